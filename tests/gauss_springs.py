@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Abilities, Promises, Rules, Traits
+from contactverif import Abilities, Promises, Rules, Subject, Traits
 
 C = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # The places of the Gauss points on a slave segment
 TRAITS = Traits(

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.traits import Promises, Rules, Traits
+from contactverif import ContactPoints, Promises, Rules, Traits
 
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
 

@@ -6,12 +6,8 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
-from contactverif.contract.case import Case
+from contactverif import Case, Outcome, Property, Subject, Verdict, judge_case, load_formulation, load_properties
 from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.subject import Subject
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_formulation, load_properties
 
 
 @cache

@@ -42,15 +42,8 @@ from expected_verdicts import FLAT as PATCH
 from subjects import judge_as, load_property, load_subject, with_promises
 
 import contactverif_nts
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.result import Row
-from contactverif.contract.subject import Subject
+from contactverif import Case, Interface, Measurement, Outcome, Property, Row, Subject, Verdict, judge_case, named_case
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.problems.named_states import named_case
-from contactverif.run.judge import judge_case
 from contactverif.run.registry import load_properties, property_ids, standalone_names
 from contactverif.run.run import run
 

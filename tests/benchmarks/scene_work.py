@@ -20,15 +20,11 @@ from unittest.mock import patch
 
 import numpy as np
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
+from contactverif import Case, Property, Subject, judge_case, load_formulation, load_properties
 from contactverif.mechanics import bulk
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
 from contactverif.mechanics.trace import Record, Trace
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_formulation, load_properties
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,10 @@ from racing import Race
 from scipy.sparse.linalg import splu
 from subjects import load_property, load_subject
 
-from contactverif import Scene, block, solve, two_blocks
-from contactverif.contract.subject import Subject
+from contactverif import Rectangle, Scene, Subject, block, judge_case, solve, two_blocks
 from contactverif.mechanics.bulk import assemble_stiffness, condense, forget_condensed
 from contactverif.mechanics.scene import forget_bodies
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.uniform_stress import stress_error
-from contactverif.run.judge import judge_case
 
 N_MESHES = 10
 ROUNDOFF = 1e-11  # The stress error of the plain script and of ours.

@@ -8,11 +8,8 @@ import pytest
 from racing import Race
 from subjects import load_property, load_subject
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Property, Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Property, Subject, Verdict, judge_case
 from contactverif.run.draw import Sampling, draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
 from contactverif.studies.bench.cell_runs import time_yardstick
 

@@ -6,8 +6,7 @@ import pytest
 from scene_work import measure_work
 from subjects import load_subject
 
-from contactverif.contract.property import Property
-from contactverif.run.registry import load_properties
+from contactverif import Property, load_properties
 
 WITH_BODIES = {item.id: item for item in load_properties(["*"]) if isinstance(item, Property) and item.bodies}
 MOST_VISITED = 1.5  # Facets that are visited for each one that touches: where contact ends must be found.

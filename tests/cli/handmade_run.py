@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from subjects import load_property
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.result import Row, Run
+from contactverif import Case, Outcome, Row, Run, Verdict
 
 
 def run_with(case: Case, formulation: str, property_id: str = "patch.flat.transmission") -> Run:

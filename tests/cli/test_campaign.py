@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from asking import Ask, asking
 
-from contactverif.contract.property import Property
-from contactverif.run.registry import load_properties
+from contactverif import Property, load_properties
 from contactverif.run.run_journal import KnownOutcomes
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run

@@ -15,10 +15,8 @@ import netCDF4
 import pytest
 from asking import Ask, check_mistake
 
-from contactverif.contract.property import Verdict
-from contactverif.contract.result import Run
+from contactverif import Run, Verdict, load_formulation, load_properties
 from contactverif.run import judge as judging
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.write import write

@@ -15,10 +15,9 @@ from foreign_texts import TEXTS, hidden_characters
 from handmade_run import run_with
 from rich.progress import Progress
 
+from contactverif import Case, Interface
 from contactverif.cli import console
 from contactverif.cli.progress import Bar
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
 from contactverif_reports.netcdf.write import write
 
 PLUGIN = """

@@ -14,13 +14,11 @@ from asking import Ask, check_mistake
 from handmade_run import run_with
 from subjects import Changed, load_subject
 
+from contactverif import End, Subject, named_case
 from contactverif.cli import scene_drawing
 from contactverif.cli.gallery import MEANINGS
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.trace import End
 from contactverif.problems.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
-from contactverif.problems.named_states import named_case
 from contactverif.run import judge as judging
 from contactverif.studies import solved_scenes as pictures
 from contactverif_reports.netcdf.write import write

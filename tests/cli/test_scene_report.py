@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 from handmade_run import run_with
 
-from contactverif.contract.case import Case
+from contactverif import Case, Placing, Rectangle, load_formulation, two_blocks
 from contactverif.mechanics.scene import has_bodies, scene_of
-from contactverif.mechanics.simple_bodies import Placing, Rectangle
-from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import SCENES, load_scene
-from contactverif.run.registry import load_formulation
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, read_case

@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contactverif import Body, MisuseError, Placing, Rectangle, block, rigid_surface
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.contract.body import Body
-from contactverif.contract.errors import MisuseError
-from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 
 # Four cells; nodes are numbered along x from below, so 0 1 2 touch and 6 7 8 are held.
 BLOCK = block(Rectangle([0, 1, 2], [0, 1, 2]), contact="bottom", approach=0.1)

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface
+from contactverif import Case, Interface, MisuseError, Surface
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
 Z = PAIR.nodes.reshape(-1) + np.array([0, -0.5] * 3 + [0, 0] * 2)

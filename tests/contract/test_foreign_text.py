@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from foreign_texts import TEXTS, hidden_characters
 
-from contactverif.contract.case import Case
+from contactverif import Case, Finding, Interface, Measurement, MisuseError, Quantity, Subject
 from contactverif.contract.counterexample import case_id, named_case_id, typeable
-from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import (
     LONGEST_LINE,
     LONGEST_NAME,
@@ -17,11 +16,8 @@ from contactverif.contract.foreign_text import (
     one_line,
     printable,
 )
-from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
-from contactverif.contract.subject import Subject
 
 texts = pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 

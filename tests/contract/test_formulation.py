@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contactverif.contract.errors import ContractError, MisuseError
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
+from contactverif import ContactPoints, ContractError, Interface, MisuseError, Pairing
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 
 PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns

@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface
+from contactverif import Interface, MisuseError, Surface
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[4, 0], [2, 0], [1.5, 0.5], [-1, 0]])
 

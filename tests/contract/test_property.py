@@ -10,14 +10,8 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
-from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif import Case, Cases, Finding, Interface, Measurement, Quantity, Rules, Subject, Traits, named_case
 from contactverif.contract.property import Outcome, Property, Verdict, judge
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Rules, Traits
-from contactverif.problems.named_states import named_case
 
 MOST = Quantity("defect", "u 8X/|g|", "roundoff of a gap")
 LEAST = Quantity("slope", "1.9", "second order", sense="at least")

@@ -6,9 +6,8 @@ from fractions import Fraction
 
 import pytest
 
-from contactverif.contract.errors import ContractError
+from contactverif import ContractError, Evidence, Traits
 from contactverif.contract.published_forces import format_forces, parse_forces
-from contactverif.contract.traits import Evidence, Traits
 
 
 def test_text_becomes_fractions_and_text_again() -> None:

@@ -10,15 +10,10 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from contactverif import Case, CheckedFormulation, ContactPoints, Interface, Pairing, Subject, evaluate_both, named_case
 from contactverif.contract.arrays import dense
-from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.formulation import ContactPoints, evaluate_both
-from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Abilities, Promises, Rules, Traits
-from contactverif.problems.named_states import named_case
 from contactverif.run.registry import load_formulation
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])

@@ -19,8 +19,7 @@ import meshio
 import numpy as np
 from damage import BYTES, GOOD, Ending, Table, run_command
 
-from contactverif.contract.errors import MisuseError
-from contactverif.meshes.mesh_file import read_interface
+from contactverif import MisuseError, read_interface
 
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
 # {file: (format of meshio, options of its writer, the groups)}, without those that need a further package.

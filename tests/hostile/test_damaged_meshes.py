@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from damaged_meshes import FORMATS, KINDS, NAMES, strange_files, write_meshes
 
-from contactverif.contract.errors import MisuseError
+from contactverif import MisuseError, read_interface
 from contactverif.isolation.limits import Limits
 from contactverif.meshes import plain_mesh
-from contactverif.meshes.mesh_file import read_interface
 from contactverif.meshes.plain_mesh import read_mesh
 
 N_FILES = 12  # The number of files with each kind of damage.

@@ -13,10 +13,9 @@ import pytest
 from damage import BYTES
 from damaged_reports import TREES, Campaign, import_everything, lie_about_sizes, write_report, write_tree
 
+from contactverif import MisuseError, load_scene
 from contactverif.contract.counterexample import counterexamples
-from contactverif.contract.errors import MisuseError
 from contactverif.isolation.limits import Limits
-from contactverif.problems.catalogue import load_scene
 from contactverif_reports.netcdf import bench_file, stored_groups
 from contactverif_reports.netcdf.bench_file import read_bench
 from contactverif_reports.netcdf.read import read_run

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from isolation import hostile_few
 
-from contactverif import load_formulation, named_case
+from contactverif import ContractError, MisuseError, load_formulation, named_case
 from contactverif.contract.arrays import dense
-from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.isolation import process
 from contactverif.isolation.limits import Limits

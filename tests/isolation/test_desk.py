@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contactverif import named_case
+from contactverif import load_formulation, named_case
 from contactverif.isolation.messages import (
     Answer,
     Ask,
@@ -22,7 +22,6 @@ from contactverif.isolation.messages import (
 )
 from contactverif.isolation.packed import PackedArray
 from contactverif.isolation.worker import Desk
-from contactverif.run.registry import load_formulation
 
 INTERFACE = named_case("c").interface
 Z = named_case("c").z

@@ -10,10 +10,9 @@ import psutil
 import pytest
 from isolation import hostile_few
 
-from contactverif import Pairing, Subject, load_formulation, load_properties, named_case, verify
+from contactverif import Pairing, Subject, Verdict, load_formulation, load_properties, named_case, verify
 from contactverif.contract.arrays import dense
 from contactverif.contract.errors import ContractError, MisuseError, PluginError
-from contactverif.contract.property import Verdict
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import host, process
 from contactverif.isolation.limits import Limits

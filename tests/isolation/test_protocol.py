@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from isolation import hostile_few
 
-from contactverif import Subject, load_properties, named_case, verify
+from contactverif import Subject, Verdict, load_properties, named_case, verify
 from contactverif.contract.errors import PluginError
-from contactverif.contract.property import Verdict
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote

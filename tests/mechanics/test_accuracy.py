@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
+from contactverif import ContactPoints, Interface, load_scene
 from contactverif.mechanics.accuracy import (
     displacement_error,
     fit_rate,
@@ -20,7 +19,6 @@ from contactverif.mechanics.accuracy import (
     solve_for_accuracy,
     traction_forces,
 )
-from contactverif.problems.catalogue import load_scene
 
 INTERFACE = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[3, 0], [0, 0]])
 

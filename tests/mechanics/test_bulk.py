@@ -13,14 +13,10 @@ import pytest
 import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
+from contactverif import Body, MisuseError, Placing, Rectangle, Scene, block, body_from_mesh, rigid_surface
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.body import Body
-from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import bulk
 from contactverif.mechanics.bulk import assemble_stiffness, condense, loose_modes
-from contactverif.mechanics.mesh_bodies import body_from_mesh
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.problems.blocks import exact_unknowns, two_blocks
 
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))

@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.errors import MisuseError
+from contactverif import MisuseError, Placing, Rectangle, Scene, solve, two_blocks
 from contactverif.mechanics.changed_scenes import change_units, move, snap
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Placing, Rectangle
-from contactverif.problems.blocks import two_blocks
 
 LENGTH, MODULUS = 2.0**-31, 4.0**13
 

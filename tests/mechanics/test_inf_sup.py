@@ -9,10 +9,9 @@ import pytest
 from scipy import linalg
 from subjects import Changed, load_subject
 
+from contactverif import CheckedFormulation, Scene, Subject
 from contactverif.contract.arrays import dense
-from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.inf_sup import InfSup, force_rows, gap_rows, inf_sup_constant
-from contactverif.mechanics.scene import Scene
 from contactverif.problems.refined_blocks import refined_blocks
 
 

@@ -14,20 +14,13 @@ import pytest
 from scipy import sparse
 from subjects import Changed, load_subject
 
+from contactverif import CheckedFormulation, End, Interface, Rectangle, Scene, Subject, Trace, Traits, solve, two_blocks
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import MisuseError, PluginError
-from contactverif.contract.interface import Interface
-from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.contract.traits import Traits
 from contactverif.mechanics import bulk, linear
 from contactverif.mechanics import scene as scene_module
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.mechanics.system import System
-from contactverif.mechanics.trace import End, Trace
 from contactverif.problems import catalogue
-from contactverif.problems.blocks import two_blocks
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
 

@@ -12,19 +12,13 @@ import pytest
 import skfem
 from subjects import Changed, load_subject
 
-from contactverif import oracle
+from contactverif import Body, Case, Interface, MisuseError, Subject, Surface, body_from_mesh, oracle
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.body import Body
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.subject import Subject
 from contactverif.geometry import chain_search, projection
 from contactverif.geometry.compiled import python_function
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.bulk import assemble_stiffness
-from contactverif.mechanics.mesh_bodies import body_from_mesh
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.problems import catalogue

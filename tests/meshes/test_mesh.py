@@ -9,8 +9,7 @@ import meshio
 import numpy as np
 import pytest
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
+from contactverif import Interface, MisuseError
 from contactverif.meshes.mesh_file import check_facing, read_interface
 
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"

@@ -6,12 +6,8 @@ from functools import cache
 
 from mutate import Mutant
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Property, Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
 from contactverif.run.draw import Sampling, draw_cases
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_properties
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
 OTHERS = 20  # Cases of each other property, which fill the matrix and decide nothing.

@@ -11,9 +11,7 @@ from mutate import Mutant, changed_line
 from subjects import load_property, load_subject
 from wrong import MUTANTS, SURVIVORS
 
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
-from contactverif.run.judge import judge_case
+from contactverif import Subject, Verdict, judge_case
 from contactverif.run.registry import load_formulation, load_properties, property_ids
 from contactverif.run.run import run
 

@@ -12,16 +12,14 @@ from exact_projection import project_point, projection_cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from contactverif import Case, Interface, Surface, named_case
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface, Surface
 from contactverif.oracle import (
     default_points,
     kink_margin,
     uniform_pressure_weights,
     uniform_pressure_weights_exact,
 )
-from contactverif.problems.named_states import named_case
 from contactverif.strategies import flat_cases, general_cases, smooth_cases
 from contactverif.strategies.solids import dead_zone_cases
 

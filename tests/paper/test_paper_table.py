@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from subjects import judge_as, load_property, load_subject
 
+from contactverif import Trace, Verdict
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.property import Verdict
 from contactverif.mechanics import newton
-from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 

@@ -14,8 +14,7 @@ import numpy as np
 from every_formulation import FORMULATIONS, draw_multipliers
 from surfaces import make_bent, make_far
 
-from contactverif import Interface
-from contactverif.run.registry import load_formulation
+from contactverif import Interface, load_formulation
 
 PENALTY = 3.75
 STEP = 2.0**-40

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
-from contactverif import Interface
-from contactverif.contract.interface import Surface
+from contactverif import Interface, Surface
 from contactverif.geometry.projection import search_tree
 from contactverif_mortar import sts
 from contactverif_mortar.cell_geometry import SlaveView

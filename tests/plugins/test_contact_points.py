@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface, Surface
+from contactverif import ContactPoints, Interface, Surface
 
 # Slave segment 2 is edge-on to the first master segment: t_AB·t is −3e-18, negative by rounding alone.
 EDGE_ON = [

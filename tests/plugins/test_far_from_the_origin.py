@@ -10,10 +10,8 @@ import pytest
 from every_formulation import FORMULATIONS, draw_multipliers
 from surfaces import make_on_grid
 
-from contactverif import Interface
+from contactverif import ContactPoints, Interface, load_formulation
 from contactverif.contract.arrays import dense
-from contactverif.contract.formulation import ContactPoints
-from contactverif.run.registry import load_formulation
 
 KINDS = ("flat", "turned", "tilted", "kinked", "overhanging")
 OFFSETS = ((2.0**20, 0.0), (-(2.0**20), 2.0**20), (2.0**10, -(2.0**17)))

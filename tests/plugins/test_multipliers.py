@@ -11,13 +11,7 @@ from surfaces import DEPTH, make_bent, make_flat
 from test_forces import TABLE, read_fractions
 
 import contactverif_nts
-from contactverif import MisuseError
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.mechanics.trace import Trace
-from contactverif.problems.blocks import two_blocks
+from contactverif import MisuseError, Rectangle, Scene, Subject, Trace, solve, two_blocks
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.uniform_stress import stress_error
 

@@ -10,9 +10,8 @@ import pytest
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 import contactverif_mortar
-from contactverif import Interface, MisuseError
+from contactverif import Interface, MisuseError, named_case
 from contactverif.oracle import uniform_pressure_weights_exact
-from contactverif.problems.named_states import named_case
 
 PRESSURE_FROM_POSITIONS = [
     ("sts", {}),

@@ -12,14 +12,9 @@ from surfaces import DEPTH, contact_forces, make_bent, make_flat
 from test_forces import PENALTY
 
 import contactverif_nts
-from contactverif import Abilities, Interface, Pairing, Promises, Traits
+from contactverif import Abilities, Interface, Pairing, Promises, Scene, Subject, Trace, Traits, solve, two_blocks
 from contactverif.contract.errors import ContractError
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.mechanics.trace import Trace
-from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_nts import two_pass

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
+from contactverif import MisuseError, Scene
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.mechanics import newton
-from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, pressure_of

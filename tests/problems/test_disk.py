@@ -9,12 +9,9 @@ import pytest
 from scipy.spatial import cKDTree
 from subjects import load_subject
 
+from contactverif import Body, End, MisuseError, Scene
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.body import Body
-from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import newton
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.trace import End
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
 from contactverif_paper.disk_solutions import DiskSolution, difference, flatter, solve_disk

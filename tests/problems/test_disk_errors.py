@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
+from contactverif import Scene, Surface
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.interface import Surface
 from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, solve_for_accuracy, traction_forces
-from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import disk_on_foundation
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Errors, ProblemInstance
 

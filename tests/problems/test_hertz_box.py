@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.errors import MisuseError
-from contactverif.mechanics.newton import solve
+from contactverif import MisuseError, solve
 from contactverif.problems.hertz_box import (
     COARSEST,
     HertzBox,

@@ -8,11 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif import Case, ContactPoints, Interface, Subject, Traits
 
 
 class Handmade:

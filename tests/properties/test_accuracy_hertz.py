@@ -6,13 +6,10 @@ import pytest
 from subjects import judge_as, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Subject, Verdict, judge_case
 from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.hertz_box import BOX, COARSEST, HERTZ_STUDIES, PENALTIES, HertzStudy, hertz_cases
 from contactverif.problems.problem import Errors
-from contactverif.run.judge import judge_case
 from contactverif_properties.convergence import accuracy_hertz
 
 CASES = {case.name: case for case in hertz_cases()}

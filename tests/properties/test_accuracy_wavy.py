@@ -11,13 +11,9 @@ import pytest
 from subjects import judge_as, load_subject
 from wave_strangers import Heights
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Property, Verdict
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Promises, Traits
+from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
 from contactverif.problems.problem import PRESSURE
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
-from contactverif.run.judge import judge_case
 from contactverif_properties.convergence import accuracy_wavy, accuracy_wavy_curved, promise_without_locking
 
 NAMES = ("upper slave, 10 E/h", "upper slave, 1000 E/h", "lower slave, 10 E/h", "lower slave, 1000 E/h")

@@ -10,12 +10,8 @@ import pytest
 from subjects import Changed, change_verbs, judge_as, load_property, load_subject
 
 import contactverif_mortar
-from contactverif.contract.case import Case
-from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
-from contactverif.run.judge import judge_case
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 

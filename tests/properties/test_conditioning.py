@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.subject import Subject
+from contactverif import Case, Interface, Subject
 from contactverif_properties.shared.any_state import freeze_state
 from contactverif_properties.shared.conditioning import (
     count_tangent_roundings,

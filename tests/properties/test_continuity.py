@@ -11,12 +11,8 @@ from strangers import SlaveNormalAtGaussPoints
 from subjects import judge_as, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 
+from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Promises, Traits
-from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.continuity import N_STEPS, continuity, find_jumps

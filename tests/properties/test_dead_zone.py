@@ -10,11 +10,9 @@ import pytest
 from subjects import judge_as, load_subject, reporting
 
 import contactverif_mortar
-from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints
+from contactverif import Case, ContactPoints, Rectangle
 from contactverif.contract.property import Verdict, judge
 from contactverif.mechanics.scene import scene_of
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, two_blocks
 from contactverif.problems.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.problems.uniform_stress import stress_error

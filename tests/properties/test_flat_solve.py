@@ -10,12 +10,9 @@ import pytest
 from subjects import Changed, judge_as, load_subject, reporting
 
 import contactverif_nts
-from contactverif.contract.case import Case
+from contactverif import Case, Rectangle, Subject, solve
 from contactverif.contract.property import Property, Verdict, judge
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import pressure_of, two_blocks
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.draw import draw_cases

@@ -8,12 +8,7 @@ from handles import Handled
 
 import contactverif_mortar
 import contactverif_nts
-from contactverif.contract.errors import ContractError
-from contactverif.contract.pairing import Handle, Pairing
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
-from contactverif.problems.catalogue import load_scene
-from contactverif.run.registry import load_properties
+from contactverif import ContractError, Handle, Pairing, Subject, Verdict, load_properties, load_scene
 from contactverif.run.run import run
 
 RIGHT = {

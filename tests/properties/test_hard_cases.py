@@ -11,12 +11,8 @@ from hard_strangers import PointSprings, Softened, simpson, trapezoid
 from subjects import load_property, load_subject, with_promises
 
 import contactverif_nts
-from contactverif.contract.case import Case
-from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
 from contactverif_properties.hard_solved import covered_share
 

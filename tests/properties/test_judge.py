@@ -11,11 +11,8 @@ from fresh_process import PYTHON
 from handmade import Handmade, case, subject
 from subjects import judge_as
 
-from contactverif.contract.property import Property, Verdict
+from contactverif import Property, Verdict, judge_case, load_properties, named_case
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
-from contactverif.problems.named_states import named_case
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_properties
 from contactverif_properties.balance import force_balance, moment_balance
 from contactverif_properties.patch_flat import FORCE, patch_flat_transmission
 

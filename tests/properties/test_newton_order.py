@@ -11,17 +11,11 @@ import pytest
 from subjects import judge_as, load_subject
 
 import contactverif_nts
+from contactverif import End, Rectangle, Subject, Trace, Verdict, judge_case, solve, two_blocks
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.mechanics.system import System
-from contactverif.mechanics.trace import End, Trace
-from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif_properties.newton_attainable import newton_attainable
 from contactverif_properties.newton_convergence import (

@@ -9,12 +9,8 @@ import pytest
 from subjects import Changed, load_subject
 
 import contactverif_nts
-from contactverif.contract.case import Case
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif import Case, Subject, Traits, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.newton_units import STEPS, newton_units
 

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from subjects import change_verbs, load_subject
 
-from contactverif import Interface, Subject
-from contactverif.contract.case import Case
-from contactverif.contract.property import Verdict
-from contactverif.run.judge import judge_case
+from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif_nts import vts_ppt
 from contactverif_properties.pushes import nodal_push
 

@@ -10,10 +10,7 @@ import pytest
 from handmade import Handmade, Springs, case, over_a_node, subject
 from subjects import judge_as, load_subject
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.property import Verdict
-from contactverif.run.judge import judge_case
+from contactverif import Case, Interface, Verdict, judge_case
 from contactverif_properties.frames import objectivity
 
 SEEDS = range(1, 30)

@@ -17,15 +17,11 @@ from subjects import load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Verdict
+from contactverif import Case, PatchPromises, Promises, Rules, Subject, Traits, Verdict, judge_case
 from contactverif.contract.published_forces import parse_forces
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif_nts import force_tables
 from contactverif_properties.patch_flat import LOST_END

@@ -13,13 +13,8 @@ from strangers import STRANGERS, PointsFirst, TurnedFrame
 from subjects import load_property, load_subject, measure_case, reporting
 
 import contactverif_mortar
-from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, ContactPoints, Interface, Outcome, Subject, Surface, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 
 IDS = ("projection.segment", "projection.place", "projection.activity", "projection.area", "projection.forces")
 

@@ -10,10 +10,7 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 from subjects import judge_as
 
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
-from contactverif.run.judge import judge_case
+from contactverif import Measurement, Quantity, Subject, Verdict, judge_case
 from contactverif_properties.purity import (
     BATCHED,
     IN_ONE_CALL,

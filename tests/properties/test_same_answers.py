@@ -14,12 +14,8 @@ from test_straight_slaves import RIGHT_ONES
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
 import contactverif_nts
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Interface, Subject, Surface, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif_properties.balance import symmetric
 from contactverif_properties.invariants import (
     BEHIND,

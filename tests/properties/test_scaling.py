@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from handmade import Springs, case, subject
 
-from contactverif.contract.property import Verdict
-from contactverif.contract.traits import Rules, Traits
-from contactverif.run.judge import judge_case
+from contactverif import Rules, Traits, Verdict, judge_case
 from contactverif.run.run import run
 from contactverif_properties.frames import SCALED_FORCES, SCALED_TANGENT, scaling
 

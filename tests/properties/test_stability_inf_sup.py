@@ -7,11 +7,8 @@ import pytest
 from subjects import load_property, load_subject, measure_case
 from textbook_springs import NodalMultipliers
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Subject, Verdict, judge_case
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
-from contactverif.run.judge import judge_case
 from contactverif_properties.stability_solutions import CONSTANT, SEGMENT, SLOPE, ZEROS
 
 QUESTION = load_property("stability.inf-sup")

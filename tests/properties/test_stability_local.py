@@ -15,9 +15,7 @@ from fresh_process import PYTHON
 from gauss_springs import RIGHT, WRONG, by_differences, springs_of
 from subjects import load_subject, measure_case
 
-from contactverif.contract.case import Case
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Abilities, PatchPromises, Promises, Rules, Traits
+from contactverif import Abilities, Case, PatchPromises, Promises, Rules, Subject, Traits
 from contactverif.run.draw import draw_cases
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.linear_gaps import node_gaps

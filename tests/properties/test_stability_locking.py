@@ -10,8 +10,7 @@ import pytest
 from subjects import Changed, alone, judge_as, load_property, load_subject, measure_case
 from textbook_cells import WeightedGaps
 
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Subject, Verdict, judge_case
 from contactverif.problems.wave_blocks import (
     COLUMNS,
     PENALTIES,
@@ -21,7 +20,6 @@ from contactverif.problems.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif_properties.shared.wave_answer import answer_to_wave
 from contactverif_properties.stability_solutions import DRIFT, ROUGHNESS

@@ -7,8 +7,7 @@ import pytest
 from gauss_springs import RIGHT, WRONG, springs_of
 from subjects import alone, load_subject, measure_case
 
-from contactverif.contract.case import Case
-from contactverif.contract.property import Property, Verdict
+from contactverif import Case, Property, Verdict
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states

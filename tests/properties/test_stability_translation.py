@@ -9,12 +9,8 @@ import pytest
 from gauss_springs import RIGHT, WRONG, by_points_first, springs_of
 from subjects import ResidualAlone, load_property, measure_case
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.shared.any_state import move_state

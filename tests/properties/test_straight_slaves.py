@@ -12,11 +12,8 @@ from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.property import Verdict
+from contactverif import Case, Interface, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
 from contactverif_properties.shared.same_answer import BITS
 

@@ -11,13 +11,12 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 from subjects import judge_as, load_subject
 
+from contactverif import Subject, judge_case
 from contactverif.cli.counterexample_output import counterexample_text
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import Verdict, judge
-from contactverif.contract.subject import Subject
 from contactverif.problems.long_states import long_states
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.run import run
 from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain

@@ -10,9 +10,7 @@ import pytest
 from handmade import Handmade, case, over_a_node, subject
 from subjects import judge_as
 
-from contactverif.contract.property import Verdict
-from contactverif.contract.traits import Promises, Traits
-from contactverif.run.judge import judge_case
+from contactverif import Promises, Traits, Verdict, judge_case
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.tangent_directional import (
     CENTRAL,

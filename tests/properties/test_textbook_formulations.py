@@ -7,10 +7,8 @@ from subjects import load_property
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
-from contactverif.contract.property import Verdict
-from contactverif.contract.subject import Subject
+from contactverif import Subject, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
 from contactverif.run.registry import property_ids
 
 FORMULATIONS = (CentredSprings, QuadraticSprings, NodalMultipliers, ClippedCells, WeightedGaps)

@@ -8,17 +8,10 @@ import numpy as np
 import pytest
 from subjects import judge_as, load_subject
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.property import Verdict
+from contactverif import Case, Interface, Pairing, Subject, Verdict, judge_case, load_properties, named_case
 from contactverif.contract.result import OPPOSITE_SIGN
-from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
-from contactverif.problems.named_states import named_case
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_properties
 from contactverif.run.run import run
 from contactverif_mortar import mortar, mortar_lm
 from contactverif_properties.pushes import allowed_pushes, lift_slave, nodal_push, unilateral

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.traits import Abilities, Promises, Rules, Traits
+from contactverif import Abilities, ContactPoints, Promises, Rules, Traits
 
 STEP = 1e-40  # The complex step: no difference is formed, so any step will do.
 

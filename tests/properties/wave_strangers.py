@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.traits import Promises, Rules, Traits
+from contactverif import ContactPoints, Promises, Rules, Traits
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(2)
 

@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif import Case, Interface, Measurement, Outcome, Property, Quantity, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 
 ERROR = Quantity("force error", "u(8X/|g| + 4N)", "rounding of the gap, and of N sums")

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactverif import Body, Case, Interface, Placing, Rectangle, Surface, block, rigid_surface
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.body import Body
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface, Surface
-from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
 from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
 
 PRESSURE = 100.0

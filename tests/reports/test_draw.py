@@ -9,9 +9,7 @@ import pytest
 from fresh_process import PYTHON
 from handmade_report import awkward, flat
 
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface
+from contactverif import Case, Interface, MisuseError, Surface
 from contactverif_reports.draw import as_text, draw_case
 from contactverif_reports.draw.lengths import format_number
 

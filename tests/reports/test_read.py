@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 from handmade_report import ERROR, awkward, small_run
 
-from contactverif.contract.case import Case
+from contactverif import Case, MisuseError, Verdict
 from contactverif.contract.counterexample import Origin
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Verdict
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, open_report, read_case

@@ -15,16 +15,13 @@ import pytest
 from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, run_with_kinds, small_run
 from rich.console import Console, RenderableType
 
+from contactverif import Finding, Measurement, MisuseError, Outcome, Verdict, load_formulation, load_properties
 from contactverif.cli.comparison_tables import errors_table, iterations_table, last_line, results_table
 from contactverif.cli.counterexample_output import counterexample_text, failing_examples, how_to_keep
 from contactverif.cli.report_comparison import ChangesTable, regressions_text
 from contactverif.cli.run_tables import RunTable, summary
 from contactverif.contract.counterexample import counterexamples
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.measurement import Finding, Measurement
-from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run as verify
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import Comparison

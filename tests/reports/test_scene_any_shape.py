@@ -7,10 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle, block
-from contactverif.problems.catalogue import load_scene
-from contactverif.run.registry import load_formulation
+from contactverif import Rectangle, Scene, block, load_formulation, load_scene
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw.scene_figures import draw_scene
 from contactverif_reports.draw.scene_meshes import close_up, magnifications

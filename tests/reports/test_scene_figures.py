@@ -12,8 +12,7 @@ from handmade_scene import make_solved_scene
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
+from contactverif import Case, MisuseError
 from contactverif_reports.draw import case_figure as figures
 from contactverif_reports.draw.case_geometry import Gaps
 from contactverif_reports.draw.scene_figures import choose_pen, draw_scene

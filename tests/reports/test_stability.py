@@ -12,11 +12,9 @@ from gauss_springs import RIGHT, WRONG, springs_of
 from matplotlib.axes import Axes
 from matplotlib.text import Text
 
+from contactverif import MisuseError, Outcome, Subject, Verdict
 from contactverif.contract.counterexample import counterexamples, find_counterexample, named_failures
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
-from contactverif.contract.subject import Subject
 from contactverif.problems.stability_states import stability_scenes, stability_states
 from contactverif.studies.stability_study import run_stability
 from contactverif_properties.shared.conditioning import CONDITION, ERROR, FORCE_ERROR, MOST_ROUNDINGS

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from handmade_scene import PRESSURE, make_solved_scene
 
-from contactverif.contract.body import Body
-from contactverif.contract.errors import MisuseError
+from contactverif import Body, MisuseError
 from contactverif_reports.draw.solved_scene import SolvedScene
 from contactverif_reports.draw.vtu import write_vtu
 

@@ -16,11 +16,8 @@ import pytest
 import xarray as xr
 from handmade_report import ERROR, flat, outcome, question, small_run
 
-from contactverif import load_formulation, load_properties, verify
+from contactverif import MisuseError, Row, Run, Verdict, load_formulation, load_properties, verify
 from contactverif.contract.counterexample import case_id
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Verdict
-from contactverif.contract.result import Row, Run
 from contactverif_reports.files import check_writable
 from contactverif_reports.netcdf import report_tree
 from contactverif_reports.netcdf.differences import same_data

@@ -11,15 +11,11 @@ from expected_verdicts import FAILS
 from hypothesis import strategies as st
 from subjects import Changed
 
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
+from contactverif import Case, MisuseError, Subject, load_formulation, load_properties, named_case
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Property, PropertyInfo, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
-from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.problems.named_states import named_case
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run
 from contactverif.testing.failure_text import explain
 from contactverif_mortar import mortar_lm

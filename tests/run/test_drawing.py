@@ -13,16 +13,10 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from contactverif.contract.case import Case
+from contactverif import Case, Interface, Measurement, Property, Quantity, Subject, Traits, Verdict, load_properties
 from contactverif.contract.cases import random_source
-from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Property, Verdict
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
 from contactverif.run.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
 from contactverif.run.hypothesis_draws import draw_different, find_difference, shrink_choices
-from contactverif.run.registry import load_properties
 from contactverif.run.rows import WHOLE
 from contactverif.run.run import run
 

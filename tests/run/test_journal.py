@@ -12,16 +12,11 @@ import numpy as np
 import pytest
 from test_scheduler import facts
 
-from contactverif.contract.errors import MisuseError
+from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formulation, load_properties, named_case
 from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.result import Run
-from contactverif.contract.subject import Subject
-from contactverif.problems.named_states import named_case
 from contactverif.run import run as run_module
 from contactverif.run.draw import Sampling
 from contactverif.run.journal import begin_journal, hold_journal, journal_folder, read_messages, remove_journal
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.rows import find_gap
 from contactverif.run.run import RunStopped, run
 from contactverif.run.run_journal import (

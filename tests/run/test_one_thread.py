@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from subjects import load_property
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from contactverif import named_case
-from contactverif.contract.case import Case
+from contactverif import Case, named_case
 from contactverif.run.draw import Sampling, draw_cases, shrink
 
 # A run that judged something before scipy's own BLAS was there.

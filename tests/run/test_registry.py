@@ -8,11 +8,8 @@ from typing import Any, Literal
 
 import pytest
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Property
+from contactverif import MisuseError, Property, Subject, Traits
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
 from contactverif.run import registry
 from contactverif.run.registry import load_formulation, load_formulations, load_properties, subject_of
 

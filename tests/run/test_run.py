@@ -16,16 +16,11 @@ from hypothesis import strategies as st
 from subjects import judge_as
 from threadpoolctl import threadpool_info
 
-from contactverif.contract.case import Case
+from contactverif import Case, Interface, MisuseError, Outcome, Property, Subject, Verdict, judge_case
 from contactverif.contract.counterexample import Origin, counterexamples
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
-from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.run.judge import judge_case
 from contactverif.run.profiles import PROFILES
 from contactverif.run.run import run
 from contactverif.run.scheduler import Progress

@@ -15,16 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contactverif.contract.case import Case
+from contactverif import Case, Interface, Outcome, Row, Run, Subject, load_formulation, load_properties, named_case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
-from contactverif.contract.property import Outcome
-from contactverif.contract.result import Row, Run
-from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.problems.named_states import named_case
 from contactverif.run import scheduler
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run
 from contactverif.run.scheduler import CaseChunk, WorkerError, decode, default_jobs, encode, usable_cores, worker_pool
 

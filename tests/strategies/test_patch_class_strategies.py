@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import find, settings
 
-from contactverif.contract.case import Case
+from contactverif import Case, named_case
 from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
-from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.strategies import normal_cases, overhung_cases, single_cases
 

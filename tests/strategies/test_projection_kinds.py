@@ -10,11 +10,9 @@ from exact_projection import project_point
 from hypothesis import Phase, find, settings
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
+from contactverif import Case, Interface, named_case
 from contactverif.oracle import is_of_kind, kind_of
 from contactverif.oracle.projection_kinds import KIND_TESTS
-from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.strategies.projections import KINDS, cases_of_kind, projection_states
 

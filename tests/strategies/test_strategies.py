@@ -12,10 +12,8 @@ from exact_projection import projection_cases
 from hypothesis import find, settings
 from hypothesis.strategies import SearchStrategy
 
+from contactverif import Case, Interface, MisuseError
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import default_points, kink_margin
 from contactverif.problems.blocks import is_uniform, overhangs

@@ -23,9 +23,8 @@ from fresh_process import MAIN
 from msgspec import structs
 from subjects import Changed, alone, load_subject
 
-from contactverif.contract.errors import MisuseError
+from contactverif import MisuseError, Subject
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import Subject
 from contactverif.isolation import remote_formulation
 from contactverif.isolation.host import answer_of
 from contactverif.isolation.limits import Limits

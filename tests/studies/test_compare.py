@@ -11,18 +11,12 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
+from contactverif import Case, End, Interface, Subject, load_formulation, load_properties, load_scene, solve
 from contactverif.cli.report_comparison import regressions_text
-from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Outcome, Property, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.trace import End
-from contactverif.problems.catalogue import load_scene
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.scheduler import worker_pool
 from contactverif.studies.comparison_study import find_differing, run_comparison
 from contactverif.studies.evaluation_cost import make_state, measure_costs

@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 from subjects import load_subject
 
-from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
+from contactverif import Case, MisuseError, Rectangle, Scene, Subject, load_scene, named_case, solve, two_blocks
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle
-from contactverif.problems.blocks import two_blocks
-from contactverif.problems.catalogue import load_scene
-from contactverif.problems.named_states import named_case
 from contactverif.run.draw import draw_cases
 from contactverif.run.judge import forces_on
 from contactverif.strategies.solids import block_cases

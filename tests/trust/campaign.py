@@ -15,11 +15,9 @@ from expected_verdicts import FAILS
 from strangers import STRANGERS
 from tables import fill
 
+from contactverif import Subject, judge_case, load_formulation, load_properties
 from contactverif.contract.property import Property, Verdict, checked_numbers
-from contactverif.contract.subject import Subject
 from contactverif.run.draw import draw_cases
-from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_formulation, load_properties
 
 FILE = "campaign.csv"
 EXAMPLES = {1: 60, 2: 30}  # {seed: random cases of each property and formulation}

@@ -16,8 +16,7 @@ from killing import OTHERS, caught_at, properties
 from tables import SURVIVES, UNKNOWN, fill
 from wrong import MUTANTS, SURVIVORS
 
-from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
+from contactverif import Property, Subject
 
 FILE = "kills.csv"
 NAMED = {mutant.name: mutant for mutant in MUTANTS} | {SURVIVES + mutant.name: mutant for mutant in SURVIVORS}

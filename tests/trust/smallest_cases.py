@@ -20,8 +20,7 @@ from subjects import load_property
 from tables import fill
 from wrong import MUTANTS
 
-from contactverif.contract.case import Case
-from contactverif.contract.subject import Subject
+from contactverif import Case, Subject
 from contactverif.run.run import run
 
 FILE, BEFORE = "smallest_cases.csv", "smallest_cases_before.csv"

@@ -20,9 +20,8 @@ from tables import fill
 
 import contactverif_mortar
 import contactverif_nts
+from contactverif import Property, Subject
 from contactverif.contract.arrays import dense
-from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
 
 FILE = "smallest_errors.csv"
 SMALLEST = 15  # Errors of 10^-1 to 10^-15.
