@@ -3,8 +3,6 @@
 All arithmetic is in integers and rationals on the stored floats, so lengths appear as their squares. A tie is reported.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ and with the file. Rule for the next editor: change an entry only with a reason 
 differs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Texts that a plugin or a file may bring, and what must never be shown of them."""
 
-from __future__ import annotations
-
 TEXTS = {
     "escape": "a\x1b[31mred\x1b]0;title\x07",
     "control": "a\rb\bc\x00d\x7fe\x9b31m",

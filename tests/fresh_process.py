@@ -1,7 +1,5 @@
 """Commands that start Python anew, on the installed packages."""
 
-from __future__ import annotations
-
 import sys
 
 # -P: the tests start in the working copy, whose packages would otherwise be imported instead of the installed ones.

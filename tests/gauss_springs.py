@@ -4,8 +4,6 @@ All ways are the same in exact arithmetic. They differ in where they round: befo
 No code of a plugin is used, so that the judges of rounding meet formulations that somebody else might write.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Formulations whose pairing is an object: right ones, and one that hides real numbers in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -4,8 +4,6 @@ Each is right by the rule that its traits state, and differs from the built-in o
 roundoff and ties decide, and in what it leaves out of its report.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Formulations and properties by name for tests, and formulations whose promises or verbs a test changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache, partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The lowest versions that are promised are those that `tox -e floors` installs and tests."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

@@ -4,8 +4,6 @@ A table of contents lists every heading of the second level below "## Contents",
 `python tests/test_habits.py FILE …` writes the table into files that have none, or a wrong one.
 """
 
-from __future__ import annotations
-
 import configparser
 import re
 import sys

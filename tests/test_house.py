@@ -3,8 +3,6 @@
 The table ROOMS is the rule; it is read against the imports of every source file, wherever in the file they stand.
 """
 
-from __future__ import annotations
-
 import ast
 import configparser
 import importlib

@@ -5,8 +5,6 @@ The rules, with examples, are in CONTRIBUTING.md. Rule for the next editor: a ru
 list of words. What needs judgement belongs to the reviewer.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import re

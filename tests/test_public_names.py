@@ -3,8 +3,6 @@
 A name that is removed or renamed breaks somebody's script; change the list together with CHANGELOG.md.
 """
 
-from __future__ import annotations
-
 import ast
 import doctest
 import importlib

@@ -3,8 +3,6 @@
 `expected_verdicts.py` holds the verdicts that theory expects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from typing import Any

@@ -18,8 +18,6 @@ step of an evaluation in µs a segment, beside the memory bound.
 Rule for the next editor: nobody is measured alone, and what is printed is the spread of ratios, not the best of them.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

@@ -7,8 +7,6 @@ A run knows the time of each call over that of a reference, measured in the same
 busier changes both, and the quotient of two ratios says what became slower. The exit status is 1 if something did.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ Rules for the next editor:
 - The file names the processor and the versions. It names no path, no host and no user.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 from importlib import metadata

@@ -10,8 +10,6 @@ The supermesh rounds its nodes to ten decimals: on meshes whose nodes are not su
 and is not roundoff.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Types for the fixture `race` in conftest.py."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

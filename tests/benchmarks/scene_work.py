@@ -7,8 +7,6 @@ What is least: each elastic body that differs in mesh, material or supports is a
 formulation visits the facets that touch at the solution; Newton's method has the free components of their nodes.
 """
 
-from __future__ import annotations
-
 import csv
 import sys
 from collections.abc import Iterator

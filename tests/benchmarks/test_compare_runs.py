@@ -1,7 +1,5 @@
 """Two runs of the benchmarks are compared by the quotient of their ratios."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

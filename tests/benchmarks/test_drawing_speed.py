@@ -1,7 +1,5 @@
 """Drawing random cases beside hypothesis' own lists of integers, and drawing pictures beside an empty figure."""
 
-from __future__ import annotations
-
 from io import BytesIO
 from typing import Any
 

@@ -3,8 +3,6 @@
 Copying as many bytes as the tangent has is the least that any kernel could do.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

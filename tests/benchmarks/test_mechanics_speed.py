@@ -1,7 +1,5 @@
 """Condensation beside its one factorisation, and a solved patch test beside a script that a user would write."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

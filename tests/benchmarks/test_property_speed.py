@@ -1,7 +1,5 @@
 """One case of each property, drawn beforehand and judged, beside the yardstick: a fixed piece of numpy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

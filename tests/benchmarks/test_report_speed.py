@@ -1,7 +1,5 @@
 """A report written and read beside numpy's own archive of the same numbers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Each body that a property needs is assembled and factorised once, and only facets that may touch are visited."""
 
-from __future__ import annotations
-
 import pytest
 from scene_work import measure_work
 from subjects import load_subject

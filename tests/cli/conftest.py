@@ -1,7 +1,5 @@
 """The fixture by which tests run `contactverif` in their own process."""
 
-from __future__ import annotations
-
 import pytest
 from asking import Ask, asking
 

@@ -1,7 +1,5 @@
 """A run made by hand, whose only counterexample is a given case."""
 
-from __future__ import annotations
-
 from subjects import load_property
 
 from contactverif import Case, Outcome, Row, Run, Verdict

@@ -1,7 +1,5 @@
 """A campaign: a run in shards gives the report of one run, and a campaign that is not whole gives none."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command line: what a user's mistake looks like, what a run prints and leaves behind, and what help costs."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

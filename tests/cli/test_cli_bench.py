@@ -1,7 +1,5 @@
 """The command `bench`: a table that fits 80 columns, files by suffix, and an exit status that follows the ratios."""
 
-from __future__ import annotations
-
 import re
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command `compare`: tables, exit statuses, files, and one line for each thing that cannot be asked."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Names, messages and files of strangers in the terminal: nothing of them is obeyed, in tables, errors or bars."""
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import replace

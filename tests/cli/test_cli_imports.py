@@ -3,8 +3,6 @@
 Modules are counted and not seconds, so that a busy machine changes nothing.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 

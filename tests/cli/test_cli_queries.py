@@ -1,7 +1,5 @@
 """The commands `queries` and `score`: files that are written and scored, a C program, and a user's mistakes."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

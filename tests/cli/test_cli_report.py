@@ -1,7 +1,5 @@
 """The command `report`: the table of the run again, a page, and one line for what cannot be."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

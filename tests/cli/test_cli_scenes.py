@@ -1,7 +1,5 @@
 """The commands that know scenes: `scenes`, `draw`, and `verify --scene`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command `stability`: a table that fits 80 columns, files by suffix, and an exit status that follows promises."""
 
-from __future__ import annotations
-
 import re
 import sys
 from functools import partial

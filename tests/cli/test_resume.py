@@ -1,7 +1,5 @@
 """A run of `verify` that is killed, stopped, or has no room to write: what is judged is kept, and the run goes on."""
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import time

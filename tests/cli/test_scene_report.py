@@ -1,7 +1,5 @@
 """A scene comes out of a report as it went in: every body, to the last bit, with a unit on every number."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import netCDF4

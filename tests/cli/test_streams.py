@@ -1,7 +1,5 @@
 """Output that cannot be written, a closed pipe, a terminal without Greek, Ctrl-C: none of them is a traceback."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The parts of a body, and a one-line message for every input that makes no body."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, radians, sin

@@ -1,7 +1,5 @@
 """A case outlives its maker bit by bit, and its scales are those of the tolerances."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A count is held against chance by the binomial distribution."""
 
-from __future__ import annotations
-
 from math import comb
 
 import pytest

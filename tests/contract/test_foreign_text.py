@@ -1,7 +1,5 @@
 """Foreign text: what is spelled out, what is cut, and which classes hold none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from foreign_texts import TEXTS, hidden_characters

@@ -1,7 +1,5 @@
 """The contract holds its own rules: a pairing is bounded integers, a promise is data, points of contact are whole."""
 
-from __future__ import annotations
-
 from dataclasses import MISSING, FrozenInstanceError, fields
 from typing import Any
 

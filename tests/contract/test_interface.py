@@ -1,7 +1,5 @@
 """An interface is either right or refused with one clear line; what it precomputes is what one would draw."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 

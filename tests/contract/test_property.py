@@ -1,7 +1,5 @@
 """From numbers to a verdict: nothing that is no number passes, and a doubt never becomes an accusation."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from math import inf, nan

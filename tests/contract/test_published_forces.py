@@ -1,7 +1,5 @@
 """Forces that a formulation states of itself, as text."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest

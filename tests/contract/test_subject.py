@@ -1,7 +1,5 @@
 """Whatever a plugin answers, what comes over the counter is checked or an error that says what was wrong."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

@@ -14,8 +14,6 @@ rows of a table those of other properties are left out. One line with "…" stan
 Rules for the next editor: nobody writes a quotation by hand, and a page runs its commands in order, in one folder.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import re

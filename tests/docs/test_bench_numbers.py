@@ -1,7 +1,5 @@
 """Numbers about speed: those of README.md and of the site are those of `reports/bench`."""
 
-from __future__ import annotations
-
 import csv
 import re
 from math import inf, log

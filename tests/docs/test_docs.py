@@ -3,8 +3,6 @@
 `test_tutorial.py` runs the tutorial, and `tests/examples` the scripts.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import xml.etree.ElementTree as ET

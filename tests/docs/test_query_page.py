@@ -1,7 +1,5 @@
 """The page about queries is true: its small files are read, scored and without an error."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from quotes import DOCS, blocks

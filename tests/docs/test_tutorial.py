@@ -4,8 +4,6 @@ tox's environment `external` installs the project for real. Here, without a netw
 sees of one: the module and a `dist-info` on the path.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """Each script of examples/ runs in an empty folder, and prints or writes what its first lines promise."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

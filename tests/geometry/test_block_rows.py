@@ -1,7 +1,5 @@
 """Blocks written straight into compressed rows, against the same blocks added up in a dense matrix."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

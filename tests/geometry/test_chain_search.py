@@ -1,7 +1,5 @@
 """The search that starts at the last answer against the one from the root, on curves made to mislead it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The tree search against rational answers, ties and all, near the origin and far from it."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Threads: parts of a range, exceptions, and how couplings are shared."""
 
-from __future__ import annotations
-
 from threading import get_ident
 
 import numpy as np

@@ -3,8 +3,6 @@
 A name is the kind and the function, `dies-exit-0`. The first line of the function's docstring says what it does.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

@@ -5,8 +5,6 @@ own, and in the process of the harness (`inline`). Every answer of the table is 
 report, in the exit status, and among the processes and files that are there afterwards.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

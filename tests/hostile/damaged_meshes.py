@@ -4,8 +4,6 @@
 harm is kept in the folder damaged/. An ending is good if the file is read, or refused in one line.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import sys

@@ -5,8 +5,6 @@ does harm is kept in the folder damaged/. An ending is good if the file is read,
 2.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import random

@@ -1,7 +1,5 @@
 """Write `reports/trust/hostile.md` from the tables that `tox -e hostile` keeps beside it."""
 
-from __future__ import annotations
-
 import sys
 from collections import defaultdict
 from pathlib import Path

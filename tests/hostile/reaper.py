@@ -7,8 +7,6 @@ between this process and the command, since a plugin may kill the process above 
 Rule for the next editor: this file imports the standard library and psutil alone, for it runs once for each plugin.
 """
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

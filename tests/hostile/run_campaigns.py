@@ -3,8 +3,6 @@
 `python tests/hostile/run_campaigns.py [KILLS LINES REPORTS MESHES]`, by default 100, 5000, 2000 and 2000.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ Cases that are asked again after a kill were lost. A plugin notes the states tha
 counted without a look into the journal: each job may lose the case that it was judging.
 """
 
-from __future__ import annotations
-
 import csv
 import os
 import random

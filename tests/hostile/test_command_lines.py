@@ -1,7 +1,5 @@
 """A sample of the random command lines; the long campaign is `python tests/hostile/command_lines.py 5000`."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 `tox -e hostile` runs all of them one by one.
 """
 
-from __future__ import annotations
-
 import pytest
 from catalogue import KINDS, PLUGINS
 from containment import CHECKS, HEADS, judge, run_command, scratch

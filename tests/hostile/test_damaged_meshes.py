@@ -1,7 +1,5 @@
 """A damaged mesh file is read or refused in one line. `damaged_meshes.py` makes many more."""
 
-from __future__ import annotations
-
 import random
 import sys
 import warnings

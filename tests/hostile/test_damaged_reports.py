@@ -1,7 +1,5 @@
 """A damaged report is read or refused in one line. `damaged_reports.py` makes many more, and runs whole commands."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The page of hostile plugins says what the tables say."""
 
-from __future__ import annotations
-
 from hostile_page import PAGE, is_whole, page, rows
 from tables import FOLDER
 

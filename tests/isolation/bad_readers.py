@@ -1,7 +1,5 @@
 """Readers that do what a library may do with a damaged file."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

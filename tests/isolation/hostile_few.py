@@ -1,7 +1,5 @@
 """A few plugins that a test asks in a process of their own, which this file is the program of."""
 
-from __future__ import annotations
-
 import sys
 
 if __name__ == "__main__":

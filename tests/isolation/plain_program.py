@@ -1,7 +1,5 @@
 """A formulation as a program that speaks the protocol and imports nothing of contactverif: springs to y = 0."""
 
-from __future__ import annotations
-
 import os
 import socket
 import struct

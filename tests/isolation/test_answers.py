@@ -1,7 +1,5 @@
 """Several questions at once: one message, the answers of questions one by one, and the first error."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A line between two processes: frames come whole, late ones are not lost, and nobody takes memory for a promise."""
 
-from __future__ import annotations
-
 import socket
 import struct
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The desk of a plugin's process: which requests have a reply, and which never do."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """However a child process ends, its parent goes on with one line."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The core that a judge shares with a plugin's process: taken after some questions, and given back."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

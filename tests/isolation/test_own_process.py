@@ -1,7 +1,5 @@
 """A plugin in a process of its own: the same answers as here, and an error whatever it does."""
 
-from __future__ import annotations
-
 import pickle
 import time
 

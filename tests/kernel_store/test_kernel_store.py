@@ -1,7 +1,5 @@
 """The store of compiled kernels: what is damaged is compiled again, and where nothing can be written it works, too."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import random

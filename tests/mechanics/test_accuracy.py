@@ -1,7 +1,5 @@
 """The error measures of `contactverif.mechanics.accuracy` are exact where the answer is known by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

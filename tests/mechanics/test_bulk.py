@@ -1,7 +1,5 @@
 """Stiffness, condensation and stresses against scikit-fem's own assembly, plain numpy and exact fields."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A scene in other units, or in another place, is the same problem to the last bit; what would round it is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, radians, sin
 

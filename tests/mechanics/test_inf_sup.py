@@ -1,7 +1,5 @@
 """The inf-sup constant, against an eigenvalue problem that is assembled here by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Linear systems of Newton's method: regular, singular, and those whose multipliers are not unique."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Newton's method: the exact pressure, every way to end, and what a trace tells."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import replace

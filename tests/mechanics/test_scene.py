@@ -1,7 +1,5 @@
 """A scene and its case are the same bits; what is far away changes none; what a scene cannot be has its line."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import cos, radians, sin

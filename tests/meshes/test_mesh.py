@@ -1,7 +1,5 @@
 """Meshes from elsewhere: every format that is promised, every way to be wrong, each with its message."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

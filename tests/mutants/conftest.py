@@ -1,7 +1,5 @@
 """Publish the kill matrix in the report of the test run: what this run judged, and the rest from the kept table."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

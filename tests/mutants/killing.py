@@ -1,7 +1,5 @@
 """Find which property catches which mutant, and at which of its cases. All mutants get the same cases."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from mutate import Mutant

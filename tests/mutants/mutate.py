@@ -3,8 +3,6 @@
 The line must stand in the source; otherwise the mutant raises, because a mutant that changes nothing proves nothing.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import itertools

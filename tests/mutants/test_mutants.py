@@ -1,7 +1,5 @@
 """Every property has a mutant that it catches; every mutant is caught by the property that is meant to catch it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Each array of the contact points has a mutant that reports it wrong."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import wrong_projection

@@ -4,8 +4,6 @@ Each mutant names the property that must catch it. Rule for the next editor: whe
 on meaning the same error; its name says which.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -3,8 +3,6 @@
 Flat patch tests and open gaps do not see them. Their tangents are exact, and forces balance.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

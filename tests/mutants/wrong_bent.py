@@ -3,8 +3,6 @@
 Their tangents are exact, and action equals reaction.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any

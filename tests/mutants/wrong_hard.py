@@ -4,8 +4,6 @@ Most of them leave out, or count twice, a contact point that some condition sing
 what the formulation itself reports, so that these mutants do not depend on the source of a kernel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 Tangents are exact, action equals reaction, and nothing is reported: what is wrong shows in the forces alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

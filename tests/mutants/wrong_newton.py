@@ -1,7 +1,5 @@
 """Mutants that are wrong in solving: numbers with a hidden unit, and points that are rounded far from the origin."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

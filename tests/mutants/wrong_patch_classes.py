@@ -4,8 +4,6 @@ Each has the traits of the right formulation. What it promises on smaller classe
 is what catches it.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

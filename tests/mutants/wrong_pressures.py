@@ -3,8 +3,6 @@
 Forces balance, and a uniform pressure is exact. Only a pressure that varies shows what is wrong.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Each of the twelve arrays of `ContactPoints` that a formulation must give has at
 two optional ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Mutants that remember something of an earlier call. Each answer is right where nothing else was asked before."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 One more hides: its tangent is wrong by noise, which would pass for a kink if anybody asked the tangent itself.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Each is right up to the precision of its numbers; `gauss_springs` has the ways of writing.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Force and tangent agree with one another, and the reported pressures stay right.
 looks at the right place: the strategies of the properties must reach it.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Mutants with a right residual and a wrong tangent: one entry, small blocks, the pattern, and large problems."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The exact nearest segments against a plain loop in fractions, and by hand."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The exact view of the master from points, against rationals by hand and against the other search of the nearest."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

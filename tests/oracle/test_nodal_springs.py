@@ -1,7 +1,5 @@
 """The forces of nodal springs, and the classes of meshes, by hand."""
 
-from __future__ import annotations
-
 import pytest
 
 from contactverif.contract.interface import Interface

@@ -1,7 +1,5 @@
 """The exact answers against the paper's tables, ties by hand, and the promise of the distance to a kink."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from fractions import Fraction

@@ -5,8 +5,6 @@ condition below 1e6: 2⁻⁵³ × 1e2 × 1e6 of the largest number of its variab
 the largest component. With springs of 1e8 E/h, as in the item on locking, the condition is 1e8.
 """
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """Single items of the paper: numbers that the page states, each checked by itself, and an item that is made up here."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated

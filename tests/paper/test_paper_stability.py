@@ -1,7 +1,5 @@
 """The items on Section 6.3: the inf-sup condition, and locking."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

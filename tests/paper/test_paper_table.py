@@ -5,8 +5,6 @@ design restores it: "pass" is an error at roundoff, "fail" one above 1e-2 of the
 10 E/h. Nothing lies between.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from subjects import judge_as, load_property, load_subject

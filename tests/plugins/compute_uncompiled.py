@@ -4,8 +4,6 @@ The file is a numpy archive. For each formulation and state of `far_states` it h
 `bent_states` the difference quotient of the residual in one direction, with a step of 2⁻⁴⁰.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from typing import Any

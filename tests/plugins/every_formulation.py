@@ -1,7 +1,5 @@
 """The built-in formulations with their options, for tests that ask all of them the same question."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

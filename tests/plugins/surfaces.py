@@ -1,7 +1,5 @@
 """Surfaces for the tests of formulations: bent and pressed into each other, flat and pressed evenly, on a grid."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any

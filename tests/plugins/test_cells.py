@@ -1,7 +1,5 @@
 """Cells agree with rational overlaps and with brute force, and bodies that must not be touched make none."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

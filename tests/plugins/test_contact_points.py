@@ -1,7 +1,5 @@
 """The reports of the built-in formulations at points that have little to say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from subjects import load_subject

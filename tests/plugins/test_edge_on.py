@@ -4,8 +4,6 @@ The foot of a virtual slave node lies past the end of its master segment there, 
 that segment, W/S, once grew like 1/S: at 1e-15 rad the forces were 1e14 times the contact force and out of balance.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from surfaces import contact_forces

@@ -1,7 +1,5 @@
 """All formulations answer alike on random bent surfaces: exact tangents, declared balance, batches, plain kernels."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """An exact translation changes no bit of a force, a tangent, a decision or a contact point."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The formulations transmit the forces of the paper's tables exactly; the printed algorithm has its known defects."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any

@@ -4,8 +4,6 @@ It once cut the part of an interior segment, too, where the foot of a virtual sl
 1.9 % of the force on a random bent surface with n = 3.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Forces of compiled kernels against the same kernels in long double, which nothing compiles."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

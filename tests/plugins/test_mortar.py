@@ -1,7 +1,5 @@
 """Mortar: shapes, weighted gaps, multipliers, normals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

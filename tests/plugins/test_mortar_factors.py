@@ -1,7 +1,5 @@
 """The factors of mortar tangents, sizes that grow too fast, and a search that stops early."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

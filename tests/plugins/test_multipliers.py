@@ -1,7 +1,5 @@
 """Lagrange multipliers: the forces of springs and of the paper's tables, who is active, and what they solve."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

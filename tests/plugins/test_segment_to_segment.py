@@ -1,7 +1,5 @@
 """Segment-to-segment and all that integrates over the same cells: exact forces, and contact points."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The sweep that makes residual and tangent of VTS-PPT: against the readable residual, wide couplings, threads."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

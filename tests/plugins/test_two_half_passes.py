@@ -1,7 +1,5 @@
 """Mortar in two half passes: what passes the patch test without cells, what does not, and why."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two passes are a sum, provide what the formulation provides, and pass the patch test with nodal multipliers only."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

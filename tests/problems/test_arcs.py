@@ -1,7 +1,5 @@
 """The exact limit of the forces between two concentric arcs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

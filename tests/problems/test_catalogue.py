@@ -1,7 +1,5 @@
 """The named scenes: all of them solve, their options do what they say, and what is no scene has its line."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Example 2: what is given and chosen of its bodies, meshes that are well shaped, and how it solves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

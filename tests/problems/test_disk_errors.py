@@ -6,8 +6,6 @@ the error bar. Against a mortar solution on a mesh four times finer, E_F of righ
 bar is 3e-3: on any mesh VTS-PPT is that far from mortar, segment-to-segment and Chen–Hisada. So no rate can be judged.
 """
 
-from __future__ import annotations
-
 from functools import cache, partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fields of a half-plane: equilibrium, Hooke's law, McEwan against superposed Flamant, and the surface."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Hertz, and Hertz on a Winkler layer: the paper's numbers, the equation itself by quadrature, and both limits."""
 
-from __future__ import annotations
-
 from math import log
 
 import numpy as np

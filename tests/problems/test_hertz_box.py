@@ -1,7 +1,5 @@
 """Hertz' boxes: meshes that match nowhere, tractions in balance, exact displacements that fit, and a first solution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from subjects import load_subject

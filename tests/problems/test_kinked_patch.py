@@ -1,7 +1,5 @@
 """The uniform state of two blocks on a broken line."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pressure of Hertz and of a layer of springs: closed forms, the equation itself, both limits, and its digits."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import pi
 

@@ -1,7 +1,5 @@
 """The exact fields of two rings that are shrunk onto each other, and their scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi
 

@@ -1,7 +1,5 @@
 """The exact fields of the wavy half-planes satisfy the equations of elasticity, and the scene is made of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

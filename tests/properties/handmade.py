@@ -1,7 +1,5 @@
 """Formulations of a few lines and meshes to draw by hand: the judge is tested without any code of a plugin."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

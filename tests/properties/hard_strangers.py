@@ -4,8 +4,6 @@ Each is a few lines of numpy without any code of a plugin. They pass no patch te
 promise, so that no hard case may accuse them.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hertz' contact as a question: who converges, who does not, and strangers who compute it in other ways."""
 
-from __future__ import annotations
-
 import pytest
 from subjects import judge_as, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps

@@ -1,7 +1,5 @@
 """The judges of accuracy clear right formulations of other kinds, and tell those that do not converge or that lock."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Right formulations, wrong ones and strangers on rings, arcs and kinks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Errors counted in roundings: K against an exact derivative, and ω against perturbed inputs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

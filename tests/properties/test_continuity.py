@@ -1,7 +1,5 @@
 """The property `continuity`: jumps are found with their size and place, and smooth formulations are not accused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

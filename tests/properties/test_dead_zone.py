@@ -1,7 +1,5 @@
 """The dead zone: exact forces where the slave overhangs, who passes, and which contact points count."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The patch test solved: exact numbers, and formulations that lock or have a wrong tangent do not mislead it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

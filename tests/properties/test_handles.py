@@ -1,7 +1,5 @@
 """A pairing with a handle: right formulations are never accused, and what the handle hides is found."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from handles import Handled

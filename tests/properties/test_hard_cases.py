@@ -1,7 +1,5 @@
 """The hard cases: nobody right is accused, what is promised is asked, and details say what nobody promises."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

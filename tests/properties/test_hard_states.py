@@ -1,7 +1,5 @@
 """The states of the hard cases are what they say: flat and touching in rationals, bounded by what is exact."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import hypot
 

@@ -1,7 +1,5 @@
 """All judges share no code with the judged, and see wrong forces."""
 
-from __future__ import annotations
-
 import subprocess
 from typing import Any
 

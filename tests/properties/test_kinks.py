@@ -1,7 +1,5 @@
 """Kinks: computed from positions where the plugin reports contact points, and else from differences."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Only what a question needs is built: no body where none is asked for, and each mesh assembled and factorised once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

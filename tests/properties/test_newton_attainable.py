@@ -1,7 +1,5 @@
 """The property `newton.attainable`: what stored positions allow is attained, and what a formulation adds is told."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from subjects import load_subject

@@ -1,7 +1,5 @@
 """The order of Newton's method: fits of known laws, and what scenes show about a tangent."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, isnan
 from typing import Any

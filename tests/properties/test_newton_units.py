@@ -1,7 +1,5 @@
 """The property `newton.units`: hidden units are told, and what merely rounds otherwise is not accused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The property `nodal-push` where an area of competence reaches round a corner of the master."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

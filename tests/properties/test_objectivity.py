@@ -1,7 +1,5 @@
 """The property `objectivity`, also where a state is exactly between two answers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

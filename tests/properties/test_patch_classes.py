@@ -1,7 +1,5 @@
 """The patch tests of classes of meshes, of nodal springs and of stated forces: `patch.flat.normal` to `published`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """The judges of projections accuse who reports something else than is there, and no right formulation of a stranger."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

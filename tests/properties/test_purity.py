@@ -1,7 +1,5 @@
 """The property `purity`: which quantity shows which dependence on something else than the question."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The tolerances that the properties share."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

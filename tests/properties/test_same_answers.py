@@ -1,7 +1,5 @@
 """The properties `mirror`, `renumbering`, `swap`, `remote` and `symmetric`: what they accuse, and what they do not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The property `scaling`, for each kind of penalty and for a hidden absolute tolerance."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

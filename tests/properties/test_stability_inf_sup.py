@@ -1,7 +1,5 @@
 """`stability.inf-sup`: who is stable, who is not, and strangers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from subjects import load_property, load_subject, measure_case

@@ -1,7 +1,5 @@
 """The judge of exact flat forces passes what is right in any way of writing, and finds lost digits near and far."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """`stability.locking`: who locks, who does not, and strangers."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The sweeps accuse nobody who is right, in whatever way of writing, and each wrong way where it loses digits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, WRONG, springs_of

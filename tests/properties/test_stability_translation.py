@@ -1,7 +1,5 @@
 """The judge of far states accuses who rounds points there, however it is written, and nobody else."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The properties of straight slaves: `patch.tilted.*` and `locality.bend`."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The judge of the blocks of a tangent: what it finds, what it excuses, and how it names what it found."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The judge of tangents, on remainders of known slopes and on formulations made by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Right formulations from a textbook, with all parts of the contract: no property may accuse them."""
 
-from __future__ import annotations
-
 import pytest
 from subjects import load_property
 from textbook_cells import ClippedCells, WeightedGaps

@@ -1,7 +1,5 @@
 """The properties `unilateral` and `nodal-push`: no force across an open gap, and a push where surfaces penetrate."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 A cell is the part of a master segment that the strip of a slave segment cuts out, as a polygon is clipped.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

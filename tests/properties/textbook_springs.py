@@ -5,8 +5,6 @@ contact points. Each subclass is right in another way: where it rounds, what law
 segments it takes, how far past a free end it looks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any

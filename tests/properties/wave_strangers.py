@@ -4,8 +4,6 @@ Gaps are heights, seen straight down. Each slave segment is cut at the master's 
 constant on the whole segment.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

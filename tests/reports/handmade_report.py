@@ -1,7 +1,5 @@
 """Small runs made by hand, from the contracts alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """SolvedScene scenes made by hand, from the contracts alone: nothing is solved here."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactverif import Body, Case, Interface, Placing, Rectangle, Surface, block, rigid_surface

@@ -1,7 +1,5 @@
 """Read an HTML page as strictly as the standard library allows: its nesting, ids, links and texts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 

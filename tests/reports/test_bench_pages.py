@@ -1,7 +1,5 @@
 """Conclusions from a bench, its file, pictures and pages: fronts, times to reach an error, profiles, slowdowns."""
 
-from __future__ import annotations
-
 import re
 from math import inf, isnan
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Drawings are legible, say what they show, and fit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

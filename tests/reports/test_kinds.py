@@ -1,7 +1,5 @@
 """The report says how many cases of each kind were planned, judged, failed, undecided and idle."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import netCDF4

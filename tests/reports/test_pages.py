@@ -1,7 +1,5 @@
 """Pages: self-contained, escaped, the same bytes for the same content, and written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import re
 from dataclasses import replace

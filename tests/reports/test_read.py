@@ -1,7 +1,5 @@
 """A stored case comes back bit by bit; what is no report is named as what it is."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The examples of reports/README.md run."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 Rule for the next editor: what a new table or page shows belongs into `everything_shown`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Scenes that are no pair of blocks: silhouettes in text, and a close-up where the contact is small."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of solved scenes: legible whatever is solved, true to the factors that they state, whole or not there."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

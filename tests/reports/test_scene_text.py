@@ -1,7 +1,5 @@
 """Blocks as text: to scale, closed boxes, and what presses where."""
 
-from __future__ import annotations
-
 import pytest
 from handmade_scene import bodies, make_solved_scene
 

@@ -1,7 +1,5 @@
 """The numbers that a drawing computes from a solution: places along the interface, pressures of nodal forces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from handmade_scene import PRESSURE, bodies, make_solved_scene

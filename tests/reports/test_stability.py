@@ -1,7 +1,5 @@
 """File, figure and page of the stability sweeps agree, and each point above the line can be replayed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A solved scene as others read it: meshio gives back what was solved."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A report is whole or not there; it opens anywhere; two equal runs give equal data."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import shutil

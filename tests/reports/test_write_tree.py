@@ -1,7 +1,5 @@
 """Groups are written as xarray writes them, in another order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

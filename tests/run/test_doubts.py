@@ -1,7 +1,5 @@
 """A run says what makes it doubtful: too little contact, too many undecided cases, forces of the opposite sign."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The drawing of cases: shared by properties with the same strategy, block by block, and the same for hypothesis."""
 
-from __future__ import annotations
-
 import gc
 import re
 from collections.abc import Callable, Mapping

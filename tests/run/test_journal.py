@@ -1,7 +1,5 @@
 """The journal of a run: what is read again is what was noted, and nothing that is damaged is believed."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Sequence
 from dataclasses import replace

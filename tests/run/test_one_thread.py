@@ -1,7 +1,5 @@
 """Cases are made on one thread of linear algebra, so that their last bits are those of any machine and any process."""
 
-from __future__ import annotations
-
 import subprocess
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The origin of a run: the commit is that of the code that runs, or nobody says one."""
 
-from __future__ import annotations
-
 import subprocess
 from importlib import metadata
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Names, options, wrappers, and plugins that do not load; all entry points here are fakes."""
 
-from __future__ import annotations
-
 import sys
 import types
 from typing import Any, Literal

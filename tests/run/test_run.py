@@ -1,7 +1,5 @@
 """The runner on formulations and properties made by hand: what is counted, what is shrunk, what fails a run."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The work of a run in several processes: the same results, and a clear end whatever happens to a worker."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

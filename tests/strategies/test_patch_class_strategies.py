@@ -1,7 +1,5 @@
 """Meshes of the paper's classes: of their class by construction, and simple when they shrink."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

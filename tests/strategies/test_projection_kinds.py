@@ -1,7 +1,5 @@
 """Each case of a kind of projection is of that kind, as the exact oracle says, and every kind gets its share."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

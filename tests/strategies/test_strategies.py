@@ -1,7 +1,5 @@
 """Random cases are valid, simple when shrunk, exact on their lattice, and reach every case of projection."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from fractions import Fraction

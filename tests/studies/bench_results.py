@@ -1,7 +1,5 @@
 """Results of a bench made by hand, for the tests of what is read from them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The answers of programs: what may stand in a line, and the one line that says what may not."""
 
-from __future__ import annotations
-
 import os
 import sys
 from math import isnan

@@ -1,7 +1,5 @@
 """The bench: all is counted, a failure is kept, a killed bench goes on, and a stranger is one more curve."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Side by side: margins, pairs and medians that can be counted by hand, and what is a regression and what is none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, isnan, log, sqrt
 from pathlib import Path

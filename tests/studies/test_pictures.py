@@ -1,7 +1,5 @@
 """A solved scene has the arrays of the solution; a mistake of a plugin is a line of text and no traceback."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The queries: always the same, of the kind whose name they bear, with answers that a plain loop confirms."""
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 from fractions import Fraction

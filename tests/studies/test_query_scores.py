@@ -1,7 +1,5 @@
 """The scores of searches that are right, wrong on purpose, or silent."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, nan, sqrt
 

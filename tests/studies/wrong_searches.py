@@ -1,7 +1,5 @@
 """Searches that answer queries in floats: a plain right one, and some that are wrong on purpose."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

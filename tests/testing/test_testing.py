@@ -1,7 +1,5 @@
 """`parametrize_with_properties` in a test file of an author, with fake entry points."""
 
-from __future__ import annotations
-
 import subprocess
 from importlib.metadata import entry_points
 

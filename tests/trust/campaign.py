@@ -5,8 +5,6 @@ what the formulation promises, a crash, or a breach of the contract. A finite li
 and the tests run it.
 """
 
-from __future__ import annotations
-
 import sys
 from functools import cache
 

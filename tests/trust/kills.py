@@ -8,8 +8,6 @@ The slow properties are asked where it matters, about mutants that at most one o
 cells are "-".
 """
 
-from __future__ import annotations
-
 import sys
 
 from killing import OTHERS, caught_at, properties

@@ -1,7 +1,5 @@
 """Write `reports/trust/README.md` and its figure from the tables that the studies of this folder keep beside it."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import matplotlib as mpl

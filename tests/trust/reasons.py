@@ -1,7 +1,5 @@
 """Reasons why a property has no wrong formulation that it alone catches. `test_trust.py` holds them to the table."""
 
-from __future__ import annotations
-
 HARD = "It is a named case of what random cases of other properties reach too, and is kept because it always runs."
 SCENE = "Whole solutions show how large an error is. Its cause also shows at single states, which others look at."
 BALANCE = "Forces out of balance are no exact forces either, so a patch or projection property catches them too."

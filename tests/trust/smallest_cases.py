@@ -10,8 +10,6 @@ engine, for mutants that need more than a segment a side today. Mutants of prope
 left out, since nothing in a list is shrunk.
 """
 
-from __future__ import annotations
-
 import sys
 from math import frexp
 

@@ -5,8 +5,6 @@ nodal force or one entry of the tangent, and of a size 10^-k. A property is aske
 each property and kind, the smallest size that it caught.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tables that the studies of this folder fill a line at a time, and that they continue after a stop."""
 
-from __future__ import annotations
-
 import csv
 import subprocess
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """The trust campaign: nobody who is right is accused, few cases are undecided, and every property is needed."""
 
-from __future__ import annotations
-
 import pytest
 from page import PAGE, campaign_counts, caught_alone, kill_rows, page, size_of
 from reasons import SHARED

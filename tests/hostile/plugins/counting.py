@@ -4,8 +4,6 @@ The environment variable CASES_ASKED names the file. Each state gives a line of 
 that a line is whole even if the process is killed.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time

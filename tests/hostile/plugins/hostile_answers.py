@@ -1,7 +1,5 @@
 """Plugins whose answers are wrong in kind: shape, dtype, NaN, indices, or objects that only look like arrays."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import threading

@@ -1,7 +1,5 @@
 """Plugins that end their process: with any exit status, by any signal, in any verb."""
 
-from __future__ import annotations
-
 import atexit
 import ctypes
 import itertools

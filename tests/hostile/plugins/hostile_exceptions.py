@@ -1,7 +1,5 @@
 """Plugins that raise what nobody expects."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time

@@ -1,7 +1,5 @@
 """Plugins that never answer."""
 
-from __future__ import annotations
-
 import atexit
 import ctypes
 import itertools

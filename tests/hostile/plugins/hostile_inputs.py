@@ -1,7 +1,5 @@
 """Plugins that change what they were given, remember what they were asked, or answer by what is no argument."""
 
-from __future__ import annotations
-
 import ctypes
 import itertools
 import os

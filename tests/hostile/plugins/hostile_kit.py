@@ -6,8 +6,6 @@ its temporary folder, it never asks for memory without the limit of its runner, 
 whatever it starts ends by itself after `LONG`.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import struct

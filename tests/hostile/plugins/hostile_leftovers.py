@@ -1,7 +1,5 @@
 """Plugins that answer rightly and leave something behind. All of it ends by itself after two minutes."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import os

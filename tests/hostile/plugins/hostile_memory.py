@@ -1,7 +1,5 @@
 """Plugins that take memory. They run under the limit of their runner only."""
 
-from __future__ import annotations
-
 import ctypes
 import itertools
 from typing import Any

@@ -3,8 +3,6 @@
 Rule for the next editor: the messages here are those of `contactverif.isolation.messages`, and change with them.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Plugins that write where the table of verdicts should be, or where the harness talks to them."""
 
-from __future__ import annotations
-
 import ctypes
 import itertools
 import logging

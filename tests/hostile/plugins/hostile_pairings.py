@@ -1,7 +1,5 @@
 """Plugins whose pairings are no flat mapping from names to small integers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

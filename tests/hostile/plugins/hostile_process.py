@@ -1,7 +1,5 @@
 """Plugins that change the process they run in: its hooks, limits, rounding, libraries, and the harness itself."""
 
-from __future__ import annotations
-
 import atexit
 import builtins
 import ctypes
