@@ -81,6 +81,55 @@ def test_one_call_may_round_otherwise_and_is_wrong_beyond(part: str, quantity: Q
         assert judge_case(purity, case(), subject(Differs)).verdict is verdict
 
 
+def test_one_call_that_uses_the_state_of_the_last_residual_is_told() -> None:
+    class Late(OneCall):
+        last: Any = None
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            self.last = z
+            return super().residual(interface, pairing, z)
+
+        def residual_and_tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            tangent = self.tangent(interface, pairing, z if self.last is None else self.last)
+            return Pure.residual(self, interface, pairing, z), tangent
+
+    assert {IN_ONE_CALL.name, ONE_TANGENT.name} == nonzero_quantities(Late)
+
+
+class Remembers(Pure):
+    """A formulation that computes one of its two answers with the arguments of the last call of the other."""
+
+    uses, argument = "tangent", 2
+    last: Any = None
+
+    def recall(self, method: str, *arguments: Any) -> Any:
+        last = self.last or arguments
+        self.last = self.last if method == self.uses else arguments
+        values = list(arguments)
+        if method == self.uses and last[2].shape == arguments[2].shape:
+            values[self.argument] = last[self.argument]
+        return values
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        interface, pairing, z = self.recall("residual", interface, pairing, z)
+        return interface.nodes.reshape(-1) * z**2 + np.repeat(pairing["up"], 2)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        interface, pairing, z = self.recall("tangent", interface, pairing, z)
+        return np.diag(2 * interface.nodes.reshape(-1) * z + np.repeat(pairing["up"], 2))
+
+
+@pytest.mark.parametrize("argument", [0, 1, 2])
+@pytest.mark.parametrize(("uses", "quantity"), [("residual", REORDERED.name), ("tangent", TANGENT.name)])
+def test_a_memory_of_the_last_call_is_told_by_calls_in_turn(uses: str, quantity: str, argument: int) -> None:
+    class Forgetful(Remembers):
+        pass
+
+    Forgetful.uses, Forgetful.argument = uses, argument
+    counts = [purity.measure(case(seed=seed), subject(Forgetful)).values[quantity] for seed in range(20)]
+    assert max(counts) > 0
+
+
 def test_forces_without_the_penalty_are_told() -> None:
     class Rigid(Pure):
         def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
