@@ -96,6 +96,31 @@ def test_one_call_that_uses_the_state_of_the_last_residual_is_told() -> None:
     assert {IN_ONE_CALL.name, ONE_TANGENT.name} == nonzero_quantities(Late)
 
 
+def test_what_counts_its_calls_is_told_when_asked_again() -> None:
+    class Counts(Pure):
+        calls = 0
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            self.calls += 1
+            return z * (1 + self.calls * 2.0**-50)
+
+    assert REPEATED.name in nonzero_quantities(Counts)
+
+
+def test_what_a_tangent_leaves_behind_is_told_by_the_order() -> None:
+    class Trace(Pure):
+        after = 0.0
+
+        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+            self.after = 2.0**-30
+            return super().tangent(interface, pairing, z)
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return z + self.after
+
+    assert nonzero_quantities(Trace) == {REPEATED.name, REORDERED.name}
+
+
 class Remembers(Pure):
     """A formulation that computes one of its two answers with the arguments of the last call of the other."""
 

@@ -12,7 +12,7 @@ from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.shared.any_state import move_state
-from contactverif_properties.stability_forces import stability_translation
+from contactverif_properties.stability_forces import FORCES, stability_translation
 
 
 @cache
@@ -38,6 +38,13 @@ def test_a_right_formulation_in_another_way_of_writing_passes(name: str) -> None
     assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
     assert sum(measure_case(stability_translation, case, subject).idle for case in cases()) <= 10
     assert max(max(measure_case(stability_translation, case, subject).values.values()) for case in cases()) <= 4
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_formulation_is_accused_by_five_orders_of_magnitude(name: str) -> None:
+    way, before = WRONG[name]
+    subject = springs_of(way, before, translation_stable=True)
+    assert max(measure_case(stability_translation, case, subject).values[FORCES.name] for case in cases()) >= 1e5
 
 
 def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
