@@ -31,6 +31,15 @@ def measure_case(question: Property, case: Case, subject: Subject) -> Measuremen
     return outcome.measurement
 
 
+def same_case(case: Case, other: Case) -> bool:
+    """Return whether two cases agree in every array, bit by bit."""
+    arrays, others = (
+        {name: (array.dtype, array.shape, array.tobytes()) for name, array in each.to_arrays().items()}
+        for each in (case, other)
+    )
+    return list(arrays.items()) == list(others.items())
+
+
 def judge_as(verdict: Verdict, question: Property, case: Case, subject: Subject) -> Outcome:
     """Judge a case; fail if the verdict is another one."""
     outcome = judge_case(question, case, subject)

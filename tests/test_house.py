@@ -64,8 +64,7 @@ ROOMS = {
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
-        (*BELOW_RUN, "geometry", "isolation", "run", *REPORTS),
-        ("numpy", "scipy", "hypothesis", "msgspec"),
+        (*BELOW_RUN, "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis", "msgspec")
     ),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
@@ -214,20 +213,14 @@ WRONG_IMPORTS = {
         ("from scipy import linalg", "contract may not import scipy.linalg"),
         ("import numpyro", "contract may not import numpyro"),
     ],
-    "contactverif.oracle.a": [
-        ("from contactverif.strategies.b import x", "oracle may not import strategies"),
-    ],
+    "contactverif.oracle.a": [("from contactverif.strategies.b import x", "oracle may not import strategies")],
     "contactverif.run.a": [
         ("from contactverif.cli.app import main", "run may not import cli"),
         ("from contactverif_reports.netcdf import b", "run may not import reports.netcdf"),
         ("from contactverif.shed.b import x", "run may not import contactverif.shed.b"),
     ],
-    "contactverif.cli.a": [
-        ("from contactverif_nts.eq6 import x", "cli may not import contactverif_nts"),
-    ],
-    "contactverif.shed.a": [
-        ("import numpy", "contactverif.shed.a is in no room; give it one in ROOMS"),
-    ],
+    "contactverif.cli.a": [("from contactverif_nts.eq6 import x", "cli may not import contactverif_nts")],
+    "contactverif.shed.a": [("import numpy", "contactverif.shed.a is in no room; give it one in ROOMS")],
 }
 
 

@@ -17,11 +17,7 @@ import numpy as np
 import skfem
 from numpy.typing import NDArray
 from skfem.helpers import jump, sym_grad
-from skfem.models.elasticity import (
-    lame_parameters,
-    linear_elasticity,
-    linear_stress,
-)
+from skfem.models.elasticity import lame_parameters, linear_elasticity, linear_stress
 from skfem.supermeshing import elementwise_quadrature, intersect
 
 FloatArray = NDArray[np.float64]

@@ -59,20 +59,8 @@ def rows(out: str) -> dict[tuple[str, str], list[str]]:
 def nts_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a report in which NTS fails the patch test."""
     path = tmp_path_factory.mktemp("reports") / "nts.nc"
-    arguments = [
-        "verify",
-        "nts",
-        "-p",
-        "patch.flat.transmission",
-        "--seed",
-        "1",
-        "--examples",
-        "20",
-        "--shrink",
-        "all",
-        "--out",
-        path,
-    ]
+    words = "verify nts -p patch.flat.transmission --seed 1 --examples 20 --shrink all --out"
+    arguments = [*words.split(), path]
     subprocess.run(command(*arguments), env=environment(), capture_output=True, check=True)
     return path
 
@@ -459,20 +447,8 @@ def test_the_same_seed_gives_the_same_report(tmp_path: Path) -> None:
         folder = tmp_path / name
         folder.mkdir()
         reports[name] = folder / "r.nc"
-        arguments = [
-            "verify",
-            "nts",
-            "-p",
-            "patch.flat.*",
-            "-p",
-            "p[ru]*",
-            "--seed",
-            seed,
-            "--examples",
-            "8",
-            "--out",
-            reports[name],
-        ]
+        words = f"verify nts -p patch.flat.* -p p[ru]* --seed {seed} --examples 8 --out"
+        arguments = [*words.split(), reports[name]]
         variables = environment(PYTHONHASHSEED=hashes)
         subprocess.run(command(*arguments), cwd=folder, env=variables, capture_output=True, check=True)
     assert same_data(reports["a"], reports["b"]) == []

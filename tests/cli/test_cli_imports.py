@@ -84,10 +84,7 @@ def test_the_version_is_told(start: tuple[str, ...]) -> None:
 def test_a_shell_completes_commands_formulations_and_properties(words: str, expected: set[str]) -> None:
     last = len(words.split()) - 1
     answer = run_python(
-        *("-m", "contactverif"),
-        _CONTACTVERIF_COMPLETE="complete_bash",
-        COMP_WORDS=words,
-        COMP_CWORD=str(last),
+        *("-m", "contactverif"), _CONTACTVERIF_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=str(last)
     )
     assert set(answer.split()) == expected
 

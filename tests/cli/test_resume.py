@@ -155,17 +155,7 @@ def test_a_file_that_may_not_grow_is_a_line_and_the_run_goes_on(ask: Ask, unbrok
     report = tmp_path / "r.nc"
     # Python would cut the modules, too, that it compiles and stores at such a limit.
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384)); "
-    command = [
-        *PYTHON,
-        "-B",
-        "-c",
-        limit + MAIN[-1],
-        *RUN,
-        "--out",
-        str(report),
-        "--out",
-        str(tmp_path / "r.html"),
-    ]
+    command = [*PYTHON, "-B", "-c", limit + MAIN[-1], *RUN, "--out", str(report), "--out", str(tmp_path / "r.html")]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     assert answer.returncode == 2
     assert "patch.flat.transmission" in answer.stdout

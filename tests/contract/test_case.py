@@ -5,22 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import same_case
 
 from contactverif import Case, Interface, MisuseError, Surface
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
 Z = PAIR.nodes.reshape(-1) + np.array([0, -0.5] * 3 + [0, 0] * 2)
-
-
-def same(case: Case, other: Case) -> bool:
-    """Return whether two cases agree bit by bit."""
-    arrays, others = case.to_arrays(), other.to_arrays()
-    return arrays.keys() == others.keys() and all(
-        arrays[name].dtype == others[name].dtype
-        and arrays[name].shape == others[name].shape
-        and arrays[name].tobytes() == others[name].tobytes()
-        for name in arrays
-    )
 
 
 def odd_case() -> Case:
@@ -34,7 +24,7 @@ def odd_case() -> Case:
 def test_round_trip_through_arrays() -> None:
     case = odd_case()
     again = Case.from_arrays(case.to_arrays())
-    assert same(case, again)
+    assert same_case(case, again)
     assert (again.name, again.seed, again.penalty) == ("C′", 2**63 - 1, 1 / 3)
     assert again.parameters["directions"].shape == (2, 2)
     assert np.signbit(again.z[0])
@@ -44,7 +34,7 @@ def test_round_trip_through_a_file(tmp_path: Path) -> None:
     case = odd_case()
     np.savez(tmp_path / "case.npz", **case.to_arrays())  # type: ignore[arg-type]
     with np.load(tmp_path / "case.npz") as arrays:
-        assert same(case, Case.from_arrays(arrays))
+        assert same_case(case, Case.from_arrays(arrays))
 
 
 def test_round_trip_of_several_and_closed_chains() -> None:
@@ -55,7 +45,7 @@ def test_round_trip_of_several_and_closed_chains() -> None:
     )
     case = Case(closed, nodes.reshape(-1))
     again = Case.from_arrays(case.to_arrays())
-    assert same(case, again)
+    assert same_case(case, again)
     assert np.array_equal(again.interface.slave.chain_order, closed.slave.chain_order)
 
 

@@ -249,8 +249,7 @@ WRONG_ANSWERS: dict[tuple[str, type[ContractError]], list[tuple[Any, str]]] = {
 
 
 @pytest.mark.parametrize(
-    ("verb", "error", "answer", "message"),
-    [(*key, *row) for key, rows in WRONG_ANSWERS.items() for row in rows],
+    ("verb", "error", "answer", "message"), [(*key, *row) for key, rows in WRONG_ANSWERS.items() for row in rows]
 )
 def test_a_wrong_answer(verb: str, error: type[ContractError], answer: Any, message: str) -> None:
     with pytest.raises(error, match=message):

@@ -314,8 +314,7 @@ def test_what_is_loose_is_said() -> None:
 
 QUADS = skfem.MeshQuad.init_tensor(np.array([0, 1, 2.5]), np.array([0, 1, 1.75])).with_defaults()
 WEDGE = skfem.MeshTri(
-    np.array([[0.0, 4, 0, 2, 0, 2], [0, 0, 3, 0, 1.5, 1.5]]),
-    np.array([[0, 3, 4, 4], [3, 1, 5, 3], [4, 5, 2, 5]]),
+    np.array([[0.0, 4, 0, 2, 0, 2], [0, 0, 3, 0, 1.5, 1.5]]), np.array([[0, 3, 4, 4], [3, 1, 5, 3], [4, 5, 2, 5]])
 ).with_boundaries(
     {
         "base": lambda x: x[1] < 1e-9,
@@ -448,10 +447,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         "mesh: poisson: found 0.5; needed Poisson's ratio above −1 and below 0.5 (an incompressible body has no "
         "stiffness matrix in displacements)",
     ),
-    "nan": (
-        {"mesh": QUADS.translated((np.nan, 0.0))},
-        "mesh: nodes: found NaN or infinity; needed finite numbers",
-    ),
+    "nan": ({"mesh": QUADS.translated((np.nan, 0.0))}, "mesh: nodes: found NaN or infinity; needed finite numbers"),
     "a node too many": (
         {"mesh": skfem.MeshQuad(np.column_stack([QUADS.p, [1, 1.2]]), QUADS.t, validate=False).with_defaults()},
         "mesh: nodes: found node 9 in no cell; needed every node in a cell",

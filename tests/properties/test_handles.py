@@ -9,11 +9,7 @@ import contactverif_nts
 from contactverif import ContractError, Handle, Pairing, Subject, Verdict, load_properties, load_scene
 from contactverif.run.run import run
 
-RIGHT = {
-    "vts-ppt": contactverif_nts.vts_ppt,
-    "nts-lm": contactverif_nts.nts_lm,
-    "mortar": contactverif_mortar.mortar,
-}
+RIGHT = {"vts-ppt": contactverif_nts.vts_ppt, "nts-lm": contactverif_nts.nts_lm, "mortar": contactverif_mortar.mortar}
 PROPERTIES = ["tangent.directional", "tangent.sparsity", "purity", "symmetric", "continuity", "objectivity", "scaling"]
 
 

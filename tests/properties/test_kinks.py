@@ -10,12 +10,7 @@ from scipy import sparse
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.kinks import (
-    explain_by_kink,
-    find_kink,
-    is_like_its_surroundings,
-    measure_jump,
-)
+from contactverif_properties.shared.kinks import explain_by_kink, find_kink, is_like_its_surroundings, measure_jump
 
 REACH = 1e-6
 

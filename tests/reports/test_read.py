@@ -7,8 +7,9 @@ import netCDF4
 import numpy as np
 import pytest
 from handmade_report import ERROR, awkward, small_run
+from subjects import same_case
 
-from contactverif import Case, MisuseError, Verdict
+from contactverif import MisuseError, Verdict
 from contactverif.contract.counterexample import Origin
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.differences import same_data
@@ -23,16 +24,6 @@ def report(tmp_path: Path) -> Path:
     return path
 
 
-def same_bits(a: Case, b: Case) -> bool:
-    ours, theirs = a.to_arrays(), b.to_arrays()
-    return list(ours) == list(theirs) and all(
-        ours[name].shape == theirs[name].shape
-        and ours[name].dtype == theirs[name].dtype
-        and ours[name].tobytes() == theirs[name].tobytes()
-        for name in ours
-    )
-
-
 def test_ids_in_the_order_of_the_run(report: Path) -> None:
     assert case_ids(report) == [
         "vts-me_n_4.patch.flat.transmission",
@@ -43,7 +34,7 @@ def test_ids_in_the_order_of_the_run(report: Path) -> None:
 
 def test_every_bit_of_a_case_comes_back(report: Path) -> None:
     stored = read_case(report, "vts-me_n_4.tangent.directional.witness")
-    assert same_bits(stored.case, awkward())
+    assert same_case(stored.case, awkward())
     assert np.signbit(stored.case.z[3])
 
 

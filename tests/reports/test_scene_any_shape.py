@@ -32,10 +32,7 @@ def test_silhouettes_are_to_scale(width: int) -> None:
     area = 20 * 10 / sum(foundation)  # The height of a character over its width
     assert sum(disk) * area == pytest.approx(np.pi * 100, rel=0.1)
     assert lines[0].strip() == "↓"
-    assert lines[-2:] == [
-        "▒ slave, 60 segments of 0.025 or more",
-        "░ master, 82 segments of 0.02 or more",
-    ]
+    assert lines[-2:] == ["▒ slave, 60 segments of 0.025 or more", "░ master, 82 segments of 0.02 or more"]
 
 
 def test_a_flat_pair_has_silhouettes_too() -> None:

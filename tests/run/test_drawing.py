@@ -7,9 +7,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import strategies as st
+from subjects import same_case
 
 from contactverif import Case, Interface, Measurement, Property, Quantity, Subject, Traits, Verdict, load_properties
 from contactverif.contract.cases import random_source
@@ -59,11 +59,6 @@ def penalties(cases: Any) -> list[float]:
     return [case.penalty for case in cases]
 
 
-def same(case: Case, other: Case) -> bool:
-    arrays, others = case.to_arrays(), other.to_arrays()
-    return arrays.keys() == others.keys() and all(np.array_equal(arrays[name], others[name]) for name in arrays)
-
-
 def random_sources() -> dict[str, Any]:
     """Return {strategy: source} of all installed properties with random cases."""
     questions = [question for question in load_properties() if isinstance(question, Property)]
@@ -111,7 +106,7 @@ def test_the_choice_and_the_order_of_properties_change_no_case() -> None:
 
     alone = cases("swap")
     for ids in (("mirror", "swap"), ("swap", "mirror"), ("balance.force", "swap", "symmetric")):
-        assert all(same(*pair) for pair in zip(alone, cases(*ids), strict=True))
+        assert all(same_case(*pair) for pair in zip(alone, cases(*ids), strict=True))
 
 
 def test_hypothesis_makes_the_same_case_of_the_same_choices() -> None:
@@ -122,7 +117,7 @@ def test_hypothesis_makes_the_same_case_of_the_same_choices() -> None:
         for draw in (next(draws) for _ in range(4)):
             replayed: list[Case] = []
             shrink_choices(strategy, draw.stored_choices(), seed="", fails=replayed.append, limit=5)
-            assert same(replayed[0], draw.case), name
+            assert same_case(replayed[0], draw.case), name
 
 
 def test_all_kinds_of_choices_are_stored() -> None:
@@ -142,7 +137,7 @@ def test_a_block_depends_on_no_other_block() -> None:
         assert block.last is (number == 2)
         assert len(set(penalties(block.cases))) == BLOCK
     case = draw_case(stiff_cases(), seed="1", examples=3 * BLOCK, number=BLOCK + 7)
-    assert same(case, everything[BLOCK + 7])
+    assert same_case(case, everything[BLOCK + 7])
 
 
 def test_more_examples_begin_with_the_same_cases() -> None:

@@ -231,15 +231,7 @@ def test_other_tests_are_left_alone(author: pytest.Pytester) -> None:
 
 def test_the_plugin_is_cheap_to_import() -> None:
     """It loads in every pytest run where contactverif is installed."""
-    heavy = [
-        "hypothesis",
-        "numba",
-        "scipy",
-        "xarray",
-        "matplotlib",
-        "contactverif.run.run",
-        "numpy",
-    ]
+    heavy = ["hypothesis", "numba", "scipy", "xarray", "matplotlib", "contactverif.run.run", "numpy"]
     script = f"import sys, contactverif.testing.pytest_plugin; print([name for name in {heavy} if name in sys.modules])"
     answer = subprocess.run([*PYTHON, "-c", script], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
