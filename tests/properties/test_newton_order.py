@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import judge_as, load_subject
+from subjects import Changed, judge_as, load_subject
 
 import contactverif_nts
 from contactverif import End, Rectangle, Subject, Trace, Verdict, judge_case, solve, two_blocks
@@ -160,22 +160,11 @@ def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
 
 
 def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
-    def make(*, penalty: float) -> Any:
+    def make(*, penalty: float) -> Changed:
         inner = contactverif_nts.vts_ppt(penalty=penalty)
-
-        class Nothing:
-            traits = inner.traits
-
-            def pair(self, interface: Any, z: FloatArray) -> Any:
-                return inner.pair(interface, z)
-
-            def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-                return 0 * z
-
-            def tangent(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
-                return np.zeros((z.size, z.size))
-
-        return Nothing()
+        return Changed(
+            inner, residual=lambda *state: 0 * state[-1], tangent=lambda *state: np.zeros((state[-1].size,) * 2)
+        )
 
     scene = two_blocks(
         Rectangle([0, 1, 3], [0, 2]), Rectangle([-1, 1.2, 4], [-2, 0]), penalty=10.0, approach=0.1
