@@ -60,8 +60,7 @@ def _is_frozen(array: NDArray[Any]) -> bool:
 
 def dense(matrix: Any) -> FloatArray:
     """Return a matrix, given as an array or as a sparse matrix or array of scipy, as an array of the same shape."""
-    array: FloatArray = matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
-    return array
+    return matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
 
 
 def compressed_matrix(kind: str, size: int, data: FloatArray, indices: Array, indptr: Array) -> Any:

@@ -63,8 +63,7 @@ class Solution:
     @property
     def displacements(self) -> FloatArray:
         """The displacements (n_nodes, 2) of the interface's nodes."""
-        moves: FloatArray = self.state.positions - self.interface.nodes
-        return moves
+        return self.state.positions - self.interface.nodes
 
     @property
     def n_iterations(self) -> int:

@@ -60,8 +60,7 @@ class CondensedBody:
         u = factor * self._particular
         u[self._interior] += self._influence @ q
         u[self.unknowns] = q
-        displacements: FloatArray = u.reshape(-1, 2) @ self.body.frame.T
-        return displacements
+        return u.reshape(-1, 2) @ self.body.frame.T
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return the stresses (n_cells, n_points, 3) at the Gauss points, in the body's axes.
@@ -74,8 +73,7 @@ class CondensedBody:
         strain = np.stack(
             [gradient[..., 0, 0], gradient[..., 1, 1], gradient[..., 0, 1] + gradient[..., 1, 0]], axis=-1
         )
-        stresses: FloatArray = strain @ elasticity(self.body).T
-        return stresses
+        return strain @ elasticity(self.body).T
 
 
 def elasticity(body: Body) -> FloatArray:

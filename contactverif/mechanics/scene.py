@@ -240,8 +240,7 @@ class Scene:
         FloatArray, shape (n_free,)
             The forces on the unknowns.
         """
-        forces: FloatArray = self.stiffness @ q - factor * self.load
-        return forces
+        return self.stiffness @ q - factor * self.load
 
     def nodal_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return the forces that contact must supply, at the nodes of the interface.
@@ -258,8 +257,7 @@ class Scene:
         FloatArray, shape (n_nodes, 2)
             The forces in global axes, without the reactions of supports on the contact boundary.
         """
-        forces: FloatArray = (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
-        return forces
+        return (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
         """Return the displacements of all bodies; a body out of reach is solved on its own.

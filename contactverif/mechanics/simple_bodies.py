@@ -39,8 +39,7 @@ class Placing:
         """Return where the points (n, 2) of the drawing lie (n, 2)."""
         cos, sin = self.axis
         rotated = points @ np.array([[cos, sin], [-sin, cos]]) if sin else points * cos
-        placed: FloatArray = (rotated + np.asarray(self.shift, dtype=np.float64)) * self.scale
-        return placed
+        return (rotated + np.asarray(self.shift, dtype=np.float64)) * self.scale
 
 
 UPRIGHT = Placing()  # The drawing as it is.

@@ -154,8 +154,7 @@ class Trace:
     @property
     def multipliers(self) -> FloatArray:
         """The multipliers at the last iterate (n_multipliers,)."""
-        last: FloatArray = self.u[-1, self.scene.n_free :]
-        return last
+        return self.u[-1, self.scene.n_free :]
 
     @property
     def deficiency(self) -> int:

@@ -134,8 +134,7 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
         forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
     except ContractError:
         return None
-    nodal: FloatArray = -forces.reshape(case.interface.nodes.shape)
-    return nodal
+    return -forces.reshape(case.interface.nodes.shape)
 
 
 def call_first(subject: Subject, parts: Collection[str]) -> bool:

@@ -122,15 +122,13 @@ class BenchResults:
         """Return the least time (n_cells,) of a part, in seconds; infinite where there is no solution."""
         row = self.formulations.index(formulation)
         least = self.fastest[row, :, list(PARTS).index(part)]
-        times: FloatArray = np.where(self.outcomes[row] == Outcome.SOLVED, least, np.inf)
-        return times
+        return np.where(self.outcomes[row] == Outcome.SOLVED, least, np.inf)
 
     def errors_of(self, formulation: str, kind: str = "forces") -> FloatArray:
         """Return the errors (n_cells,) of a kind; infinite where there is no solution, NaN where none is reported."""
         row = self.formulations.index(formulation)
         values = self.errors[row, :, list(ERRORS).index(kind)]
-        errors: FloatArray = np.where(self.outcomes[row] == Outcome.SOLVED, values, np.inf)
-        return errors
+        return np.where(self.outcomes[row] == Outcome.SOLVED, values, np.inf)
 
     def cells_of(self, scene: str, stiffness: float | None = None) -> BoolArray:
         """Return which cells (n_cells,) belong to a scene, if wanted at one penalty alone."""

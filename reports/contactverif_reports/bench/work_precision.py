@@ -104,8 +104,7 @@ def pair_profiles(results: BenchResults, reference: str = REFERENCE) -> tuple[Pa
 
 def _times_of_accurate(results: BenchResults, formulation: str) -> FloatArray:
     accurate = results.errors_of(formulation) <= ACCURATE
-    times: FloatArray = np.where(accurate, results.times(formulation), np.inf)
-    return times
+    return np.where(accurate, results.times(formulation), np.inf)
 
 
 def _over(values: FloatArray, best: FloatArray) -> FloatArray:

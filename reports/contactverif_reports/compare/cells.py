@@ -87,8 +87,7 @@ class Cell:
     @property
     def decided(self) -> BoolArray:
         """(n_cases,) whether the case was judged."""
-        decided: BoolArray = np.isin(self.verdicts, list(DECIDED))
-        return decided
+        return np.isin(self.verdicts, list(DECIDED))
 
     @property
     def median(self) -> float:
@@ -106,8 +105,7 @@ class Cell:
     def standing(self) -> FloatArray:
         """(n_cases,) margins, 0 for a case that passes without a number; NaN where the case is undecided."""
         passed = (self.verdicts == Verdict.PASS) & np.isnan(self.margins)
-        standing: FloatArray = np.where(passed, 0.0, self.margins)
-        return standing
+        return np.where(passed, 0.0, self.margins)
 
 
 def _facts(info: PropertyInfo, outcome: Outcome) -> tuple[Any, ...]:

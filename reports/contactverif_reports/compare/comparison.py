@@ -171,5 +171,4 @@ def _converged_counts(cell: Cell, name: str) -> FloatArray:
         return np.zeros(0)
     counts = cell.details[name]
     end = cell.details.get(name.replace(ITERATIONS, END, 1))
-    converged: FloatArray = counts if end is None else np.where(end == CONVERGED, counts, nan)
-    return converged
+    return counts if end is None else np.where(end == CONVERGED, counts, nan)

@@ -99,16 +99,14 @@ class SolvedScene:
     @property
     def along(self) -> FloatArray:
         """Return coordinates (n_nodes,) of the interface's nodes along it, in the reference configuration."""
-        along: FloatArray = self.case.interface.nodes @ self.course.direction
-        return along
+        return self.case.interface.nodes @ self.course.direction
 
     def points_along(self, points: PointPressures) -> tuple[FloatArray, FloatArray]:
         """Return coordinates along the interface of points (n_points,) and of the ends of their areas (n_points, 2)."""
         ends = self.along[self.case.interface.slave.segments[points.segment]]  # (n_points, 2)
 
         def at(c: FloatArray, ends: FloatArray) -> FloatArray:
-            place: FloatArray = ((1 - c) * ends[..., 0] + (1 + c) * ends[..., 1]) / 2
-            return place
+            return ((1 - c) * ends[..., 0] + (1 + c) * ends[..., 1]) / 2
 
         return at(points.c, ends), at(points.area, ends[:, None, :])
 

@@ -45,8 +45,7 @@ class Axis:
         with np.errstate(divide="ignore"):
             places = np.ceil((np.log10(margins) - LEAST) * _BINS_A_DECADE) - 1
         last = self.n_bins - 1
-        numbers: FloatArray = np.where(np.isinf(margins), last, np.clip(places, 0, last - 1)).astype(np.int64)
-        return numbers
+        return np.where(np.isinf(margins), last, np.clip(places, 0, last - 1)).astype(np.int64)
 
     def x(self, decade: float) -> float:
         """Return the position of a power of ten on the axis, in user units."""

@@ -182,8 +182,7 @@ def _texts(root: Group, name: str, scenes: list[str]) -> dict[str, str]:
 def _wall(timing: Group) -> FloatArray:
     """Return the times by the wall clock; NaN from a file whose only clock it was."""
     nothing = np.full_like(timing["seconds"].values[:, :, -1], np.nan)
-    wall: FloatArray = timing["wall_seconds"].values if "wall_seconds" in timing else nothing
-    return wall
+    return timing["wall_seconds"].values if "wall_seconds" in timing else nothing
 
 
 def _split(line: str) -> tuple[str, str]:
