@@ -32,6 +32,8 @@ _PIVOT_FLOOR = 2.0**-40
 _RESISTANCE_FLOOR = 1e-9  # A rigid motion of the body's size that meets less resistance than this is free.
 # A smallest resistance, squared, above this share of the largest is far from the floor and from roundoff.
 _SAFE_RESISTANCE = 1e-6
+# The matrix is symmetric and positive definite, so pivots lie on the diagonal and an ordering of A + Aᵀ fills less.
+_SYMMETRIC = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 _MOTION_FLOOR = 1e-6  # A smaller part of a free motion is not mentioned.
 _MOTIONS = ("move along its first axis", "move along its second axis", "turn")
 
@@ -221,7 +223,7 @@ def _interior_solver(body: Body, matrix: Any) -> Callable[[FloatArray], FloatArr
         return lambda forces: forces
     if sparse.issparse(matrix):
         try:
-            factors = splu(matrix.tocsc())
+            factors = splu(matrix.tocsc(), **_SYMMETRIC)
         except RuntimeError:  # The matrix is exactly singular.
             raise _loose_part_error(body) from None
         pivots = np.abs(factors.U.diagonal()[factors.perm_c])
