@@ -9,8 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import Quantity
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import (
@@ -58,7 +61,11 @@ class ProblemInstance:
 
     def exact_forces(self, state: Case) -> FloatArray:
         """Return the exact forces (n_nodes, 2) that push the nodes in a state of this mesh."""
-        return self.forces(state.positions if self.deformed else state.interface.nodes)
+        forces = np.asarray(self.forces(state.positions if self.deformed else state.interface.nodes))
+        if forces.shape != state.interface.nodes.shape:
+            needed = f"{state.interface.nodes.shape}, a force for each node"
+            raise MisuseError("ProblemInstance.forces", f"shape {forces.shape}", needed)
+        return forces
 
     def errors(self, solution: Solution) -> Errors:
         """Return the errors of a solution by kind, whoever solved the scene."""

@@ -225,7 +225,7 @@ def load_problems() -> dict[str, Problem | NotLoaded]:
         loaded = _load_entry(name, entries)
         if not isinstance(loaded, NotLoaded | Problem):
             needed = "a contactverif.problems.problem.Problem"
-            loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}; needed {needed}")
+            loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}, not {needed}")
         problems[name] = loaded
     return dict(sorted(problems.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))
 

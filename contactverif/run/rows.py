@@ -279,12 +279,16 @@ def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -
         )
     if matches := [case for case in listed if case.name == name]:
         return matches[0]
-    if not question.bodies:
-        return named_case(name)
-    # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
-    from contactverif.problems.catalogue import load_scene_case
+    try:
+        if not question.bodies:
+            return named_case(name)
+        # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
+        from contactverif.problems.catalogue import load_scene_case
 
-    return load_scene_case(name)
+        return load_scene_case(name)
+    except MisuseError as error:
+        listed_names = f"a case of {question.id} ({'; '.join(case.name for case in listed)}), or " if listed else ""
+        raise MisuseError(f"witness of {question.id}", error.found, f"{listed_names}{error.needed}") from None
 
 
 @dataclass(frozen=True, slots=True)

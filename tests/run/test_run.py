@@ -382,7 +382,10 @@ def test_a_failure_of_the_witness_alone_keeps_the_promise_and_is_not_shrunk() ->
 
 @pytest.mark.parametrize(
     ("named", "reason"),
-    [({}, "traits: witnesses: found none for patch.zero"), ({"patch.zero": "D"}, "traits: case: found 'D'")],
+    [
+        ({}, "traits: witnesses: found none for patch.zero"),
+        ({"patch.zero": "D"}, "traits: witness of patch.zero: found 'D'"),
+    ],
 )
 @pytest.mark.usefixtures("witnesses")
 def test_a_promise_to_fail_needs_a_witness(named: dict[str, str], reason: str) -> None:

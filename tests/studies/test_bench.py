@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import EntryPoint
@@ -21,7 +22,7 @@ from fresh_process import MAIN
 from msgspec import structs
 from subjects import Changed, alone, load_subject
 
-from contactverif import MisuseError, Subject
+from contactverif import MisuseError, Subject, Traits
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import remote_formulation
 from contactverif.isolation.host import answer_of
@@ -29,10 +30,11 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
 from contactverif.mechanics.accuracy import solve_for_accuracy, solve_in_tries
-from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance
 from contactverif.run import registry
 from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
 from contactverif.run.registry import load_formulation, load_problems
+from contactverif.studies.bench import bench_plan
 from contactverif.studies.bench.bench_journal import Header, Journal
 from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose
 from contactverif.studies.bench.bench_study import run_bench
@@ -207,9 +209,7 @@ def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, 
     assert list(load_problems()) == [*sorted(problems, key=lambda name: problems[name].rank), "number"]
     plan = make_plan(["number", "zigzag"], quick=True, repeats=1)
     results = run_bench([load_subject("vts-ppt")], plan)
-    assert results.not_loaded == {
-        "number": "the entry point gives a int; needed a contactverif.problems.problem.Problem"
-    }
+    assert results.not_loaded == {"number": "the entry point gives a int, not a contactverif.problems.problem.Problem"}
     assert [cell.scene for cell in results.cells] == ["zigzag", "zigzag"]
     assert (results.outcomes == Outcome.SOLVED).all()
     assert results.errors_of("vts-ppt").max() < 1e-5
@@ -220,6 +220,32 @@ def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, 
     assert again.penalty_name("zigzag", 30.0) == "ε̂ = 30 E/m"
     with pytest.raises(MisuseError, match="--scene: found number: the entry point gives a int"):
         make_plan(["number"])
+
+
+def _fail(mesh: int, penalty: float, traits: Traits) -> ProblemInstance:
+    raise ValueError(f"no mesh {mesh}")
+
+
+def _pose_flat_forces(mesh: int, penalty: float, traits: Traits) -> ProblemInstance:
+    instance = PROBLEMS["kinked"].pose(mesh, penalty, traits)
+    return replace(instance, forces=lambda positions: instance.forces(positions).reshape(-1))
+
+
+@pytest.mark.parametrize(
+    ("pose", "message"),
+    [
+        (_fail, "pose of the problem mine: found ValueError: no mesh 1, on mesh 1 at the penalty 30; needed a Problem"),
+        (lambda *arguments: 3, "pose of the problem mine: found a int; needed a ProblemInstance"),
+        (_pose_flat_forces, r"ProblemInstance.forces: found shape \(.*,\); needed \(.*, 2\), a force for each node"),
+    ],
+)
+def test_a_strangers_mistake_in_a_problem_is_named(
+    monkeypatch: pytest.MonkeyPatch, pose: Callable[..., Any], message: str
+) -> None:
+    monkeypatch.setattr(bench_plan, "_problem", lambda name: replace(PROBLEMS["kinked"], pose=pose))
+    subject = load_subject("vts-ppt")
+    with pytest.raises(MisuseError, match=message):
+        run_cell(Cell("mine", 1, 30.0), [subject], 1, 0)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import describe_error
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import Solution
@@ -113,7 +115,16 @@ def pose(cell: Cell, subject: Subject, seed: int) -> ProblemInstance:
     """Return the problem that a formulation solves in a cell; the seed is that of the random scenes."""
     if cell.scene == RANDOM:
         return pose_blocks(random_cases(seed, cell.mesh + 1)[cell.mesh], subject.traits)
-    return _problem(cell.scene).pose(cell.mesh, cell.stiffness, subject.traits)
+    try:
+        instance: Any = _problem(cell.scene).pose(cell.mesh, cell.stiffness, subject.traits)
+    except MisuseError:
+        raise
+    except Exception as error:  # A stranger's function may raise what it likes.
+        cause = f"{describe_error(error)}, on mesh {cell.mesh} at the penalty {cell.stiffness:g}"
+        raise MisuseError(f"pose of the problem {cell.scene}", cause, "a ProblemInstance") from error
+    if not isinstance(instance, ProblemInstance):
+        raise MisuseError(f"pose of the problem {cell.scene}", f"a {type(instance).__name__}", "a ProblemInstance")
+    return instance
 
 
 @cache
