@@ -73,7 +73,7 @@ def compressed_matrix(kind: str, size: int, data: FloatArray, indices: Array, in
     return matrix
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)  # Each holds a number for each row, which counts where there are millions.
 def _empty_matrix(kind: str, size: int) -> Any:
     return sparse.csr_array((size, size)) if kind == "csr" else sparse.csc_array((size, size))
 
