@@ -23,6 +23,7 @@ from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import differences_by_complex_step, groups_of
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
 # Combinations of directions that are shorter than this share s of the longest are left out. A central difference is
 # exact to u^(2/3), and its noise grows by 1/s as the combination is made as long as the others. Both are equal at
@@ -87,12 +88,12 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** A failing case is undecided near a kink that the pairing does not freeze, or where the residual bends
     over less than ℓ/1024. A pairing that is another one wherever the nodes move holds numbers and not decisions; that
-    fails.
+    fails, unless all of these pairings give the same forces to roundoff, in all states that differences are taken of.
     """
     state = freeze_state(case, subject)
     case, shortest = state.case, state.case.shortest_segment
     directions = first_directions(case, N_DIRECTIONS)
-    undecided, broken = _check_pairing(state, directions[0])
+    undecided, broken = _check_pairing(state, directions)
 
     def measure_over(length: float) -> tuple[Measurement, float]:
         comparison = compare(state, directions, length)
@@ -165,8 +166,7 @@ def compare(state: FrozenState, directions: FloatArray, length: float) -> Compar
     """
     case, reach = state.case, state.case.largest_coordinate
     derivative = directions @ state.tangent.T  # (n_directions, n_unknowns)
-    central = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * reach / length) ** (1 / 3)
-    taylor = np.array(TAYLOR_STEPS) * length
+    central, taylor = _central_steps(case, length), np.array(TAYLOR_STEPS) * length
     steps = np.concatenate([central, -central, taylor])
     batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
     states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
@@ -261,14 +261,22 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
     return float(best[decided].min(initial=np.inf))
 
 
-def _check_pairing(state: FrozenState, direction: FloatArray) -> tuple[str, str]:
+def _central_steps(case: Case, length: float) -> FloatArray:
+    """Return the steps of central differences of a residual that bends over a length."""
+    steps: FloatArray = np.array(CENTRAL_STEPS) * length * (UNIT_ROUNDOFF * case.largest_coordinate / length) ** (1 / 3)
+    return steps
+
+
+def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str]:
     """Return why the pairing makes a failure undecided, and how it breaks the contract; both empty if it does neither.
 
     A pairing that is another one at every place, however near, holds numbers and not decisions, and on such a pairing
-    no difference shows a missing term. A pairing that changes here and there, as ties by roundoff do, is no breach.
+    no difference shows a missing term. A pairing that changes here and there, as ties by roundoff do, is no breach, nor
+    is one whose changes do not count, as those of points that are not active.
     """
-    case, shortest = state.case, state.case.shortest_segment
-    step = CENTRAL_STEPS[-1] * shortest * (UNIT_ROUNDOFF * case.largest_coordinate / shortest) ** (1 / 3)
+    case, direction = state.case, directions[0]
+    central = _central_steps(case, case.shortest_segment)
+    step = central[-1]
 
     def pair(shifts: Iterable[float]) -> list[Pairing | None]:
         return [state.formulation.pair(case.interface, case.z + shift * step * direction) for shift in shifts]
@@ -283,8 +291,24 @@ def _check_pairing(state: FrozenState, direction: FloatArray) -> tuple[str, str]
         return "a kink: the pairing changes here, and is steady on either side", ""
     around = [pair(scale * np.arange(-2, 4)) for scale in (1, 2.0**-5, 2.0**-10)]
     if all(map(_all_differ, around)):
-        return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
+        steps = np.concatenate([central, -central, np.array(TAYLOR_STEPS) * case.shortest_segment])
+        if _change_forces([pairing for pairings in around for pairing in pairings], state, directions, steps):
+            return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
     return "", ""
+
+
+def _change_forces(
+    pairings: Sequence[Pairing | None], state: FrozenState, directions: FloatArray, steps: FloatArray
+) -> bool:
+    """Return whether any pairing changes the residual by more than roundoff does, at a state or a step from it."""
+    case = state.case
+    moves = (steps[:, None, None] * directions).reshape(-1, case.z.size)
+    places = np.concatenate([case.z[None], case.z + moves])
+    forces = state.residual_at(places)
+    slope = (np.abs(forces[1:] - forces[0]).max(axis=1) / np.abs(moves).max(axis=1)).max()
+    roundoff = COORDINATE_ROUNDING * case.largest_coordinate * slope
+    others = (replace(state, pairing=pairing).residual_at(places) for pairing in pairings)
+    return any(np.abs(other - forces).max() > roundoff for other in others)
 
 
 def _all_differ(pairings: Sequence[Pairing | None]) -> bool:

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gauss_springs import RIGHT, springs_of
 from handmade import Handmade, case, over_a_node, subject
 from subjects import judge_as
 
-from contactverif import Promises, Traits, Verdict, judge_case
+from contactverif import Case, Interface, Promises, Traits, Verdict, judge_case
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.tangent_directional import (
     CENTRAL,
@@ -171,6 +172,41 @@ def test_nor_where_it_names_its_contact_points() -> None:
             return self.points(c=0.1)
 
     assert judge_case(tangent_directional, case(), subject(Pointed, error=one_entry(1.0))).verdict is Verdict.FAIL
+
+
+@pytest.mark.parametrize("way", RIGHT)
+def test_a_pairing_may_flip_where_it_changes_no_force(way: str) -> None:
+    """An arc of open Gauss points above a ridge is nearest to the ridge itself, so that roundoff picks the facet."""
+    angles = np.linspace(-0.8, 0.8, 13)
+    arc = 0.5 * np.stack([np.sin(angles), np.cos(angles)], axis=1)
+    slave = np.vstack([[[-4.0, -2.85], [-2.0, -1.5]], arc])
+    master = np.array([[6.0, -4.0], [0.0, 0.0], [-6.0, -4.0]])
+    interface = Interface.from_chains(slave, master)
+    ridge = Case(interface, interface.nodes.reshape(-1), 4.0)
+    judge_as(Verdict.PASS, tangent_directional, ridge, springs_of(*RIGHT[way]))
+
+
+class Stored(Smooth):
+    """It stores how far a node is in its pairing, in steps of 1e-12, and the force that follows from it."""
+
+    def __init__(self, share: float) -> None:
+        super().__init__()
+        self.share = share
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        digits = np.int64(round(abs(z[0]) * 1e12))
+        return {"digits": np.array([digits >> shift & 1 for shift in range(48)])}
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = super().residual(interface, pairing, z)
+        forces[..., 1] += self.share * 1e-12 * (pairing["digits"] << np.arange(48)).sum()
+        return forces
+
+
+def test_a_pairing_that_stores_a_number_of_the_force_is_found() -> None:
+    judge_as(Verdict.PASS, tangent_directional, case(), subject(Stored, share=0.0))
+    outcome = judge_as(Verdict.FAIL, tangent_directional, case(), subject(Stored, share=1e-3))
+    assert "it holds numbers, not decisions" in outcome.reason
 
 
 @pytest.mark.parametrize(("wrong", "verdict"), [(0.0, Verdict.PASS), (1e-3, Verdict.FAIL)])
