@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from mutate import Mutant, decides, replaces, says, whole_segments
+from mutate import Mutant, decides, replaces, says, whole_segments, wrap
 from wrong_invariants import Look, make_factored
 
 import contactverif_mortar
@@ -45,11 +45,33 @@ def _reports_a_fifth_less(right: Any, interface: Any, pairing: Any, z: Any) -> C
     return replace(points, pressure=np.where(abs(sine) > LEAST_TURN, 0.8, 1.0) * points.pressure)
 
 
+def _where_kinks_are_sharp(interface: Any, z: Any) -> float:
+    """Return 1.01 if two slave segments meet at 14° or more, else 1."""
+    look = Look(interface, z[..., : interface.n_unknowns].real.reshape(-1, interface.n_nodes, 2)[0], None, None)
+    sines = look.turns("slave", np.arange(len(interface.slave)), 1)
+    return 1.01 if abs(sines).max() > 0.25 else 1.0
+
+
+def _scales(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    return _where_kinks_are_sharp(interface, z) * right(interface, pairing, z)
+
+
+def _reports_as_stiff(right: Any, interface: Any, pairing: Any, z: Any) -> ContactPoints:
+    points = right(interface, pairing, z)
+    return replace(points, pressure=_where_kinks_are_sharp(interface, z) * points.pressure)
+
+
+def stiffer_at_sharp_kinks(*, penalty: float) -> Any:
+    """Make segment-to-segment springs that are 1 % too stiff, all of them, as soon as one kink is sharp."""
+    return wrap(penalty, contactverif_mortar.sts, residual=_scales, tangent=_scales, contact_points=_reports_as_stiff)
+
+
 MUTANTS = (
     make_factored("springs a quarter as stiff where the slave bends", CURVED, _quarter_where_the_slave_bends),
     make_factored("springs softer by the square of depth over radius", ARC, _less_by_depth_over_radius),
     Mutant("pressures reported a fifth too small off the parallel", ARC, _reports_a_fifth_less),
     Mutant("normals averaged over kinks said to pass there", KINKED,
            says(partial(contactverif_mortar.mortar, normals="averaged"), kinked=True, witnesses={})),
+    Mutant("springs 1 % too stiff where a kink is sharp", KINKED, stiffer_at_sharp_kinks),
     Mutant("whole slave segments in contact", "projection.activity", decides(contactverif_nts.vts_g, whole_segments)),
 )  # fmt: skip

@@ -10,6 +10,7 @@ from subjects import Changed, change_verbs, judge_as, load_property, load_subjec
 import contactverif_mortar
 from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
+from contactverif.problems.kinked_patch import KinkedPatch, kinked_patch
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 
@@ -84,6 +85,42 @@ def test_a_formulation_that_does_nothing_fails(property_id: str) -> None:
 
     outcomes = judge_all(property_id, Subject("nothing", lambda *, penalty: Nothing()))
     assert Verdict.PASS not in {outcome.verdict for outcome in outcomes}
+
+
+def test_springs_that_are_too_stiff_at_kinks_are_found_by_the_approach_alone() -> None:
+    def report(right: Any, *state: Any) -> Any:
+        points = right(*state)
+        return replace(points, pressure=1.01 * points.pressure)
+
+    stiff = change("sts", residual=lambda right, *state: 1.01 * right(*state), contact_points=report)
+    for outcome in judge_all("patch.kinked", stiff):
+        assert outcome.verdict is Verdict.FAIL
+        assert outcome.reason.startswith("error of the approach 0.01")
+
+
+@pytest.mark.parametrize("degrees", [60.0, 80.0, 88.0, 89.9])
+@pytest.mark.parametrize("upper_slave", [True, False])
+def test_the_tolerance_grows_as_the_other_facet_is_seen_edge_on(degrees: float, upper_slave: bool) -> None:
+    """The former tolerance, without tan(φ), accused segment-to-segment springs at 89.9°, eight times over."""
+    height = 4 * np.tan(np.radians(degrees) / 2)
+    roof = KinkedPatch(((0.0, -height / 2), (4.0, height / 2), (8.0, -height / 2)))
+    case = kinked_patch(roof, upper_slave=upper_slave, penalty=10.0).case()
+    judge_as(Verdict.PASS, load_property("patch.kinked"), case, load_subject("sts"))
+
+
+def test_forces_that_no_motion_changes_are_undecided_and_not_accused() -> None:
+    """Nothing holds the upper block: the matrix at the exact state is singular, and that state would be judged."""
+    question = load_property("patch.kinked")
+
+    class Dead:
+        traits = Traits(promises=Promises(patch=PatchPromises(kinked=True)))
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return 0 * z + np.cos(np.arange(z.shape[-1]))
+
+    for case in question.cases(None):
+        outcome = judge_as(Verdict.UNDECIDED, question, case, Subject("dead", lambda *, penalty: Dead()))
+        assert "singular" in outcome.reason
 
 
 def test_averaged_normals_fail_at_every_kink_with_or_without_a_third_normal() -> None:
