@@ -298,9 +298,7 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
         MASTER: float(errors[n_slave:].max()),
     }
     tolerances = dict.fromkeys(values, _floor(problem, start, gap))
-    unique = not multiplier or traits.promises.independent_multipliers is True
-    known = contact.has_points and traits.rules.penalty == "distributed" and unique
-    if known and not contact.points.on_master.any():  # Nobody says how two passes share a pressure.
+    if _knows_its_pressure(contact, traits):
         values[PRESSURE] = _pressure_error(contact.points, pressure)
         tolerances[PRESSURE] = tolerances[STRESS] + problem.contraction
     if multiplier or not refuse_unknown_total(traits):
@@ -309,6 +307,13 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     idle = not by_contact.any()
     undecided = "Newton's method: the matrix at the exact state is singular" if singular and not idle else ""
     return Measurement(check_all(values, tolerances), undecided, details=end_details(trace), idle=idle)
+
+
+def _knows_its_pressure(contact: FrozenState, traits: Traits) -> bool:
+    """Return whether contact points report the pressure; nobody says how two passes share it."""
+    unique = traits.rules.enforcement != "multiplier" or traits.promises.independent_multipliers is True
+    distributed = traits.rules.penalty == "distributed"
+    return unique and distributed and contact.has_points and not contact.points.on_master.any()
 
 
 def _solve(
