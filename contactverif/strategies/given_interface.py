@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
 from contactverif.strategies.parts import OFFSETS, depth_units, depths, penalties, seeds, shifts
@@ -112,18 +112,39 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
 
 
 def _push(interface: Interface, positions: FloatArray, depth: float) -> FloatArray:
-    """Return the translation (2,) of the slave that brings its deepest node to the penetration `depth`."""
-    ends = positions[interface.master.segments]  # (n_segments, 2 ends, dim)
-    along = ends[:, 1] - ends[:, 0]
-    length = np.hypot(*along.T)
-    deepest, push = np.inf, np.zeros(2)
-    for point in positions[: interface.n_slave_nodes]:
-        foot = np.einsum("ij,ij->i", point - ends[:, 0], along) / length**2
-        feet = ends[:, 0] + np.clip(foot, 0, 1)[:, None] * along
-        home = int(np.argmin(np.hypot(*(point - feet).T)))
-        normal = np.array([along[home, 1], -along[home, 0]]) / length[home]
-        gap = float((point - ends[home, 0]) @ normal)
-        beyond = not 0 <= foot[home] <= 1  # counts only where nothing is above the master
-        if gap + beyond * length.sum() < deepest:
-            deepest, push = gap + beyond * length.sum(), -(gap + depth) * normal
+    """Return the translation (2,) of the slave that brings its deepest node to the penetration `depth`.
+
+    A node past the ends of the segment nearest to it counts only where none stands over one.
+    """
+    gaps, normals, over = _look(interface, positions, positions[: interface.n_slave_nodes])
+    deepest = np.argmin(gaps + np.where(over, 0.0, interface.master.lengths(positions).sum()))
+    push: FloatArray = -(gaps[deepest] + depth) * normals[deepest]
     return push
+
+
+def touches(interface: Interface, positions: FloatArray) -> bool:
+    """Return whether half of a slave segment, its end and its middle, is below the master segments nearest to it."""
+    ends = positions[interface.slave.segments]
+    points = np.concatenate([ends[:, 0], ends.mean(axis=1), ends[:, 1]])
+    gaps, _, over = _look(interface, positions, points)
+    first, middle, last = (over & (gaps < 0)).reshape(3, -1)
+    return bool((middle & (first | last)).any())
+
+
+def _look(interface: Interface, positions: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return gaps (n,) and normals (n, 2) of points (n, 2) at the master segments nearest to them.
+
+    The third array says which points are over their segment, and not past its ends.
+    """
+    ends = positions[interface.master.segments]  # (n_segments, 2 ends, dim)
+    first, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    length = np.hypot(*along.T)
+    homes, feet = [], []
+    for point in points:  # One by one: a mesh of the user may have thousands of segments on either side.
+        foot = np.einsum("ij,ij->i", point - first, along) / length**2
+        distance = np.hypot(*(point - first - np.clip(foot, 0, 1)[:, None] * along).T)
+        homes.append(int(np.argmin(distance)))
+        feet.append(foot[homes[-1]])
+    home, foot = np.array(homes), np.array(feet)
+    normals = np.column_stack([along[home, 1], -along[home, 0]]) / length[home, None]
+    return np.einsum("ij,ij->i", points - first[home], normals), normals, (foot >= 0) & (foot <= 1)

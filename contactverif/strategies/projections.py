@@ -23,6 +23,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.oracle.projection_kinds import TAU, kind_of
 from contactverif.strategies import sketch_kinds
+from contactverif.strategies.given_interface import touches
 from contactverif.strategies.parts import penalties, seeds
 from contactverif.strategies.sketches import ROUND_PLACES, Sketch, gaps, sketch_cases
 
@@ -59,7 +60,8 @@ _FEET = st.one_of(  # ξ on the master segment: inside, at a node, near one, and
     _NEAR.map(lambda part: -_PAST * (1 - part)),
     _NEAR.map(lambda part: -_PAST * (1 + part)),
 )
-_DEGREES = st.sampled_from([0.0, 0.0, 0.0, 5.0, -20.0, 45.0, 89.9, 90.0, 180.0])
+# Along the slave's normal nothing is in contact at 90° and beyond, so that only few states are that steep.
+_DEGREES = st.sampled_from([*[0.0] * 6, *[5.0, -20.0, 45.0] * 2, 89.9, 90.0, 180.0])
 
 
 @cache
@@ -90,9 +92,10 @@ def projection_states(interface: Interface | None = None) -> SearchStrategy[Case
 
 @st.composite
 def _states(draw: DrawFn, interface: Interface) -> Case:
-    """Draw a state of the interface: a point of a slave segment stands over, in or past a master segment.
+    """Draw a state of the interface: a point of a slave segment stands in or past a master segment, or on it.
 
     The slave is moved as a whole. On any mesh another segment may turn out to be nearer, so the oracle names the kind.
+    Where nothing touches, a node is set into the master: a run on a mesh of the user shall have contact to judge.
     """
     slave_segment = draw(st.integers(0, len(interface.slave) - 1))
     home = draw(st.integers(0, len(interface.master) - 1))
@@ -100,17 +103,31 @@ def _states(draw: DrawFn, interface: Interface) -> Case:
     if draw(st.booleans()):
         xi = 1 - xi
     penalty, seed = draw(penalties()), draw(seeds())
-    positions = interface.nodes.copy()
-    first, second = positions[interface.master.segments[home]]
-    along = second - first
-    target = first + xi * along + gap * np.array([along[1], -along[0]])
-    slave = positions[: interface.n_slave_nodes]
-    a, b = slave[interface.slave.segments[slave_segment]]
-    point = (1 - c) / 2 * a + (1 + c) / 2 * b
-    slave[:] = (slave - point) @ _turn(b - a, -along, degrees).T + target
+    positions = _set_point(interface, (slave_segment, c), (home, xi), gap, degrees)
+    if not touches(interface, positions):
+        c = -1.0
+        positions = _set_point(interface, (slave_segment, c), (home, 3 / 7), -abs(gap) or -1 / 8, 0.0)
     z = positions.reshape(-1)
     parameters = {"probe_segment": np.array(float(slave_segment)), "probe_c": np.array(c)}
     return Case(interface, z, penalty, parameters, seed, kind=kind_of(interface, z, slave_segment, c))
+
+
+def _set_point(
+    interface: Interface, point: tuple[int, float], foot: tuple[int, float], gap: float, degrees: float
+) -> FloatArray:
+    """Return positions (n_nodes, 2) with the slave moved as a whole.
+
+    Its point c on a segment gets to `gap`, in lengths of the master segment, above ξ there. Both segments then run
+    against each other, up to so many degrees.
+    """
+    positions = interface.nodes.copy()
+    first, second = positions[interface.master.segments[foot[0]]]
+    along = second - first
+    target = first + foot[1] * along + gap * np.array([along[1], -along[0]])
+    slave, c = positions[: interface.n_slave_nodes], point[1]
+    a, b = slave[interface.slave.segments[point[0]]]
+    slave[:] = (slave - ((1 - c) / 2 * a + (1 + c) / 2 * b)) @ _turn(b - a, -along, degrees).T + target
+    return positions
 
 
 def _turn(before: FloatArray, after: FloatArray, degrees: float) -> FloatArray:
