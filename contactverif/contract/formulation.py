@@ -33,8 +33,9 @@ z
 Multipliers: a formulation that enforces contact by multipliers says how many it has by a method
 ``n_multipliers(interface) -> int``. The multipliers stand behind the positions in z, and the constraint rows behind the
 forces in the residual: −area · gap where a constraint is active, area · λ where it is not. λ ≥ 0 is a pressure (trait
-``penalty="distributed"``) or a nodal force (``"nodal"``). The penalty that the factory gets is then the scale c of the
-decision λ − c gap ≥ 0; no solution may depend on it.
+``penalty="distributed"``) or a nodal force (``"nodal"``). The area turns it into a force: it is the area of competence,
+and 1 for a nodal force. A multiplier that sees nothing is not active; its area is not 0, or its row would be 0 = 0. The
+penalty that the factory gets is then the scale c of the decision λ − c gap ≥ 0; no solution and no row depends on it.
 
 Rule for the next editor: signs and words change here first, or not at all.
 """

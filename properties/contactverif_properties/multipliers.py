@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from contactverif.contract.arrays import FloatArray
+import numpy as np
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
-from contactverif.mechanics.linear import scale_factors
+from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
-from contactverif.strategies.solids import block_cases, solid_cases
+from contactverif.strategies.solids import block_cases, dead_zone_cases, solid_cases
 from contactverif_properties.shared.applicability import refuse_dependent_multipliers
 from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details, solution_floor
 from contactverif_properties.shared.uniform_pressure import exact_solution
 
+COVERED, OVERHANG = "covered", "overhang"
 SCALE_RATIO = 8.0  # The first scale c over the second one.
 TOLERANCE = "max(1e3 u/cond, 30 u X)/ℓ"
 TENSION = Quantity(
@@ -91,11 +95,19 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, floor), details=details, idle=is_untouched(trace))
 
 
+@random_source("contactverif_properties.multipliers.covered_and_overhanging_cases")
+def covered_and_overhanging_cases(scene: Case | None = None) -> dict[str, SearchStrategy[Case]]:
+    """Return blocks under a uniform pressure: half on a master as wide, half with slave nodes that see nothing."""
+    kinds = {COVERED: block_cases(scene), OVERHANG: dead_zone_cases(scene)}
+    return {kind: cases for kind, cases in kinds.items() if cases is not None}
+
+
 @Property.define(
     id="multipliers.rank",
     family="multipliers",
     quantities=(REDUNDANT,),
-    cases=Cases.random(block_cases),
+    cases=Cases.by_kind(covered_and_overhanging_cases),
+    kinds=(COVERED, OVERHANG),
     promise=lambda traits: traits.promises.independent_multipliers,
     asks=frozenset({"multiplier"}),
     bodies=True,
@@ -103,13 +115,16 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
 def multiplier_rank(case: Case, subject: Subject) -> Measurement:
     """The constraints are independent, so that the multipliers are unique.
 
-    **Question.** In the exact solution of two blocks under a uniform pressure, how many multipliers are redundant?
+    **Question.** In the exact solution of two blocks under a uniform pressure, how many multipliers are redundant? In
+    half of the cases the slave overhangs the master, by one node or more that see nothing.
 
     **Why it matters.** A redundant constraint makes the matrix singular. A solver then stops, or returns multipliers
-    (the contact pressures) that are arbitrary.
+    (the contact pressures) that are arbitrary. A node that sees nothing needs a row that sets its multiplier to 0: if
+    the row is 0 = 0, the first interface with an overhang cannot be solved.
 
     **How it is judged.** The measured number counts the zero singular values of the saddle-point matrix. The tolerance
-    is 0. A singular value counts as zero below 8 n u times the largest one, for n unknowns.
+    is 0. A singular value counts as zero below 8 n u times the largest one, for n unknowns. A slave of which no point
+    sees the master may move freely, which is no fault of a multiplier: motions that no row resists are not counted.
 
     **Undecided.** Never.
 
@@ -120,5 +135,14 @@ def multiplier_rank(case: Case, subject: Subject) -> Measurement:
     system, u = System(scene, formulation, use_tangent=False), exact_solution(scene, case, subject, formulation)
     matrix, floor = system.matrix(u, system.pair(u))
     step = system.step(matrix, np.zeros(system.size), floor)
+    redundant = step.deficiency - (_count_free_motions(matrix, scene.n_free) if step.deficiency else 0)
     details = {"multipliers": float(system.n_multipliers)}
-    return Measurement([REDUNDANT.check(float(step.deficiency), 0.0)], details=details)
+    return Measurement([REDUNDANT.check(float(redundant), 0.0)], details=details)
+
+
+def _count_free_motions(matrix: Any, n_positions: int) -> int:
+    """Return how many motions of the bodies no row (n,) of a saddle-point matrix resists, neither force nor gap."""
+    rows, columns = scale_factors(matrix, n_positions)
+    scaled = rows[:, None] * dense(matrix) * columns
+    least = RANK_ROUNDOFF * len(scaled) * UNIT_ROUNDOFF * np.linalg.norm(scaled, 2)
+    return int((np.linalg.svd(scaled[:, :n_positions], compute_uv=False) <= least).sum())

@@ -22,6 +22,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases, general_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import freeze_state, prepare_state, random_moves
+from contactverif_properties.shared.constraint_rows import check_constraint_rows
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.passes import Pass
 from contactverif_properties.shared.uniform_pressure import unit_forces
@@ -112,12 +113,24 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
     reported; it may be as large as rounding the positions makes a gap. Where the surfaces penetrate and nothing begins,
     or the slave is pulled as a whole, the case fails in words. What single nodes may do is asked by `nodal-push`.
 
+    The constraint rows of multipliers are held to the contract on the flat interface, with the gap closed and open:
+    −area · gap where λ − c gap ≥ 0, and area · λ elsewhere, whatever the scale c. Multipliers are chosen so that
+    λ − c gap is positive everywhere, then of both signs, from c |gap|/4 down to 16 tolerances beside 0; there the two
+    forms differ in sign. The area is what a unit of the multiplier pushes the slave by, and 1 for a nodal force. The
+    tolerance of a row is u(8X/min(g, ℓ) + 4N). Where springs act twice, an inactive row must have the sign of λ alone.
+    A row with another size, or of the other form, breaks the contract.
+
     **Undecided.** A case in which nothing begins is undecided if moving the nodes by 64 u X makes contact begin one way
     and not another: a node that faces a free end exactly is over the master or not, as roundoff decides. Where contact
     begins whichever way the nodes move, the case fails.
     """
     if "penetration" in case.parameters:
-        return measure_flat_contact(case, subject)
+        measurement = measure_flat_contact(case, subject)
+        if measurement.broken or measurement.undecided or subject.traits.rules.enforcement != "multiplier":
+            return measurement
+        lifted = lift_slave(case, 2 * case.parameter("penetration"))
+        error = check_constraint_rows(subject.for_case(case), case, lifted, subject.traits.rules, subject.penalty(case))
+        return replace(measurement, details={"error of a constraint row over its tolerance": error})
     state = freeze_state(case, subject)
     values, tolerances = _pull_of_points(state)
     return Measurement(check_all(values, tolerances), idle=not state.forces.any())

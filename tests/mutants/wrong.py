@@ -12,6 +12,7 @@ import wrong_accuracy
 import wrong_bent
 import wrong_hard
 import wrong_invariants
+import wrong_multipliers
 import wrong_newton
 import wrong_patch_classes
 import wrong_pressures
@@ -375,6 +376,7 @@ MUTANTS = (
            lambda *, penalty: replace(contactverif_mortar.sts(penalty=penalty), quadrature=Quadrature.gauss(1, True))),
     *wrong_hard.MUTANTS,
     *wrong_invariants.MUTANTS,
+    *wrong_multipliers.MUTANTS,
     *wrong_newton.MUTANTS,
     *wrong_patch_classes.MUTANTS,
     *wrong_pressures.MUTANTS,
