@@ -18,6 +18,7 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
+from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.foreign_text import describe_error, name_line
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -75,6 +76,8 @@ class Subject:
         The optional parts that the plugin has, among "pair", "tangent", "contact_points" and "residual_and_tangent".
     counts_multipliers : bool
         The plugin has a method ``n_multipliers``.
+    first_answers : FirstAnswers | None
+        The first answers of the plugin in a process, once a run has asked for them.
 
     Raises
     ------
@@ -97,6 +100,7 @@ class Subject:
     def __init__(self, name: str, make: Callable[..., Any]) -> None:
         self.name = name_line(name)
         self._make = make
+        self.first_answers: FirstAnswers | None = None
         plugin = _call_plugin("make", make, penalty=1.0)
         if not callable(getattr(plugin, "residual", None)):
             raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`")

@@ -21,6 +21,7 @@ from threadpoolctl import ThreadpoolController
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
+from contactverif.contract.first_answers import FirstAnswers, ask_first
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject
@@ -137,26 +138,25 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
     return -forces.reshape(case.interface.nodes.shape)
 
 
-def call_first(subject: Subject, parts: Collection[str]) -> bool:
-    """Call a formulation for the first time, and return whether its forces have the opposite sign.
+def call_first(subject: Subject, parts: Collection[str]) -> tuple[bool, FirstAnswers | None]:
+    """Call a formulation for the first time, and return whether its forces have the opposite sign, and its answers.
 
     Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
-    is called. What else goes wrong here, the properties will say.
+    is called. What else goes wrong here, the properties will say: then there are no answers.
     """
-    opposite = has_opposite_sign(subject)
-    case = named_case("c")
+    first: FirstAnswers | None = None
     try:
-        with np.errstate(all="ignore"):
-            formulation = subject.for_case(case)
-            state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), 1.0))
-            pairing = formulation.pair(case.interface, state.z)
-            if "tangent" in parts:
-                formulation.tangent(case.interface, pairing, state.z)
+        with one_thread(), np.errstate(all="ignore"):
+            if subject.traits.rules.enforcement != "barrier":  # It is not defined in penetration.
+                first = ask_first(subject, named_case(STATES[0]), parts)
             if "contact_points" in parts:
+                formulation, case = subject.for_case(named_case("c")), named_case("c")
+                state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), 1.0))
+                pairing = formulation.pair(case.interface, state.z)
                 formulation.contact_points(case.interface, pairing, state.z)
     except ContractError:
         pass
-    return opposite
+    return has_opposite_sign(subject), first
 
 
 def has_opposite_sign(subject: Subject) -> bool:

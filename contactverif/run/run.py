@@ -21,6 +21,7 @@ from typing import TypeVar, get_args
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.interface import Interface
 from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property
@@ -122,7 +123,8 @@ def run(
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
     with closing(journal):
         try:
-            scheduler.work(chain(jobs.first_calls(), jobs))
+            scheduler.work(jobs.first_calls())  # Jobs that follow carry the first answers to other processes.
+            scheduler.work(jobs)
         except KeyboardInterrupt:
             raise RunStopped(jobs.result(not_loaded, resolved.name)) from None
     return jobs.result(not_loaded, resolved.name)
@@ -141,7 +143,8 @@ def judge_share(
     scheduler = Scheduler(None, progress)
     jobs = RunJobs(subjects, questions, sampling, journal, scheduler.report, {}, share)
     with closing(journal):
-        scheduler.work(chain(jobs.first_calls(), jobs))
+        scheduler.work(jobs.first_calls())
+        scheduler.work(jobs)
     jobs.check_written()
 
 
@@ -181,9 +184,15 @@ class RunJobs:
         for subject in self._subjects:
             before = Progress(subject.name, "", "first call (compiles)", 0, 1)
             self._report(before)
-            yield Job(judge.call_first, (subject, self._needs & subject.provides), partial(self._note_sign, before))
+            yield Job(
+                judge.call_first, (subject, self._needs & subject.provides), partial(self._note_first, before, subject)
+            )
 
-    def _note_sign(self, before: Progress, opposite: bool) -> Iterable[Job]:
+    def _note_first(
+        self, before: Progress, subject: Subject, answers: tuple[bool, FirstAnswers | None]
+    ) -> Iterable[Job]:
+        opposite, first = answers
+        subject.first_answers = subject.first_answers or first  # In a second run the process is warm.
         self._opposite_signs |= {before.formulation} if opposite else set()
         self._report(replace(before, count=1))
         return ()

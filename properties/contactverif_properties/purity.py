@@ -7,10 +7,12 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.first_answers import FirstAnswers, ask_first
 from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
+from contactverif.problems.named_states import named_case
 from contactverif_properties.shared import interleaved_calls
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.roundoff import ratio
@@ -43,6 +45,20 @@ ONE_TANGENT = Quantity(
     "difference of the tangent in one call",
     "32u",
     "One call may round four factors otherwise, as if nodes had moved by uX. The difference counts over X K' + N |K|.",
+)
+
+N_ROUNDS = 500  # The rounds of four calls in the life of an instance.
+IN_LIFE = Quantity("entries that change in 2,000 calls of one instance", "0", REASON)
+FIRST_RESIDUAL = Quantity(
+    "difference of the first residual of a process",
+    "8u",
+    "The first call may add in another order, as a batch may. The difference counts over X (k + |R|/ℓ) + N |R|.",
+)
+FIRST_TANGENT = Quantity(
+    "difference of the first tangent of a process",
+    "32u",
+    "The first call may round four factors otherwise, as if nodes had moved by uX. "
+    "The difference counts over X K' + N |K|.",
 )
 
 
@@ -150,6 +166,66 @@ def purity(case: Case, subject: Subject) -> Measurement:
         broken.append("the interface was changed")
     idle = not forces[:, : interface.n_unknowns].any()
     return Measurement(numbers, broken="; ".join(broken), idle=idle)
+
+
+@Property.define(
+    id="purity.long",
+    family="invariants",
+    quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
+    cases=Cases.from_list(lambda: (named_case("offset-c"),)),
+    promise=lambda traits: True,
+)
+def purity_long(case: Case, subject: Subject) -> Measurement:
+    """The first answers of an instance and of a process are those that a long life repeats.
+
+    **Question.** One instance answers 2,000 calls. Are its answers the same from the first to the last? Is the first
+    answer of a process, before anything is warm, the answer that it gives later?
+
+    **Why it matters.** A program makes an instance once, and asks it in thousands of iterations. A counter that runs
+    over, a store that is full, a sum that drifts or a table that is filled in the first call shows in no test of a few
+    calls.
+
+    **How it is judged.** The methods are asked at one state. Then residuals, pairings and tangents follow in turn, at
+    that state and at 500 new ones near it, and all methods are asked at that state again. The first number counts the
+    entries of repeated answers that differ; the tolerance is 0. A pairing that differs fails in words. The other two
+    compare the first residual and the first tangent of the process with those that it gives now, each as `purity`
+    compares a batch with a loop. A run notes the first answers where it calls a formulation for the first time, on case
+    A1, in a process of its own or in that of the harness. They are only compared to roundoff, since a process may
+    compile in its first calls and add in another order later.
+
+    **Undecided.** Never.
+    """
+    first = subject.first_answers or ask_first(subject, named_case("a1"), subject.provides)
+    formulation, state = prepare_state(case, subject)
+    random = np.random.default_rng(state.seed)
+    moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.shortest_segment
+    question = interleaved_calls.Question(state.interface, formulation.pair(state.interface, state.z), state.z)
+    changed, pairs_otherwise = interleaved_calls.count_changes_in_life(formulation, question, state.z + NEAR * moves)
+    numbers = [IN_LIFE.check(changed, 0.0), *_compare_first(first, subject, random)]
+    broken = "the pairing of a state differs after many calls" if pairs_otherwise else ""
+    idle = not formulation.residual(state.interface, question.pairing, state.z)[: state.interface.n_unknowns].any()
+    return Measurement(numbers, broken=broken, idle=idle)
+
+
+def _compare_first(first: FirstAnswers, subject: Subject, random: np.random.Generator) -> list[CheckedNumber]:
+    """Return the differences of the first answers of a process from those that it gives now."""
+    case, formulation = first.case, subject.for_case(first.case)
+    near = case.z + NEAR * random.uniform(-1, 1, case.z.size) * case.shortest_segment
+    pairing = formulation.pair(case.interface, case.z)
+
+    def ask(verb: str) -> Array:
+        answers = formulation.answers([(verb, case.interface, pairing, u) for u in (case.z, near)])
+        return np.array([dense(answer) for answer in answers])
+
+    forces = ask("residual")
+    then = np.array([first.residual, forces[1]])
+    difference = compare_batch(case, near, forces, np.array([then, then[::-1]]))
+    numbers = [FIRST_RESIDUAL.check(difference, BATCH_ROUNDINGS * UNIT_ROUNDOFF)]
+    if first.tangent is not None:
+        tangents = ask("tangent")
+        difference = compare_tangents(case, near, tangents, np.array([first.tangent, tangents[1]]))
+        numbers.append(FIRST_TANGENT.check(difference, TANGENT_ROUNDINGS * UNIT_ROUNDOFF))
+    return numbers
 
 
 def _compare_penalties(

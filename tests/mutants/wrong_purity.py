@@ -11,7 +11,8 @@ from subjects import Changed
 import contactverif_nts
 from contactverif.contract.arrays import dense
 
-PURITY = "purity"
+PURITY, LONG = "purity", "purity.long"
+MANY = 500  # The calls of one instance after which a mutant is wrong.
 
 
 def _remembers(*, memory: str, user: str, argument: int) -> Callable[..., Any]:
@@ -127,7 +128,44 @@ def _last_in_one_call(*, penalty: float) -> Changed:
     return Changed(inner, residual=residual, residual_and_tangent=both)
 
 
+def _wears_out(verb: str) -> Callable[..., Any]:
+    """Return a factory: the answers of a verb are one percent too large after many calls of one instance."""
+
+    def make(*, penalty: float) -> Any:
+        calls: list[None] = []
+
+        def answer(right: Any, *arguments: Any) -> Any:
+            calls.append(None)
+            return right(*arguments) * (1.01 if len(calls) > MANY else 1.0)
+
+        return wrap(penalty, **{verb: answer})
+
+    return make
+
+
+def _wrong_at_first(verb: str) -> Callable[..., Any]:
+    """Return a factory: the first answer of a verb in a process is one percent too large, whatever the instance is."""
+    answered: list[bool] = []
+
+    def make(*, penalty: float) -> Any:
+        if penalty == 1.0:  # The harness loads a formulation once in a process, and makes it with this penalty.
+            answered.clear()
+
+        def answer(right: Any, *arguments: Any) -> Any:
+            factor = 1.0 if answered else 1.01
+            answered.append(True)
+            return right(*arguments) * factor
+
+        return wrap(penalty, **{verb: answer})
+
+    return make
+
+
 MUTANTS = (
+    Mutant("one percent too stiff after 500 calls of one instance", LONG, _wears_out("residual")),
+    Mutant("tangent one percent too large after 500 calls of one instance", LONG, _wears_out("tangent")),
+    Mutant("first residual of a process one percent too large", LONG, _wrong_at_first("residual")),
+    Mutant("first tangent of a process one percent too large", LONG, _wrong_at_first("tangent")),
     Mutant("one object in the handles of all pairings", PURITY, ReusesItsHandle),
     Mutant("residual in one call that pulls", PURITY, _in_one_call(lambda residual, tangent: (-residual, tangent))),
     Mutant("tangent in one call made symmetric", PURITY,

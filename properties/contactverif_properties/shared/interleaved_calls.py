@@ -1,4 +1,4 @@
-"""Calls of all methods in turn, for states, pairings and interfaces in turn.
+"""Calls of all methods in turn, for states, pairings and interfaces in turn, and the many calls of one instance.
 
 Two instances are asked, in two orders. A formulation that remembers something of an earlier call answers differently.
 """
@@ -68,6 +68,50 @@ def count_changes(
     for call, answer in _ask(second, others, questions):
         changed[call[0]] += _count_different(answer, answers[call])
     return repeated, changed
+
+
+def count_changes_in_life(
+    formulation: CheckedFormulation, question: Question, states: FloatArray
+) -> tuple[float, bool]:
+    """Ask one instance a question with all methods, then in rounds of four calls, and all methods once more.
+
+    A round is a residual at the state of the question, a pairing, a tangent, and a residual at a new state. Pairing and
+    tangent are those of the question and of new states in turn, so that half of all answers must repeat.
+
+    Parameters
+    ----------
+    formulation : CheckedFormulation
+        The instance.
+    question : Question
+        The question, with the pairing that was the first answer to it.
+    states : FloatArray, shape (n_rounds, n_unknowns + n_multipliers)
+        The new states, near that of the question.
+
+    Returns
+    -------
+    tuple[float, bool]
+        How many entries of answers to the question change, and whether the pairing does.
+    """
+    interface, z = question.interface, question.z
+    order = ("residual", "tangent", "contact_points", BOTH)
+    verbs = [verb for verb in order if verb in {"residual", *formulation.provides}]
+    slow = "tangent" if "tangent" in formulation.provides else "residual"
+    first = dict(_ask(formulation, [(verb, 0) for verb in verbs], [question]))
+    changed, pairs_otherwise = 0.0, False
+    for number, state in enumerate(states):
+        repeats = number % 2 == 1
+        pairing = formulation.pair(interface, z if repeats else state)
+        pairs_otherwise |= repeats and pairing != question.pairing
+        near = Question(interface, question.pairing if repeats else pairing, state)
+        answers = _ask(
+            formulation, [("residual", 0), (slow, 1), ("residual", 2)], [question, question if repeats else near, near]
+        )
+        for (verb, _), answer in answers[: 1 + repeats]:
+            changed += _count_different(answer, first[verb, 0])
+    pairs_otherwise |= formulation.pair(interface, z) != question.pairing
+    for call, answer in _ask(formulation, list(first), [question]):
+        changed += _count_different(answer, first[call])
+    return changed, pairs_otherwise
 
 
 def _ask(
