@@ -33,6 +33,7 @@ from contactverif.cli.stability_command import stability
 from contactverif.cli.verify_command import verify
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.foreign_text import name_line, one_line
+from contactverif.isolation.one_thread import ONE_THREAD
 
 app = typer.Typer(
     help="Find out whether a contact formulation is right: random meshes, exact answers, small counterexamples.",
@@ -88,6 +89,8 @@ def _options_of_all_commands(
 
 def main() -> None:
     """Run the command `contactverif`; a user's mistake is one line and exit status 2, never a traceback."""
+    if "numpy" not in sys.modules:  # Later no library would read it.
+        os.environ.update(ONE_THREAD)
     _open_closed_streams()
     _limit_columns()
     for stream in (sys.stdout, sys.stderr):

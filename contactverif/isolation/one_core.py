@@ -3,6 +3,8 @@
 Rule for the next editor: to wake a process that sleeps on another core takes longer than most answers, and the system
 likes to wake a process on a core that sleeps. So both are held on one core, and let go now and then for one question:
 then the system may move the judge to a better core.
+
+A plugin's process starts on one core and stays on one: TBB counts the cores when it is first used, and has no variable.
 """
 
 from __future__ import annotations
@@ -10,7 +12,8 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from time import perf_counter
 
 _QUESTIONS_FIRST = 32  # The judge is not held to one core before so many questions.
@@ -49,6 +52,18 @@ class Judge:
         self.core, self._until = core, now + _SECONDS_ON_A_CORE
         with suppress(OSError):
             os.sched_setaffinity(0, {core})
+
+    @contextmanager
+    def on_one_core(self) -> Iterator[None]:
+        """Open a block in which this process is on one core, so that a process that it starts there is held on it."""
+        self.let_go()
+        if _LIBC is not None:
+            self._cores = os.sched_getaffinity(0)
+            self._hold(int(_LIBC.sched_getcpu()), perf_counter())
+        try:
+            yield
+        finally:
+            self.let_go()
 
     def let_go(self) -> None:
         """Let this process run on any of its cores."""

@@ -28,6 +28,7 @@ from contactverif.isolation.child import Child, name_of_signal
 from contactverif.isolation.limits import MEGABYTE, Limits
 from contactverif.isolation.messages import MessageError, Reply, decode_replies
 from contactverif.isolation.one_core import JUDGE
+from contactverif.isolation.one_thread import ONE_THREAD
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
 PROGRESS = "CONTACTVERIF_PROGRESS"  # The number of an open file of one byte, see `docs/reference/protocol.md`.
@@ -39,12 +40,11 @@ _LARGEST_ANSWER = 512  # Megabytes. The judge keeps some answers at a time, in i
 _SECONDS_TO_DIE = 5.0
 _SECONDS_TO_READ = 1.0
 _LAST_WORDS = 2000  # Bytes.
-# One thread for linear algebra, as in the judge's process (`contactverif.run.judge.one_thread`): the same bits.
-_SETTINGS = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM")}
+# One thread, as for linear algebra in the judge's process (`contactverif.run.judge.one_thread`): the same bits.
 # A plugin that limits the size of files would cut the compiled modules of the harness, which all runs share.
-_SETTINGS |= {"PYTHONDONTWRITEBYTECODE": "1"}
-# A second process of the same plugin differs in what no answer may depend on.
-_OTHER_SETTINGS = {"PYTHONHASHSEED": "4711", "OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2"}
+_SETTINGS = ONE_THREAD | {"PYTHONDONTWRITEBYTECODE": "1"}
+# A second process of the same plugin differs in what no answer may depend on. The number of threads is not among it.
+_OTHER_SETTINGS = {"PYTHONHASHSEED": "4711"}
 
 
 class Question:
@@ -66,7 +66,7 @@ class Question:
 class PluginProcess:
     """A process that may hold one plugin: any program that speaks the protocol.
 
-    A `second` one has another hash seed and another number of threads.
+    A `second` one has another hash seed.
     """
 
     def __init__(self, command: Sequence[str], limits: Limits, *, second: bool = False) -> None:
@@ -74,14 +74,14 @@ class PluginProcess:
         self._limits = limits
         self._progress = _file_of_one_byte()
         self.output = Output()
-        JUDGE.let_go()  # A process that starts while the judge is held on a core would be held, too.
         numbers = {MARK: _run, MEMORY: str(limits.memory), PROGRESS: str(self._progress.fileno()), "TMPDIR": _folder()}
         largest = min(limits.memory, _LARGEST_ANSWER) * MEGABYTE
         settings, files = _SETTINGS | (_OTHER_SETTINGS if second else {}), [self._progress.fileno()]
         try:
-            self._child = Child.start(
-                command, largest, environment=settings | numbers, files=files, output=self.output.end
-            )
+            with JUDGE.on_one_core():
+                self._child = Child.start(
+                    command, largest, environment=settings | numbers, files=files, output=self.output.end
+                )
         except OSError as error:
             self._progress.close()
             raise PluginError(f"import: {command[0]} does not start: {error.strerror}", "exit", ended=True) from error

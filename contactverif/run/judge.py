@@ -6,7 +6,7 @@ Whatever a plugin does is an outcome. What the harness or a property does wrong 
 from __future__ import annotations
 
 from collections.abc import Collection
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -144,19 +144,24 @@ def call_first(subject: Subject, parts: Collection[str]) -> tuple[bool, FirstAns
     Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
     is called. What else goes wrong here, the properties will say: then there are no answers.
     """
-    first: FirstAnswers | None = None
+    if subject.traits.rules.enforcement == "barrier":  # It is not defined in penetration.
+        return False, None
     try:
         with one_thread(), np.errstate(all="ignore"):
-            if subject.traits.rules.enforcement != "barrier":  # It is not defined in penetration.
-                first = ask_first(subject, named_case(STATES[0]), parts)
+            first = ask_first(subject, named_case(STATES[0]), parts)
+            opposite = has_opposite_sign(subject)
             if "contact_points" in parts:
-                formulation, case = subject.for_case(named_case("c")), named_case("c")
-                state = case.with_multipliers(np.full(formulation.n_multipliers(case.interface), 1.0))
-                pairing = formulation.pair(case.interface, state.z)
-                formulation.contact_points(case.interface, pairing, state.z)
+                _call_contact_points(subject, first.case)
     except ContractError:
-        pass
-    return has_opposite_sign(subject), first
+        return False, None
+    return opposite, first
+
+
+def _call_contact_points(subject: Subject, case: Case) -> None:
+    """Let a formulation compile its contact points."""
+    with suppress(ContractError):
+        formulation = subject.for_case(case)
+        formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
 
 
 def has_opposite_sign(subject: Subject) -> bool:

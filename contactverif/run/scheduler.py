@@ -40,6 +40,7 @@ from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.result import Row
 from contactverif.isolation.host import last_words, note_last_words
+from contactverif.isolation.one_thread import ONE_THREAD, one_thread_for_children
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.run.registry import installed_properties, load_property
 
@@ -217,7 +218,7 @@ def _context() -> Any:
 
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOAD)
-    with _interrupts_wait():  # The server inherits that, and hears no Ctrl-C.
+    with _interrupts_wait(), one_thread_for_children():  # The server inherits both, and hears no Ctrl-C.
         forkserver.ensure_running()  # It imports while the parent goes on.
     return context
 
@@ -233,7 +234,8 @@ def _interrupts_wait() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """Leave interrupts to the parent, and end with it."""
+    """Leave interrupts to the parent, end with it, and let what is loaded from now on compute on one thread."""
+    os.environ.update(ONE_THREAD)  # For a worker that no server of ours has started.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent()
     parent = multiprocessing.parent_process()

@@ -33,7 +33,7 @@ BATCHED = Quantity(
 SECOND_PROCESS = Quantity(
     "difference from a second process",
     "8u",
-    "Threads may add in another order, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
+    "It may add in another order, as if nodes had moved by uX. The difference counts over X (k + |R|/ℓ) + N |R|.",
 )
 IN_ONE_CALL = Quantity("entries of residual and tangent in one call that change with the order of calls", "0", REASON)
 ONE_RESIDUAL = Quantity(
@@ -89,9 +89,9 @@ def purity(case: Case, subject: Subject) -> Measurement:
     state, with another state in between: it must have the same entries and give the same answers.
 
     A plugin that lives in a process of its own is asked in a second process too, which differs in what no answer may
-    depend on: the seed of hashes, the number of threads, and the state that was asked first. The pairing is the same,
-    and the residual is held to that of the first process as a batch is held to a loop, since threads may add in another
-    order.
+    depend on: the seed of hashes, and the state that was asked first. The pairing is the same, and the residual is held
+    to that of the first process as a batch is held to a loop, since the order of a set may be that of a sum. Each
+    process has one thread: bits that depend on the number of threads are no breach.
 
     Some formulations compute residual and tangent in one call. Its residual is held to that of the method alone as a
     batch is held to a loop. Its tangent may round each of the four factors of an entry (area, pressure, normal, shape)

@@ -67,11 +67,48 @@ class KnowsItsProcess(Springs):
         return super().residual(interface, pairing, z) * (1 + 1e-9 * (hash("spring") % 1000))
 
 
+class WearsOut(Springs):
+    """Its forces are one percent too large after 500 calls of one instance."""
+
+    calls = 0
+
+    def residual(self, interface, pairing, z):
+        self.calls += 1
+        return super().residual(interface, pairing, z) * (1.01 if self.calls > 500 else 1.0)
+
+
+class WrongAtFirst(Springs):
+    """Its first forces in a process are one percent too large."""
+
+    answered = False
+
+    def residual(self, interface, pairing, z):
+        factor = 1.0 if WrongAtFirst.answered else 1.01
+        WrongAtFirst.answered = True
+        return super().residual(interface, pairing, z) * factor
+
+
+def count_threads():
+    """Return how many threads OpenMP, linear algebra and numba may use here."""
+    import numba
+    from threadpoolctl import threadpool_info
+
+    libraries = [entry["num_threads"] for entry in threadpool_info()]
+    return int(os.environ.get("OMP_NUM_THREADS", "0")), max(libraries), numba.get_num_threads()
+
+
 class PairsByThreads(Springs):
-    """Its pairing depends on the number of threads."""
+    """Its pairing depends on the number of threads, and on that of the cores that its process had at its first call.
+
+    TBB counts those cores once.
+    """
+
+    cores = 0
 
     def pair(self, interface, z):
-        return {**super().pair(interface, z), "threads": np.array([int(os.environ.get("OMP_NUM_THREADS", "1"))])}
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        PairsByThreads.cores = PairsByThreads.cores or cores
+        return {**super().pair(interface, z), "threads": np.array([*count_threads(), PairsByThreads.cores])}
 
 
 class RaisesInMake:

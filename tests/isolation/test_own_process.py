@@ -1,5 +1,6 @@
 """A plugin in a process of its own: the same answers as here, and an error whatever it does."""
 
+import os
 import pickle
 import time
 
@@ -15,7 +16,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.isolation import host, process
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
-from contactverif.isolation.remote_formulation import count_ends
+from contactverif.isolation.remote_formulation import RemoteSubject, count_ends
+from contactverif.run.scheduler import worker_pool
 
 CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)
@@ -164,18 +166,60 @@ def test_one_that_always_ends_its_process_is_not_asked_for_ever(monkeypatch: pyt
     [
         ("Springs", None),
         ("KnowsItsProcess", "difference from a second process"),
-        ("PairsByThreads", "the pairing of a state differs in another process"),
+        ("PairsByThreads", None),
     ],
 )
 def test_purity_asks_a_second_process(name: str, words: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONHASHSEED", "1")
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
     (question,) = load_properties(["purity"])
     (here,) = verify([Subject(name, getattr(hostile_few, name))], [question], examples=4, seed=1).rows
     (there,) = verify([load_remote(hostile_few.PROGRAM, name, QUICK)], [question], examples=4, seed=1).rows
     assert here.verdict is Verdict.PASS
     assert there.verdict is (Verdict.FAIL if words else Verdict.PASS), there.reason
     assert words is None or words in there.reason
+
+
+@pytest.mark.parametrize("threads", ["", "4"])
+def test_every_process_of_a_plugin_has_one_thread(threads: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenMP, linear algebra, numba, and cores, which TBB counts: in the first process and in the second."""
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.setenv(name, threads) if threads else monkeypatch.delenv(name, raising=False)
+    first = load_remote(hostile_few.PROGRAM, "PairsByThreads", QUICK)
+    assert isinstance(first, RemoteSubject)
+    for subject in (first, first.restart()):
+        pairing = subject.for_case(CASE).pair(CASE.interface, CASE.z)
+        assert pairing is not None
+        assert pairing["threads"].tolist() == [1, 1, 1, 1]
+
+
+def test_a_worker_of_a_run_has_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plugin lives there with `--isolation inline`."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    with worker_pool(2) as executor:
+        assert executor is not None
+        assert executor.submit(hostile_few.count_threads).result() == (1, 1, 1)
+    assert os.environ["OMP_NUM_THREADS"] == "4"
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Springs", ""),
+        ("WearsOut", "entries that change in 2,000 calls of one instance"),
+        ("WrongAtFirst", "difference of the first residual of a process"),
+    ],
+)
+def test_a_long_life_and_a_fresh_process_answer_alike(name: str, words: str, jobs: int) -> None:
+    """The check of signs takes the first call, here and in a process of the plugin, in a worker or not."""
+    questions = load_properties(["patch.flat.transmission", "purity.long"])
+    hostile_few.WrongAtFirst.answered = False
+    with worker_pool(jobs) as executor:
+        for subject in (Subject(name, getattr(hostile_few, name)), load_remote(hostile_few.PROGRAM, name, QUICK)):
+            _, row = verify([subject], questions, examples=2, seed=1, executor=executor).rows
+            assert row.verdict is (Verdict.FAIL if words else Verdict.PASS), row.reason
+            assert words in row.reason
+        host.end_all()
 
 
 def test_processes_make_room_where_memory_is_short(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from hostile_kit import EITHER, IMPURE, Factory, answers, instead
+from hostile_kit import EITHER, IMPURE, LIKE_NTS, Factory, answers, instead
 
 _calls = itertools.count(1)
 _last: list[Any] = []
@@ -75,9 +75,9 @@ by_hash_seed = answers("residual", ends=IMPURE)(
     lambda answer: answer * (1 + 1e-6 * (hash("seed") % 1001)),
     "Answer by the seed of Python's hashes, as the order of a set of words does.",
 )
-by_threads = answers("residual", ends=IMPURE)(
-    lambda answer: answer * (1 + 1e-6 * int(os.environ.get("OMP_NUM_THREADS", "1"))),
-    "Answer by the number of threads that the environment allows.",
+by_threads = answers("residual", ends=LIKE_NTS)(
+    lambda answer: answer * (1 + 1e-6 * (int(os.environ.get("OMP_NUM_THREADS", "2")) - 1)),
+    "Answer by the number of threads that the environment allows, which is one.",
 )
 by_time = answers("residual", ends=IMPURE)(
     lambda answer: answer * (1 + 1e-9 * (time.perf_counter_ns() % 1_000_003)), "Answer by the clock."
