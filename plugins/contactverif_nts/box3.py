@@ -6,7 +6,8 @@ One segment: Eq. 6. Otherwise segment j with nodes f, m and projected length L_j
     W_m = L_j (b² − a²)/2                                        W_f = L_j [(b − a) − (b² − a²)/2]
 
 Printed: the slave nodes get Eq. 6 with F_V = ε̂ g l_AB (c_P − c_Q)/2, the master nodes −ε̂ g W n. Balanced: the master
-nodes get −F_V (W/S) n with S = ΣW, so that action equals reaction.
+nodes get −F_V (W/S) n with S = ΣW, so that action equals reaction. Where a free end truncates the parts, S is the
+sum of what is left: the master gets the whole force there too, on its last nodes.
 
 With multipliers −λ stands for ε̂ g on both sides. Each virtual slave node then has a constraint row: −F_V/(ε̂ g) × g
 where it is active, λ × its share of the slave segment's reference length where it is not. Arrays of multipliers without
@@ -120,7 +121,7 @@ def _add_residual(
                 push(r, node_2, -xi * f_v, v.normal)
                 continue
             if transmission == BALANCED:  # ELSE assembly of all the involved segments
-                pressure = f_v / sum_of_parts(v)
+                pressure = f_v / sum_of_parts(now, v, area, master)
             j = area.first
             while True:
                 f, m = master[j, 0], master[j, 1]
@@ -167,20 +168,31 @@ def virtual_slave_node(x_a: Vector, x_b: Vector, x_1: Vector, x_2: Vector, c_p: 
 
 
 @compile_part
-def sum_of_parts(v: VirtualSlaveNode) -> float:
-    """Return S = ΣW, which telescopes to s(Q) − s(P).
+def sum_of_parts(x: Array, v: VirtualSlaveNode, area: Area, master: IntArray) -> float:
+    """Return S = ΣW, which telescopes to s(Q) − s(P), or to a free end in the place of the end that it truncates.
 
-    It is a multiple of the number by which the pairing decides that the slave faces the master. So it is not zero where
-    the pairing decides so, however nearly edge-on the slave is.
+    Where nothing is truncated, it is a multiple of the number by which the pairing decides that the slave faces the
+    master. So it is not zero where the pairing decides so, however nearly edge-on the slave is. Elsewhere it is at
+    least the projected length of the segment at the free end: the walk went past the other end of that segment.
     """
-    return (v.c_q - v.c_p) / 2 * dot(minus(v.x_b, v.x_a), v.t)
+    if area.clip_p == NOT_CUT and area.clip_q == NOT_CUT:
+        return (v.c_q - v.c_p) / 2 * dot(minus(v.x_b, v.x_a), v.t)
+    return dot(across_parts(x, v, area, master), v.t)
 
 
 @compile_part
-def from_p_to_q(v: VirtualSlaveNode) -> Vector:
-    """Return x_Q − x_P, a part of the slave segment."""
-    ab, share = minus(v.x_b, v.x_a), (v.c_q - v.c_p) / 2
-    return share * ab[0], share * ab[1]
+def across_parts(x: Array, v: VirtualSlaveNode, area: Area, master: IntArray) -> Vector:
+    """Return the vector from P to Q, a free end in the place of the end that it truncates."""
+    if area.clip_p == NOT_CUT and area.clip_q == NOT_CUT:
+        ab, share = minus(v.x_b, v.x_a), (v.c_q - v.c_p) / 2
+        return share * ab[0], share * ab[1]
+    x_f, x_m = node(x, master[area.first, 0]), node(x, master[area.last, 1])
+    if area.clip_q == NOT_CUT:
+        return arm(x_f, v.q)
+    if area.clip_p == NOT_CUT:
+        back = arm(x_m, v.p)
+        return -back[0], -back[1]
+    return minus(x_m, x_f)
 
 
 @compile_part

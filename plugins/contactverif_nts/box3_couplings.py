@@ -63,7 +63,7 @@ def _write_couplings(
 ) -> tuple[int, int]:
     """Write the fields of `Box3Couplings`; return the number of couplings, and of the entries of `nodes`."""
     _, slave, master, neighbours = surfaces
-    partner, first, last, cutting, cut_p, cut_q, _, _, active = areas
+    partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     first_point, end_point, segment = of_couplings
     has_multipliers = first_multiplier != NO_NODE
     coupling, place, starts[0] = 0, _BEGIN, 0
@@ -73,9 +73,8 @@ def _write_couplings(
             start = place
             for point in range(i, end):
                 if active[point] and place - start <= MOST_NODES:
-                    area = Area(
-                        partner[point], first[point], last[point], cutting[point], cut_p[point], cut_q[point], 0, 0
-                    )
+                    cuts = cutting[point], cut_p[point], cut_q[point], clip_p[point], clip_q[point]
+                    area = Area(partner[point], first[point], last[point], *cuts)
                     place = _insert_segment(nodes, start, place, slave, point // n)
                     place = _insert_point(nodes, start, place, master, neighbours, area, j)
             if place - start > MOST_NODES:
@@ -109,6 +108,10 @@ def _insert_point(
     """
     place = _insert_core(nodes, start, place, master, area.frame, area.cut_p, area.cut_q)
     place = _insert_segment(nodes, start, place, master, area.master)
+    if area.clip_p != NOT_CUT:  # A free end that truncates an area, on which a balanced pressure depends
+        place = insert_node(nodes, start, place, master[area.first, 0])
+    if area.clip_q != NOT_CUT:
+        place = insert_node(nodes, start, place, master[area.last, 1])
     k, k_last = (area.first, area.last) if j == WHOLE else (j, j)
     place = _insert_segment(nodes, start, place, master, k)
     while k != k_last and place - start <= MOST_NODES:

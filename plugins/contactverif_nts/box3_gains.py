@@ -16,7 +16,7 @@ from typing import NamedTuple
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.compiled import compile_inline
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, dot, frame, minus, node
-from contactverif_nts.box3 import Area, VirtualSlaveNode, from_p_to_q, sum_of_parts
+from contactverif_nts.box3 import Area, VirtualSlaveNode, across_parts, sum_of_parts
 from contactverif_nts.turned_force import ZERO, times
 from contactverif_nts.walk import NOT_CUT
 
@@ -53,7 +53,9 @@ class Pressure(NamedTuple):
 
     is_balanced: bool
     s: float  # S = ΣW
-    turning: float  # (x_Q − x_P)·n
+    turning: float  # (x_Q − x_P)·n, a free end in the place of the end that it truncates
+    p_moves: float  # 1 where S begins at P, 0 where at a free end
+    q_moves: float
     size: float  # F_V/S, or stiffness × e
     unit: float  # its derivative by the multiplier, sign reversed
 
@@ -137,12 +139,15 @@ def force_at(
 
 
 @compile_inline
-def pressure_on_master(v: VirtualSlaveNode, force: Force, is_balanced: bool) -> Pressure:
+def pressure_on_master(
+    x: FloatArray, master: IntArray, v: VirtualSlaveNode, area: Area, force: Force, is_balanced: bool
+) -> Pressure:
     """Return the pressure of a virtual slave node on several master segments."""
-    s, turning = sum_of_parts(v), dot(from_p_to_q(v), v.normal)
+    s, turning = sum_of_parts(x, v, area, master), dot(across_parts(x, v, area, master), v.normal)
+    p_moves, q_moves = 1.0 if area.clip_p == NOT_CUT else 0.0, 1.0 if area.clip_q == NOT_CUT else 0.0
     if is_balanced:
-        return Pressure(True, s, turning, force.f_v / s, force.size / s)
-    return Pressure(False, s, turning, force.stiffness * force.e, 1.0)
+        return Pressure(True, s, turning, p_moves, q_moves, force.f_v / s, force.size / s)
+    return Pressure(False, s, turning, p_moves, q_moves, force.stiffness * force.e, 1.0)
 
 
 @compile_inline
@@ -242,7 +247,7 @@ def gains_on_segment(
 def gains_on_part(d: Gain, ends: Ends, force: Force, pressure: Pressure, part: Part) -> tuple[float, float]:
     """Return Δ of −pressure × W_f and of −pressure × W_m (A13–A27).
 
-    ΔL_j = t·(Δx_m − Δx_f) + ((x_m − x_f)·n) ω, and ΔS = t·(Δx_Q − Δx_P) + ((x_Q − x_P)·n) ω
+    ΔL_j = t·(Δx_m − Δx_f) + ((x_m − x_f)·n) ω, and ΔS = t·(Δx_Q − Δx_P) + ((x_Q − x_P)·n) ω without free ends
     L_j Δa = t·(Δx_P − (1−a)Δx_f − aΔx_m) + ((x_P − (1−a)x_f − a x_m)·n) ω, and the same for b with Q
     ΔW_m = L (b Δb − a Δa) + (b² − a²)/2 ΔL
     ΔW_f = L (Δb − Δa) − L (b Δb − a Δa) + [(b − a) − (b² − a²)/2] ΔL
@@ -251,7 +256,7 @@ def gains_on_part(d: Gain, ends: Ends, force: Force, pressure: Pressure, part: P
     d_p = force.stiffness * (force.by_gap * d.g)
     x_p, x_q = ends.p + force.along * d.c_p, ends.q + force.along * d.c_q
     if pressure.is_balanced:
-        d_s = x_q - x_p + pressure.turning * d.omega
+        d_s = pressure.q_moves * x_q - pressure.p_moves * x_p + pressure.turning * d.omega
         d_p = (gain_of_force(d, force) - pressure.size * d_s) / pressure.s
     d_length = ends.m - ends.f + part.rise * d.omega
     d_a = part.a_moves * (x_p - (1 - a) * ends.f - a * ends.m + part.a_lever * d.omega)
@@ -260,6 +265,13 @@ def gains_on_part(d: Gain, ends: Ends, force: Force, pressure: Pressure, part: P
     d_wm = moment + half * d_length
     d_wf = d_b - d_a - moment + ((b - a) - half) * d_length
     return -(part.w_f * d_p + pressure.size * d_wf), -(part.w_m * d_p + pressure.size * d_wm)
+
+
+@compile_inline
+def gains_of_sum(d_s: float, pressure: Pressure, part: Part) -> tuple[float, float]:
+    """Return Δ of −pressure × W_f and of −pressure × W_m where a free end moves that S reaches to, by ΔS."""
+    d_p = pressure.size * d_s / pressure.s
+    return part.w_f * d_p, part.w_m * d_p
 
 
 @compile_inline

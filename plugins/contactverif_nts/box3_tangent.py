@@ -47,6 +47,7 @@ from contactverif_nts.box3_gains import (
     gain_of_p,
     gain_of_q,
     gains_of_node,
+    gains_of_sum,
     gains_on_part,
     gains_on_segment,
     part_under_area,
@@ -131,12 +132,13 @@ def _sweep(
             if area.first == area.last:  # IF only one segment is involved THEN Eq. 6
                 _add_segment_forces(local, push, point, False)
             else:  # ELSE assembly of all the involved segments
-                pressure = pressure_on_master(v, force, transmission == BALANCED)
+                pressure = pressure_on_master(x, master, v, area, force, transmission == BALANCED)
+                free_ends = slots[master[area.first, 0]], slots[master[area.last, 1]]
                 j, j_last = (area.first, area.last) if only[coupling] == WHOLE else (only[coupling], only[coupling])
                 while j >= 0:
                     f, m = master[j, 0], master[j, 1]
                     part_j = part_under_area(node(x, f), node(x, m), v, area, j)
-                    _add_part_forces(local, push, point, pressure, part_j, slots[f], slots[m])
+                    _add_part_forces(local, push, point, pressure, part_j, slots[f], slots[m], free_ends)
                     j = neighbours[j, 1] if j != j_last else NO_NODE
         find_runs(runs, nodes, start, n_coupled)
         add_local_matrix(*csr, nodes, start, n_coupled, runs, local, owner, part)
@@ -269,9 +271,19 @@ def _add_segment_forces(local: FloatArray, push: FloatArray, point: LinearizedNo
 
 @compile_inline
 def _add_part_forces(
-    local: FloatArray, push: FloatArray, point: LinearizedNode, pressure: Pressure, part: Part, f: int, m: int
+    local: FloatArray,
+    push: FloatArray,
+    point: LinearizedNode,
+    pressure: Pressure,
+    part: Part,
+    f: int,
+    m: int,
+    free_ends: tuple[int, int],
 ) -> None:
-    """Add the forces −pressure × W n on the nodes f and m of one of several master segments, and their Δ."""
+    """Add the forces −pressure × W n on the nodes f and m of one of several master segments, and their Δ.
+
+    `free_ends` are the first unknowns of the first node of the first segment and of the last node of the last one.
+    """
     v, force, at, p_cut, q_cut = point
     f_f, f_m = -pressure.size * part.w_f, -pressure.size * part.w_m
     _add_force(push, f, f_f, v)
@@ -286,6 +298,12 @@ def _add_part_forces(
         d_f, d_m = gains_on_part(NO_GAIN, ends, force, pressure, part)
         _add_block(local, f, column, v, 0.0, d_f, 0.0)
         _add_block(local, m, column, v, 0.0, d_m, 0.0)
+    if pressure.is_balanced:
+        for moves, d_s, column in ((pressure.p_moves, -1.0, free_ends[0]), (pressure.q_moves, 1.0, free_ends[1])):
+            if moves == 0.0:
+                d_f, d_m = gains_of_sum(d_s, pressure, part)
+                _add_block(local, f, column, v, 0.0, d_f, 0.0)
+                _add_block(local, m, column, v, 0.0, d_m, 0.0)
     if p_cut.is_cut or q_cut.is_cut:
         for d, cut in ((gain_of_p(force), p_cut), (gain_of_q(force), q_cut)):
             d_f, d_m = gains_on_part(d, FIXED, force, pressure, part)

@@ -236,8 +236,12 @@ def vts_ppt_balanced(
     """VTS-PPT with action equal to reaction on tilted and bent surfaces and at free ends (ours).
 
     The master nodes share the force of the virtual slave node in the proportions of Box 3. So force and moment are
-    conserved, and the flat patch test passes as with `vts_ppt`. With "cover", the default, it also covers an overhang;
-    with another `free_end` an overhang breaks the balance, and nothing is promised of it.
+    conserved, and the flat patch test passes as with `vts_ppt`. With "cover", the default, it also covers an overhang.
+    With "extend" force and moment are conserved, too. With "truncate" the master's last nodes get the whole force, S
+    being the sum of the truncated parts: force is conserved, and moment is not where an area overhangs a free end.
+
+    A walk does not begin where the whole area of competence lies past one end of V's master segment: its part of that
+    segment is negative, and S may vanish. Eq. 6 holds there, which is balanced as well.
 
     References
     ----------
@@ -272,14 +276,18 @@ def _basic_promises(free_end: int, n: int) -> Traits:
 
 @cache
 def _balanced_promises(free_end: int, n: int, current: bool) -> Traits:
-    """Return the promises of `vts_ppt_balanced`."""
-    covers = free_end == walk.COVER or None
+    """Return the promises of `vts_ppt_balanced`.
+
+    The parts of all segments together have S and, by the lever rule, the moment of the whole area, also where the last
+    one is continued. Truncated parts have S as well, but their middle lies elsewhere than that of the area.
+    """
+    covers = free_end == walk.COVER
     traits = _PRINTED.revise(
         overhang=covers,
-        conserves_force=covers,
-        conserves_moment=covers,
+        conserves_force=True,
+        conserves_moment=None if free_end == walk.TRUNCATE else True,
         nodes_push=covers or None,
         area="current" if current else "reference",
-        witnesses=POINT_TRAITS.evidence.witnesses,
+        witnesses={**({} if covers else {"patch.dead-zone": "dead-zone"}), **POINT_TRAITS.evidence.witnesses},
     )
     return add_locking(traits, n)

@@ -6,7 +6,8 @@ a free end of the master, and before a segment that is seen edge-on or from behi
 
 The paper is silent about free ends, too. The option `free_end` says what happens there:
 
-- TRUNCATE: the master loses the part of the force that lies past its free end; the slave keeps its force.
+- TRUNCATE: where several segments are involved, the master's parts end at its free end; the slave keeps its force. The
+  printed transmission loses the rest of the force, the balanced one puts it on the parts that are left.
 - EXTEND: Box 3 is read literally, and the last segment is continued past the free end.
 - COVER (ours): the area of competence is cut to what faces the master, before anything else happens.
 
@@ -14,8 +15,9 @@ Everywhere else Box 3 stands as printed, whatever the option says. This holds al
 of an interior segment: the parts of the segments are then neither cut nor limited to [0, 1].
 
 The balanced transmission (ours) divides by the sum S of all parts. Where the whole area lies past the same end of V's
-segment, the part of that segment is negative. As S → 0, on a slave that is seen edge-on, forces of both signs grow
-beyond all bounds. So there the balanced walk does not begin, and Eq. 6 holds.
+segment (P and Q both before its first node, or both behind its last one), the part of that segment is negative. As
+S → 0, on a slave that is seen edge-on, forces of both signs grow beyond all bounds. So there the balanced walk does not
+begin: only V's segment is involved, and Eq. 6 holds, which is balanced as well.
 
 Rule for the next editor: this file makes decisions. It returns integers and booleans, never a real number.
 

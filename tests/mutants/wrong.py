@@ -246,7 +246,7 @@ MUTANTS = (
          "push(r, node_a, (1 - v.c) / 2 * f_v, v.normal)",
          "push(r, node_a, (1 - v.c) / 2 * f_v * (1 + 1e-6), v.normal)"),
     line("slave and master forces of the printed algorithm", FORCE, "box3",
-         "pressure = f_v / sum_of_parts(v)", "pressure = penalty * v.g"),
+         "pressure = f_v / sum_of_parts(now, v, area, master)", "pressure = penalty * v.g"),
     line("shares of one segment exchanged", MOMENT, "box3",
          "xi = dot(v.d, v.t) / v.l_12", "xi = 1 - dot(v.d, v.t) / v.l_12"),
     line("shares of the nodes of a segment exchanged", MOMENT, "box3",

@@ -64,6 +64,35 @@ def test_at_a_free_end_the_master_loses_what_lies_past_it() -> None:
         assert -forces[2:, 1].sum() == pytest.approx(carried, rel=1e-15)
 
 
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("free_end", ["truncate", "extend"])
+def test_a_balanced_transmission_hands_on_the_whole_force_past_a_free_end(free_end: str, n: int) -> None:
+    """With "truncate" the master once lost a quarter of it here: S was the sum of uncut parts."""
+    interface, z = make_flat([4.0], [1.5, 1.375, 0.125], shift=0.5)  # the slave overhangs by 0.5 at either end
+    forces = contact_forces(vts_ppt_balanced(penalty=PENALTY, n=n, free_end=free_end, tau=0.5), interface, z)
+    assert forces[:2, 1].sum() == pytest.approx(4.0, rel=1e-14)
+    assert -forces[2:, 1].sum() == pytest.approx(4.0, rel=1e-14)
+    if free_end == "truncate" and n == 1:  # the master gets a uniform pressure on what is there
+        assert -forces[2:, 1] * 3 / 4 == pytest.approx(np.array([0.0625, 0.75, 1.4375, 0.75]), rel=1e-14)
+
+
+def test_the_tangent_of_a_truncated_area_over_many_segments_is_exact() -> None:
+    """The free ends move the forces of all segments, also where each segment is a coupling of its own."""
+    random = np.random.default_rng(0)
+    along = np.linspace(3.5, 0.5, 41)
+    master = np.column_stack([along, random.normal(scale=0.01, size=41)])
+    interface = Interface.from_chains([[0.0, -0.25], [4.0, -0.125]], master)
+    for transmission in (vts_ppt, vts_ppt_balanced):
+        formulation = transmission(penalty=PENALTY, n=1, free_end="truncate")
+        z = interface.nodes.ravel()
+        pairing = formulation.pair(interface, z)
+        assert (pairing["clip_p"], pairing["clip_q"], pairing["last"] - pairing["first"]) == (0, 1, 39)
+        h = 2.0**-100
+        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size)).imag.T / h
+        tangent = formulation.tangent(interface, pairing, z).toarray()
+        assert np.abs(moved - tangent).max() <= 1e-13 * np.abs(moved).max()
+
+
 def has_overhang(interface: Interface, z: Any, n: int, pairing: Any) -> bool:
     """Return whether the area of competence of an active virtual slave node reaches past an end of the master chain."""
     x, master = z.reshape(-1, 2), interface.master.segments
