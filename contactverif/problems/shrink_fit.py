@@ -7,6 +7,9 @@ refined.
 Lamé's formula is the limit of a small interference. `ShrinkFit.finite` has no such limit: the rings stay linear, as
 they are in a scene, but contact is measured where they are after the fit. It differs by about δ/c.
 
+One force acts on both rings where action equals reaction. Two half passes give each ring the pressure on that ring's
+own radius, and after the fit the radii differ by the penetration. `ShrinkFit.half_passes` is their fit.
+
 Rules for the next editor: `ShrinkFit` knows no mesh and no formulation, so that it can be used without the harness. The
 scene holds a quarter, cut along both lines of symmetry, so that nothing but contact loads the rings.
 
@@ -47,8 +50,9 @@ _FACTS = ("inner_radius", "radius", "outer_radius", "young", "poisson", "interfe
 class FiniteFit:
     """The fit of two rings, measured where they are after it."""
 
-    force: float  # The force between the rings for each unit of angle, pressure times radius.
+    force: float  # The force on the slave for each unit of angle, pressure times radius.
     pressure: float  # The contact pressure over the length of the slave, force per length.
+    master_force: float  # The force on the master for each unit of angle.
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +152,49 @@ class ShrinkFit:
         from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
 
         force = brentq(excess, 0.0, 2 * self.pressure() * self.radius, xtol=1e-300, rtol=1e-14)
-        return FiniteFit(force, force / (radii[index] + outwards * force))
+        return FiniteFit(force, force / (radii[index] + outwards * force), force)
+
+    def half_passes(
+        self, slave: Role, penalty: float = inf, area: Literal["current", "reference"] = "current"
+    ) -> FiniteFit:
+        """Return the fit of two half passes, which give each ring the pressure on its own radius.
+
+        With a pressure p the force for each unit of angle is f = p r on a ring of radius r after the fit, or of contact
+        radius R before it. So f_i = p R_i/(1 + p C_i/R_i) on the inner ring, and f_o = p R_o/(1 − p C_o/R_o) on the
+        outer one, or p R for lengths of the reference. By how much the rings give way, and the penetration p/ε̂, add up
+        to δ. After the fit the radii differ by p/ε̂, and so the forces by p²/ε̂.
+
+        Parameters
+        ----------
+        slave : Literal['inner', 'outer']
+            The ring that is the slave.
+        penalty : float
+            The distributed stiffness ε̂; infinite without springs.
+        area : Literal['current', 'reference']
+            The configuration in which lengths are measured.
+
+        Returns
+        -------
+        FiniteFit
+            Forces and pressure.
+        """
+        radii = self.contact_radii
+        flexibilities = [replace(self, radius=radius).compliances[ring] / radius for ring, radius in enumerate(radii)]
+        inwards = (1.0, -1.0) if area == "current" else (0.0, 0.0)
+
+        def forces(pressure: float) -> list[float]:
+            rings = zip(radii, flexibilities, inwards, strict=True)
+            return [pressure * radius / (1 + sign * pressure * gives) for radius, gives, sign in rings]
+
+        def excess(pressure: float) -> float:
+            moves = [gives * force for gives, force in zip(flexibilities, forces(pressure), strict=True)]
+            return sum(moves) + pressure / penalty - self.interference
+
+        from scipy.optimize import brentq
+
+        pressure = brentq(excess, 0.0, 2 * self.pressure(), xtol=1e-300, rtol=1e-14)
+        inner, outer = forces(pressure)
+        return FiniteFit(inner, pressure, outer) if slave == "inner" else FiniteFit(outer, pressure, inner)
 
     def displacement(self, radius: FloatArray, ring: Role, penalty: float = inf) -> FloatArray:
         """Return the radial displacement (n,) of a ring at the radii (n,), a length, positive outwards.
@@ -258,9 +304,24 @@ class RingStudy:
     penalty: float  # The distributed stiffness ε̂
 
     def fit(self, traits: Traits) -> FiniteFit:
-        """Return the exact fit for formulations of these traits."""
-        penalty = inf if traits.rules.enforcement == "multiplier" else self.penalty
-        return self.problem.finite(self.slave, penalty, "reference" if traits.rules.area == "reference" else "current")
+        """Return the exact fit for formulations of these traits, the first of `fits`."""
+        return self.fits(traits)[0]
+
+    def fits(self, traits: Traits) -> tuple[FiniteFit, ...]:
+        """Return the exact fits for formulations of these traits: one, or two where the traits leave open which.
+
+        Forces that prefer no side and are not in balance are those of half passes. Where one side is preferred, the
+        other one gets the force of that side, which is in balance between circles even if it is not elsewhere.
+        """
+        multiplier = traits.rules.enforcement == "multiplier"
+        unbiased, balanced = traits.promises.unbiased, traits.promises.conserves_force
+        kinds = [self.problem.finite, self.problem.half_passes]
+        if multiplier or balanced or unbiased is False:
+            kinds = kinds[:1]
+        elif unbiased and balanced is False:
+            kinds = kinds[1:]
+        area: Literal["current", "reference"] = "reference" if traits.rules.area == "reference" else "current"
+        return tuple(fit(self.slave, inf if multiplier else self.penalty, area) for fit in kinds)
 
     def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh.
@@ -285,12 +346,12 @@ class RingStudy:
         )
 
     def _forces(self, interface: Interface, fit: FiniteFit, positions: FloatArray) -> FloatArray:
-        """Return the exact forces: the master bears the same force for each unit of angle as the slave."""
+        """Return the exact forces, from those for each unit of angle."""
 
         def traction(of_master: bool, places: FloatArray) -> FloatArray:
             radii = np.linalg.norm(places, axis=1)[:, None]
             towards = -1.0 if (self.slave == "inner") is not of_master else 1.0
-            pressures: FloatArray = towards * (fit.force / radii if of_master else fit.pressure) * places / radii
+            pressures: FloatArray = towards * (fit.master_force / radii if of_master else fit.pressure) * places / radii
             return pressures
 
         sides = ((interface.slave, False), (interface.master, True))

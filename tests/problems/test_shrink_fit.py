@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import inf, pi
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -105,6 +106,31 @@ def test_nodes_do_not_meet_but_at_the_ends() -> None:
     angles = [np.arctan2(*body.nodes[body.contact_nodes].T[::-1]) for body in shrink_fit(ShrinkFit(), refine=4).bodies]
     distances = np.abs(np.subtract.outer(angles[0][1:-1], angles[1]))
     assert distances.min() > 1e-4
+
+
+@pytest.mark.parametrize("area", ["current", "reference"])
+@pytest.mark.parametrize("slave", RINGS)
+def test_half_passes_give_each_ring_the_pressure_on_its_own_radius(
+    slave: Role, area: Literal["current", "reference"]
+) -> None:
+    problem, penalty = ShrinkFit(interference=1e-2), 1e2
+    fit = problem.half_passes(slave, penalty, area)
+    forces = (fit.force, fit.master_force) if slave == "inner" else (fit.master_force, fit.force)
+    before, after = problem.contact_radii, []
+    for index, (radius, force, outwards) in enumerate(zip(before, forces, (-1, 1), strict=True)):
+        lame = replace(problem, radius=radius).compliances[index]
+        after.append(radius + outwards * lame * force / radius)
+    assert penalty * (after[0] - after[1]) == pytest.approx(fit.pressure, rel=1e-12)
+    lengths = after if area == "current" else before
+    assert np.divide(forces, lengths) == pytest.approx(fit.pressure, rel=1e-12)
+
+
+def test_half_passes_tend_to_one_force_as_springs_become_stiff() -> None:
+    problem = ShrinkFit(interference=1e-2)
+    fit, exact = problem.half_passes("outer"), problem.finite("outer")
+    assert fit.force == pytest.approx(fit.master_force, rel=1e-12) == pytest.approx(exact.force, rel=1e-12)
+    assert fit.pressure == pytest.approx(exact.pressure, rel=1e-12)
+    assert problem.half_passes("inner", 1e2).force == problem.half_passes("outer", 1e2).master_force
 
 
 def test_unknown_rings_are_refused() -> None:

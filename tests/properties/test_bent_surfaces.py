@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, change_verbs, judge_as, load_property, load_subject
+from subjects import Changed, change_verbs, judge_as, load_property, load_subject, with_promises
 
 import contactverif_mortar
 from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
+from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.kinked_patch import KinkedPatch, kinked_patch
+from contactverif.problems.shrink_fit import FIT, RingStudy
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 
@@ -35,6 +37,43 @@ def change(name: str, **verbs: Any) -> Subject:
 def test_the_error_of_the_mean_pressure_of_the_rings_is_of_second_order(name: str) -> None:
     for outcome in judge_all("patch.curved", load_subject(name)):
         assert 1.9 < measurement_of(outcome).details["rate"] < 2.1
+
+
+@pytest.mark.parametrize("area", ["current", "reference"])
+def test_half_passes_tend_to_forces_of_their_own(area: str) -> None:
+    """The fit of formulations that balance stays more than 1e-3 off on every mesh, here up to 6e-3."""
+    subject, study, errors = load_subject(f"mortar-two-half-pass:n=5,area={area}"), RingStudy(FIT, "outer", 1e2), []
+    balanced = study.fit(subject.traits.revise(conserves_force=True))
+    for refine in (3, 6):
+        solution = solve_for_accuracy(study.pose(refine, subject.traits).scene, subject)
+        outwards = solution.interface.nodes / np.linalg.norm(solution.interface.nodes, axis=1)[:, None]
+        radial = np.abs((solution.forces * outwards).sum(axis=1)) / (np.pi / 2)
+        n_slave = solution.interface.n_slave_nodes
+        totals = np.array([radial[:n_slave].sum(), radial[n_slave:].sum()])
+        errors.append([totals / [fit.force, fit.master_force] - 1 for fit in (study.fit(subject.traits), balanced)])
+    of_half_passes, of_balanced = np.abs(4 * np.array(errors[1]) - errors[0]).max(axis=1) / 3
+    assert of_half_passes < 2e-4
+    assert of_balanced > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("unbiased", "balanced", "kinds"),
+    [
+        (True, False, ["halves"]),
+        (False, None, ["one force"]),
+        (None, True, ["one force"]),
+        (None, None, ["one force", "halves"]),
+    ],
+)
+def test_the_traits_say_which_exact_forces_count(unbiased: Any, balanced: Any, kinds: list[str]) -> None:
+    traits = load_subject("mortar-two-half-pass").traits.revise(unbiased=unbiased, conserves_force=balanced)
+    fits = RingStudy(FIT, "inner", 1e2).fits(traits)
+    assert ["one force" if fit.force == fit.master_force else "halves" for fit in fits] == kinds
+    if "halves" in kinds:
+        question = load_property("patch.curved")
+        make = contactverif_mortar.mortar_two_half_pass
+        stated = with_promises(make, unbiased=unbiased, conserves_force=balanced, witnesses={})
+        judge_as(Verdict.PASS, question, question.cases(None)[0], stated)
 
 
 def test_springs_that_are_two_percent_too_soft_are_found_out() -> None:
