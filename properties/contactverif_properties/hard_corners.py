@@ -22,6 +22,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import WITHOUT_BARRIER, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.problems.flat_states import touching_states
 from contactverif.problems.hard_corner_states import (
     concave_corner_states,
@@ -171,7 +172,11 @@ SLIDING = Quantity(
     "64 u X/ℓ + 4(|g| + d)/ℓ",
     "Rounding the ends of a segment turns its normal by uX/ℓ. d = 64 u X is the depth of the state.",
 )
-PRESSING = Quantity("stiffness across the surface", "4", TWO_PASSES.capitalize())
+PRESSING = Quantity(
+    "stiffness across the surface",
+    "s (1 + 30 (uX/ℓ)^(2/3))",
+    "s is 1 where areas add up, else what springs on both surfaces have. Differences confirm an exact tangent.",
+)
 PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring resists, and never helps.")
 
 
@@ -197,11 +202,20 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The first number is the largest nodal force over ε̂ h, a length, in units of the largest
     coordinate X, h the longest slave segment: at most 4 (8u + |g|/X), since a gap is rounded to 8uX, and springs act in
     two passes at most. With an exact tangent, the slave is moved across its surface. It meets between no resistance
-    (open) and that of all springs, 4 ε̂ L. Near the origin, where the gap is ±1e-16, it is also moved along its
-    surface, with the slave d = 64 u X deeper. No gap changes, so the derivative of a force is at most that of rounded
-    directions, 64 u X/ℓ + 4(|g| + d)/ℓ, over ε̂ h. At a gap of 0 there is no derivative: the columns of a complex step
-    take the side of their own rounding there, each for itself. At d every gap has its sign in spite of its rounding of
-    8 u X, while a normal that is a difference over a distance still turns by u X/d = 1/64. All multipliers are 0 here.
+    (open) and that of all springs, s ε̂ L:
+
+    - Where `penalty` and `area` are stated, the areas add up to L, so s = 1.
+    - Other distributed springs may act on both surfaces, so s = 1 + L_master/L.
+    - A nodal spring has the stiffness ε̂ L/n for n slave segments. So s is the number of slave nodes over n, (n + 1)/n
+      for one chain. Unless `unbiased` is False, the nodes of the master count too.
+    - Where the unit of the penalty is not stated, ε̂ may be that of a node, and the largest of these counts.
+
+    A tangent is exact if differences confirm it, so s is allowed to be larger by their 30 (uX/ℓ)^(2/3), as in
+    `tangent.directional`. Near the origin, where the gap is ±1e-16, the slave is also moved along its surface, with the
+    slave d = 64 u X deeper. No gap changes, so the derivative of a force is at most that of rounded directions,
+    64 u X/ℓ + 4(|g| + d)/ℓ, over ε̂ h. At a gap of 0 there is no derivative: the columns of a complex step take the
+    side of their own rounding there, each for itself. At d every gap has its sign in spite of its rounding of 8 u X,
+    while a normal that is a difference over a distance still turns by u X/d = 1/64. All multipliers are 0 here.
 
     **Undecided.** Never: contact may be active or not, and the numbers allow for both.
     """
@@ -216,7 +230,8 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
         resistance = float(across @ tangent @ across) / (case.penalty * case.slave_length)
         values |= {PRESSING: resistance, PULLING: -resistance}
         roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
-        tolerances |= {PRESSING: 4.0, PULLING: roundoff}
+        accuracy = 30 * (UNIT_ROUNDOFF * size / case.shortest_segment) ** (2 / 3)
+        tolerances |= {PRESSING: _all_springs(case, subject.traits) * (1 + accuracy), PULLING: roundoff}
         if gap:
             depth = DEPTH * UNIT_ROUNDOFF * size
             z = state.case.z.copy()
@@ -227,9 +242,23 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerances))
 
 
+def _all_springs(case: Case, traits: Traits) -> float:
+    """Return the stiffness of all springs that the traits allow over ε̂ L, if each of them is closed."""
+    interface, rules = case.interface, traits.rules
+    if knows_total(traits):
+        return 1.0
+    n_nodes = interface.n_slave_nodes if traits.promises.unbiased is False else interface.n_nodes
+    nodal = n_nodes / len(interface.slave)
+    distributed = 1 + float(interface.master.lengths(case.positions).sum()) / case.slave_length
+    # Without a unit the penalty ε̂ may be taken for the stiffness of a node.
+    unstated = max(distributed, interface.n_nodes / case.slave_length)
+    return {"nodal": nodal, "distributed": distributed, None: unstated}[rules.penalty]
+
+
 def _motions(case: Case) -> tuple[FloatArray, FloatArray]:
     """Return the motions (n_unknowns,) of the slave by a unit along and across its surfaces."""
-    along = case.parameters["directions"].copy()
+    directions = case.parameters["directions"]
+    along = directions / np.hypot(directions[:, :1], directions[:, 1:])  # Integers, whose length is near 1, are exact.
     along[case.interface.n_slave_nodes :] = 0.0
     across = np.column_stack([-along[:, 1], along[:, 0]])
     return along.reshape(-1), across.reshape(-1)

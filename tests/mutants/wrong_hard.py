@@ -133,6 +133,13 @@ def _divides_by_the_distance(*, penalty: float) -> Any:
     return wrap(penalty, contactverif_nts.vts_me, residual=residual)
 
 
+@replaces("tangent", contactverif_nts.vts_me)
+def _counts_touch_as_both(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Count springs whose gaps are all 0 among the closed ones and among those that are about to close."""
+    gaps = contactverif_nts.vts_me(penalty=1.0).contact_points(interface, pairing, z).gap
+    return right(interface, pairing, z) * (2.0 if np.nanmax(np.abs(gaps)) < 1e-14 else 1.0)
+
+
 @replaces("residual", contactverif_nts.nts_ar)
 def _divides_by_the_cosine(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     """Divide forces by the cosine of the angle between the first segments of slave and master."""
@@ -183,6 +190,7 @@ MUTANTS = (
            _leaves_out(lambda interface, x, points: points.weight < 5e-3 * interface.slave.lengths(x).min())),
     Mutant("slave thicker by a millionth of a segment", "hard.zero-load", _moves_nodes(_thickens_the_slave)),
     Mutant("normal from foot to point", "hard.touch", _divides_by_the_distance),
+    Mutant("twice the stiffness in touch", "hard.touch", _counts_touch_as_both),
     Mutant("point between two segments left out", "hard.convex-kink",
            _leaves_out(_is_between_two_segments, contactverif_nts.nts_ar)),
     Mutant("point with its foot on no segment left out", "hard.concave-corner",

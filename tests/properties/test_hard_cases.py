@@ -151,6 +151,31 @@ def test_the_covered_share_is_that_of_the_last_segment() -> None:
 # --- touch --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("name", "allowed", "measured"),
+    [
+        ("vts-me", 1.0, 1.0),
+        ("mortar-dual", 1.0, 1.0),
+        ("nts", 1.5, 1.5),  # Three nodes for two segments.
+        ("two-pass/nts", 3.5, 2.5),  # Four more nodes on the master, two of which face the slave.
+        ("two-pass/nts-ar", 1 + 1.75 / 1.125, 2.0),
+    ],
+)
+def test_in_touch_no_more_springs_act_than_the_traits_allow(name: str, allowed: float, measured: float) -> None:
+    measurement = measure_named("hard.touch", "gap -1e-16, 16°", load_subject(name))
+    across = "stiffness across the surface"
+    assert measurement.tolerances[across] == pytest.approx(allowed, rel=1e-8)
+    assert measurement.values[across] == pytest.approx(measured, rel=1e-14)
+
+
+def test_in_touch_a_penalty_without_a_unit_may_be_that_of_a_node() -> None:
+    silent = with_promises(contactverif_nts.nts, penalty=None, gap=None)
+    outcome = judge_named("hard.touch", "gap -1e-16, 16°", silent)
+    assert outcome.verdict is Verdict.PASS
+    assert outcome.measurement is not None
+    assert outcome.measurement.values["stiffness across the surface"] == pytest.approx(3 / 1.125)
+
+
 def test_without_a_load_a_law_that_is_not_linear_is_not_accused() -> None:
     soft = Subject("soft", lambda *, penalty: Softened(penalty))
     for name in ("free, pushed in", "held, touching"):
