@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import cycle
-from math import ceil
+from math import ceil, log2
 
 import numpy as np
 from hypothesis import strategies as st
@@ -27,6 +27,8 @@ from contactverif.strategies.sketches import exact_turns
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
 _SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.
+# The slopes of a steep slave in sixteenths: 35° to 89°, half of them between 80° and 88°.
+_STEEP_SIXTEENTHS = st.sampled_from([11, 16, 24, 40, 64, *(91, 112, 144, 200, 288, 448), 912])
 _LEVEL_OR_TILTED = st.integers(0, 11)
 _SIGNS = st.sampled_from([1, -1])
 _QUARTERS = st.integers(1, 8)  # The depth of the shallow end, in quarters of a unit.
@@ -41,6 +43,15 @@ def tilted_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
     The slave's reference is level, so that its lengths there are others than in the state.
     """
     return _tilted_cases() if interface is None else None
+
+
+@random_source("contactverif.strategies.straight.steep_cases")
+def steep_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return slaves as `tilted_cases` does, tilted by 35° to 89°; None for a given mesh.
+
+    Coordinates along the slave are integers over a power of two, and so are those across it. No rounding bends it.
+    """
+    return _steep_cases() if interface is None else None
 
 
 @random_source("contactverif.strategies.straight.bent_end_cases")
@@ -67,6 +78,21 @@ def _tilted_cases(draw: DrawFn) -> Case:
     slope = draw(_SIXTEENTHS) * draw(_SIGNS) / 16
     slave, master, reference, _ = _layout(draw, slope)
     return _place(draw, slave, master, reference)
+
+
+@st.composite
+def _steep_cases(draw: DrawFn) -> Case:
+    slope = draw(_STEEP_SIXTEENTHS) / 16
+    x = ends_of(draw(_SLAVE)) * 2.0 ** -ceil(3 + log2(max(slope, 1.0)))  # So the slave is less than 1 high.
+    shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) / 8
+    depth = shallow + slope * (x if draw(_SIGNS) > 0 else x[-1] - x)
+    # A line along the slave's normal meets the master depth × slope aside. Each master segment is longer than that, so
+    # no gap is longer than two segments, and a search that looks no farther than that finds all.
+    reach = float(ceil(depth.max() * slope) + 1)
+    first, second = (float(on_lattice(np.array(draw(SEVENTHS) / 7))) for _ in range(2))
+    x, master_x = x + first, reach * (np.arange(3.0, -2.0, -1.0) - second)
+    level = np.column_stack([x, np.zeros(len(x))])
+    return _place(draw, np.column_stack([x, -depth]), np.column_stack([master_x, np.zeros(5)]), level)
 
 
 @st.composite

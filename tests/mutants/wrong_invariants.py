@@ -97,6 +97,16 @@ def _cosine_of_tilt_squared(look: Look) -> Any:
     return (look.tangents("slave", look.slave) * look.tangents("master", look.master)).sum(axis=1) ** 2
 
 
+def _off_where_steep(error: float) -> Factor:
+    """Return the factor 1 + `error` at tilts between 80° and 88°, else 1."""
+
+    def factor(look: Look) -> Any:
+        cosine = abs((look.tangents("slave", look.slave) * look.tangents("master", look.master)).sum(axis=1).real)
+        return 1 + error * ((np.cos(np.radians(88)) < cosine) & (cosine < np.cos(np.radians(80))))
+
+    return factor
+
+
 def _soft_where_bent(look: Look) -> Any:
     """Return less than 1 where the neighbours of the master segment turn away from it."""
     turn = look.turns("master", look.master, 0) + look.turns("master", look.master, 1)
@@ -162,6 +172,10 @@ class ForcesAlone:
 
 MUTANTS = (
     make_factored("pressure that falls with the tilt", RESULTANT, _cosine_of_tilt_squared, integrates_linear_gap=None),
+    make_factored("forces off by 1e-9 at tilts of 80° to 88°", RESULTANT, _off_where_steep(1e-9),
+                  integrates_linear_gap=None),
+    make_factored("forces off by 1 % at tilts of 80° to 88°", RESULTANT, _off_where_steep(0.01),
+                  integrates_linear_gap=None),
     Mutant("quarter points said to integrate a linear gap", DISTRIBUTION,
            says(contactverif_nts.vts_me, integrates_linear_gap=True)),
     make_factored("springs softer where the master bends", BEND, _soft_where_bent, area=None),

@@ -1,6 +1,7 @@
 """The properties of straight slaves: `patch.tilted.*` and `locality.bend`."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from contactverif import Case, Interface, Verdict, judge_case
 from contactverif.run.draw import draw_cases
 from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
 from contactverif_properties.shared.same_answer import BITS
+from contactverif_properties.straight_slaves import STEEP, TILTED
 
 IDS = ("patch.tilted.resultant", "patch.tilted.nodal", "locality.bend")
 EXAMPLES = 15
@@ -59,12 +61,39 @@ def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id
 def test_all_slaves_are_straight_tilted_and_wholly_in_contact() -> None:
     for case in cases_of("patch.tilted.resultant", 60):
         master, slave = directions(case)
-        assert 0.05 < np.arccos(float(master @ slave)) < 0.61
+        angle = np.degrees(np.arccos(float(master @ slave)))
+        assert 34 < angle < 89.1 if case.kind == STEEP else 3 < angle < 35
         assert (node_gaps(case) < 0).all()
         n, points = case.interface.n_slave_nodes, case.positions
         heights = (points[:n] - points[0]) @ slave, (points[n:] - points[n]) @ master
         for side in heights:
             assert np.ptp(side) <= 2.0**-50 * case.largest_coordinate
+
+
+def test_half_of_the_steep_slaves_are_tilted_by_80_to_88_degrees_and_no_gap_is_longer_than_two_segments() -> None:
+    cases = [case for case in cases_of("patch.tilted.resultant", 200) if case.kind == STEEP]
+    assert len(cases) == 100
+    cosines = np.array([float(np.multiply(*directions(case)).sum()) for case in cases])
+    assert (np.abs(np.degrees(np.arccos(cosines)) - 84) < 4).sum() >= 40
+    for case, cosine in zip(cases, cosines, strict=True):
+        deepest = -float(node_gaps(case).min()) / cosine
+        assert deepest < 2 * case.interface.master.lengths(case.positions).min()
+
+
+def test_only_who_states_no_rule_for_gaps_may_overlook_a_steep_slave() -> None:
+    class Blind(ClippedCells):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return np.zeros_like(z)
+
+    question = load_property("patch.tilted.resultant")
+    cases = {case.kind: case for case in cases_of(question.id)}
+    assert set(cases) == {TILTED, STEEP}
+    for kind, gap, verdict in (
+        (STEEP, None, Verdict.PASS),
+        (TILTED, None, Verdict.FAIL),
+        (STEEP, "slave normal", Verdict.FAIL),
+    ):
+        judge_as(verdict, question, cases[kind], with_promises(Blind, force_along="slave normal", gap=gap))
 
 
 def tilted_segment() -> Case:
