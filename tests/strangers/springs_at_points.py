@@ -151,11 +151,3 @@ class NearbyOnly(PointsFirst):
         arrays = {name: getattr(points, name) for name in ("slave_segment", "c", "position", "pressure", "weight")}
         ends = {"area_from": points.c - 0.25, "area_to": points.c + 0.25}
         return ContactPoints(**arrays, **numbers, **ends, active=points.active, master_segment=master, normal=normal)
-
-
-STRANGERS = {
-    "points first, no tolerance, the last of ties": PointsFirst,
-    "points in a frame along the first segment": TurnedFrame,
-    "two Gauss points along the slave's normal": SlaveNormalAtGaussPoints,
-    "points that look no farther than a segment": NearbyOnly,
-}

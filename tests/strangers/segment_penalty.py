@@ -1,0 +1,135 @@
+"""A bed of springs on exact segments, three Gauss points each, and the same from both sides with half the stiffness.
+
+After Zavarise and Wriggers, "A segment-to-segment contact strategy" (1998), with a penalty in place of multipliers: gap
+and pressure act along the slave's normal at both facing points. The tangent takes complex steps of each strip alone.
+"""
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from contactverif import Abilities, ContactPoints, Interface, PatchPromises, Promises, Rules, Traits
+from strangers.strips import add_at, cross, dot, visible_strips
+
+PLACES, WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
+STEP = 2.0**-200
+
+
+class SegmentPenalty:
+    """Springs at three Gauss points of each strip, each with a decision of its own; batches, and an exact tangent."""
+
+    traits = Traits(
+        promises=Promises(
+            patch=PatchPromises(flat=True, kinked=True, overhang=True),
+            converges=True,
+            integrates_linear_gap=True,
+            tangent="exact",
+            conserves_force=True,
+            conserves_moment=True,
+            continuity="C0",
+            local=True,
+            nodes_push=True,
+            translation_stable=True,
+        ),
+        rules=Rules(penalty="distributed", area="current", force_along="slave normal"),
+        abilities=Abilities(batched=True, takes_complex=True),
+    )
+
+    def __init__(self, *, penalty: float) -> None:
+        self.penalty = penalty
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        x = z.reshape(-1, 2)
+        strips = visible_strips(interface.slave.segments, interface.master.segments, x)
+        return {"strips": strips, "active": self._at_points(self._corners(interface, strips, x))[0] < 0}
+
+    def _corners(self, interface: Any, strips: Any, x: Any) -> Any:
+        """Return the nodes (..., n, 6, 2) that a strip depends on: two of each segment, and those that cut it."""
+        return x[..., self._nodes(interface, strips), :]
+
+    def _nodes(self, interface: Any, strips: Any) -> Any:
+        segments = interface.slave.segments[strips[:, 0]], interface.master.segments[strips[:, 1]]
+        ends = np.where(strips[:, 2:] < 0, segments[0], strips[:, 2:])  # An end cuts at itself: its share is exact.
+        return np.hstack([*segments, ends])
+
+    def _at_points(self, corners: Any) -> Any:
+        """Return gap, s, t, weight of the points (..., n, 3), and the normal into the slave (..., n, 1, 2)."""
+        a, b, first, second, low, high = (corners[..., number, :] for number in range(6))
+        along = b - a
+        square = dot(along, along)
+        start, end = dot(low - a, along) / square, dot(high - a, along) / square
+        s = start[..., None] + (end - start)[..., None] * PLACES
+        s_first, s_second = dot(first - a, along) / square, dot(second - a, along) / square
+        t = (s - s_first[..., None]) / (s_second - s_first)[..., None]
+        size = np.sqrt(square)
+        heights = cross(along, first - a) / size, cross(along, second - a) / size
+        gap = -((1 - t) * heights[0][..., None] + t * heights[1][..., None])
+        normal = np.stack([-along[..., 1], along[..., 0]], axis=-1) / size[..., None]
+        return gap, s, t, ((end - start) * size)[..., None] * WEIGHTS, normal[..., None, :]
+
+    def _forces(self, active: Any, corners: Any) -> Any:
+        """Return the forces (..., n, 4, 2) on both nodes of the slave segment, and of the master's."""
+        gap, s, t, weight, normal = self._at_points(corners)
+        pull = (self.penalty * np.where(active, gap, 0) * weight)[..., None] * normal
+        return np.stack([(share[..., None] * pull).sum(axis=-2) for share in (1 - s, s, t - 1, -t)], axis=-2)
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        x = z.reshape(*z.shape[:-1], -1, 2)
+        parts = self._forces(pairing["active"], self._corners(interface, pairing["strips"], x))
+        forces, nodes = np.zeros_like(x), self._nodes(interface, pairing["strips"])
+        for number in range(4):
+            add_at(forces, nodes[:, number], parts[..., number, :])
+        return forces.reshape(z.shape)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        corners = self._corners(interface, pairing["strips"], z.reshape(-1, 2))
+        moves = STEP * np.eye(12).reshape(12, 1, 6, 2)
+        slopes = self._forces(pairing["active"], corners + 1j * moves).imag / STEP  # (12, n, 4, 2)
+        nodes = self._nodes(interface, pairing["strips"])
+        unknowns = 2 * nodes[..., None] + np.arange(2)
+        columns = np.broadcast_to(unknowns.reshape(-1, 12).T[:, :, None, None], slopes.shape)
+        rows = np.broadcast_to(unknowns[:, :4], slopes.shape)
+        entries = slopes.ravel(), (rows.ravel(), columns.ravel())
+        return sparse.coo_array(entries, shape=(z.size, z.size)).tocsr()
+
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> ContactPoints:
+        x, strips = z.reshape(-1, 2), pairing["strips"]
+        gap, s, t, weight, normal = self._at_points(self._corners(interface, strips, x))
+        a, b = (x[interface.slave.segments[strips[:, 0], end]][:, None] for end in (0, 1))
+        position = (1 - s)[..., None] * a + s[..., None] * b
+        slave, master = (np.repeat(strips[:, column], 3) for column in (0, 1))
+        active = pairing["active"].ravel()
+        gap, normals = gap.ravel(), np.broadcast_to(normal, position.shape).reshape(-1, 2)
+        pressure, unknown = np.where(active, -self.penalty * gap, 0.0), np.full(gap.size, np.nan)
+        places = (slave, 2 * s.ravel() - 1, master, t.ravel(), position.reshape(-1, 2), normals)
+        return ContactPoints(*places, gap, pressure, weight.ravel(), active, unknown, unknown)
+
+
+class BothSidesHalved:
+    """The mean of both choices of the slave, without bias: the symmetric form of Nitsche's method without stresses.
+
+    After Mlika, Renard and Chouly, "An unbiased Nitsche's formulation" (2017), whose terms of stress are left out.
+    Areas are means of both surfaces, so the traits state none.
+    """
+
+    traits = SegmentPenalty.traits.revise(
+        area=None,
+        force_along=None,
+        integrates_linear_gap=None,
+        unbiased=True,
+        tangent=None,
+        batched=False,
+        takes_complex=False,
+    )
+
+    def __init__(self, *, penalty: float) -> None:
+        self.inner = SegmentPenalty(penalty=penalty / 2)
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        total = np.zeros_like(z)
+        n_slave = 2 * interface.n_slave_nodes
+        for each, shift in ((interface, 0), (interface.swap_roles(), n_slave)):
+            state = np.roll(z, -shift)
+            total += np.roll(self.inner.residual(each, self.inner.pair(each, state), state), shift)
+        return total
