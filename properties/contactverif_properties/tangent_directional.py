@@ -72,8 +72,8 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The pairing stays frozen, so the residual is smooth. Eight directions move all unknowns at
     random, and others the nodes of one chain, or the multipliers. Two more follow from what was found: the defect of
     the worst direction, and the leading singular direction of the tangent minus its difference quotient on all
-    directions before. Two conditions hold together, since an error of 1e-3 in one entry still has a Taylor slope of 2,
-    and a central difference has an error of its own:
+    directions before. Two conditions hold together, since the steps of the Taylor slope, ℓ/256 and ℓ/4096, are too long
+    to show an error of 1e-4 in one entry, and a central difference has an error of its own:
 
     - The best central difference over three steps differs by at most 30 (uS/ℓ)^(2/3) at each node. That is relative to
       the largest derivative there, or its change over ℓ, or the largest block of the tangent in the columns that the
