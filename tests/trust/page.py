@@ -22,14 +22,16 @@ CAMPAIGN = """## Nobody who is right is accused
 {cases:,} random cases over {formulations} formulations that are right, with seeds {seeds}: {accusations} accusations.
 An accusation is a failure of what a formulation promises, a crash, or a breach of the contract. *Nearest* is the
 largest number over its tolerance in a case that passes, and the formulation that came so near.
-In *idle* cases nothing is in contact. The named cases of finite lists are the same for every seed; the tests run them.
+In *idle* cases nothing is in contact. The campaign has random cases alone: no scene with a name, such as those of the
+paper, and no finite list, such as those of `hard.*` and `accuracy.*`. These are the same for every seed, and the tests
+ask them.
 
 """
 KILLS = """## Who catches whom
 
 {mutants} formulations are wrong on purpose, and each is caught. A row of the figure is one of them, a column a
 property: dark where the property is the one that is meant to catch it, light where it does so too.
-{survivors} more survives.
+{survivors}
 
 ![Wrong formulations against properties](kills.svg)
 
@@ -150,7 +152,10 @@ def kills() -> str:
             rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
             shared = f"{mutant}: {', '.join(f'`{other}`' for other in others[:3])}{rest}"
         lines.append([f"`{name}`", str(n_intended), str(catches), str(len(alone[name])), shared])
-    text = KILLS.format(mutants=len(rows), survivors=len(survivors))
+    missing = "; ".join(
+        f"*{row['mutant'].removeprefix(SURVIVES)}* (missing: `{row['caught by']}`)" for row in survivors
+    )
+    text = KILLS.format(mutants=len(rows), survivors=f"No property catches {len(survivors)} more: {missing}.")
     return text + table(["property", "meant", "catches", "alone", "least shared"], lines)
 
 
