@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from killing import caught_at, properties
 from kills import SLOW
-from mutate import Wrapped
+from mutate import wrap
 from tables import fill
 
 import contactverif_mortar
@@ -164,7 +164,7 @@ def is_caught(question: Property, make: Callable[..., Any], verbs: Verbs) -> boo
     """Return whether the property catches an error."""
 
     def wrong(*, penalty: float) -> Any:
-        return Wrapped(penalty, make, **verbs)
+        return wrap(penalty, make, **verbs)
 
     examples = 1 if question.id in SLOW else EXAMPLES_SOLVED if question.bodies else EXAMPLES
     return caught_at(question, Subject("wrong", wrong), examples) > 0
