@@ -39,12 +39,13 @@ def stability(
 
     The states have gaps down to 1e-12, segments down to 1e-9, offsets up
     to 1e9 and penalties up to 1e12 E/h. The error of a stable formulation
-    is at most 16 u × condition number. The error of one that rounds
-    positions far from the origin is above that line.
+    is at most 4 u × condition number, the line of the figure. The error of
+    one that rounds positions far from the origin is above that line. The
+    properties fail from 16 u × condition number on.
 
     \bExit status
       0  no promise is broken: what says that it is stable under
-         translations is below the line in all states
+         translations stays below 16 u × condition number
       1  a promise is broken, a property could not be judged, or a plugin
          does not load
       2  the command line is wrong; one line says what is needed
@@ -105,7 +106,8 @@ def _show(result: Run, files: OutputFiles) -> None:
     for panel in panels:
         sentence = f"{panel.formulation} {sentence_of(panel).replace('`', '')}"
         show(Text(sentence, style="magenta" if panel.above else ""))
-        for point in panel.above[:_MOST_IDS] if REPORT in files.names else ():
+        failing = [point for point in panel.above if point.fails]
+        for point in failing[:_MOST_IDS] if REPORT in files.names else ():
             report = shlex.quote(str(files.names[REPORT]))
             show_as_it_is(Text(f"    contactverif replay {report} --case {shlex.quote(point.case_id)}"))
     files.announce()

@@ -57,7 +57,7 @@ def test_a_stable_formulation_has_a_table_a_sentence_and_files(ask: Ask, tmp_pat
     assert (answer.status, answer.err) == (0, "")
     (line,) = [line for line in answer.out.splitlines() if line.startswith(" nts-ar ")]
     assert len(line.split()) == 8
-    assert all(float(number) <= 16 for number in line.split()[1:7])
+    assert all(float(number) <= 4 for number in line.split()[1:7])
     assert float(line.split()[7]) <= 1e-10
     assert "nts-ar stays below the line in all 95 states;" in answer.out
     assert answer.out.endswith("Every promise is kept and every property was judged.\n")

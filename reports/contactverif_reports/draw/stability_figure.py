@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif_reports.draw.case_figure import save
-from contactverif_reports.stability.sweep_points import LINE_FACTOR, SWEEPS, SweepPanel, short_number
+from contactverif_reports.stability.sweep_points import LINE_FACTOR, SWEEPS, TOLERANCE, SweepPanel, short_number
 
 _COLUMNS = 4
 _PANEL = 1.95, 1.62  # Width and height of one of many panels in inches.
@@ -40,6 +40,7 @@ _PENS: dict[str, dict[str, Any]] = {
     "offset, gap, ratio": {"marker": "X", "color": "black"},
     "ε̂h/E": {"marker": "D", "color": "#CC79A7"},
 }
+_TOLERANCE_LINE: dict[str, Any] = {"color": "0.35", "linewidth": 0.6, "linestyle": (0, (4, 3))}
 _STYLE: dict[Any, Any] = {
     "font.size": 7.0,
     "axes.titlesize": 7.5,
@@ -96,6 +97,7 @@ def _draw_panel(axes: Axes, panel: SweepPanel) -> None:
     line = LINE_FACTOR * UNIT_ROUNDOFF * conditions
     axes.fill_between(conditions, line, _HIGH, color="0.93", linewidth=0)
     axes.plot(conditions, line, color="0.35", linewidth=0.9)
+    axes.plot(conditions, TOLERANCE * UNIT_ROUNDOFF * conditions, **_TOLERANCE_LINE)
     axes.axhline(_LOW / 1.8, color="0.8", linewidth=0.5)
     for sweep in SWEEPS:
         points = [point for point in panel.points if point.sweep == sweep]
@@ -148,4 +150,5 @@ def _handles() -> list[Any]:
     """Return the entries of the legend."""
     sweeps = [Line2D([], [], label=f"sweep of {sweep}", **_pen(sweep)) for sweep in SWEEPS]
     line = Line2D([], [], color="0.35", linewidth=0.9, label=f"{LINE_FACTOR:g} u κ, u = 2⁻⁵³")
-    return [*sweeps, line, Patch(color="0.93", label="unstable: more than the\ncondition number explains")]
+    dashed = Line2D([], [], label=f"{TOLERANCE:g} u κ: the property fails", **_TOLERANCE_LINE)
+    return [*sweeps, line, dashed, Patch(color="0.93", label="more than the condition\nnumber explains")]

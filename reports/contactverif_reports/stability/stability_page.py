@@ -10,6 +10,7 @@ from contactverif_reports.stability.sweep_points import (
     FAR_AND_CLOSE,
     LINE_FACTOR,
     SWEEPS,
+    TOLERANCE,
     SweepPanel,
     SweepPoint,
     short_number,
@@ -20,9 +21,10 @@ _FAR = ("offset", "offset, gap 1e-6", "offset, gap, ratio")  # The sweeps away f
 _MEANING = f"""\
 A state is a flat interface that is turned and moved without rounding. The reference is the forces of the same state,
 flat at the origin, turned. κ is the condition number of a force: Σ ‖K‖ |z − z̄| over the largest force. K is the
-derivative of the residual and z̄ the centroid of the interface. No formulation can keep all errors below u κ, with
-u = 2⁻⁵³. The line of the figure is {LINE_FACTOR:g} u κ. The states of ε̂h/E are two blocks, solved; there K is the
-matrix of bodies and contact."""
+derivative of the residual and z̄ the centroid of the interface. If each position is rounded relative to the others,
+with u = 2⁻⁵³, a force changes by u κ at most. {{below}} of {{count}} formulations keep all errors below that. The line
+of the figure is {LINE_FACTOR:g} u κ. The dashed line is {TOLERANCE:g} u κ, from which `stability.sweep` and
+`stability.stiffness` fail. The states of ε̂h/E are two blocks, solved; there K is the matrix of bodies and contact."""
 
 
 def stability_page(run: Run, files: Mapping[str, str]) -> str:
@@ -30,7 +32,8 @@ def stability_page(run: Run, files: Mapping[str, str]) -> str:
     panels = sweep_panels(run)
     sentences = [f"- `{panel.formulation}` {sentence_of(panel)}" for panel in panels]
     sentences += [f"- `{plugin.formulation}` was not loaded: {plugin.reason}" for plugin in run.not_loaded]
-    parts = ["# Error against condition number", f"`{run.provenance['command']}`", _origin(run), _MEANING]
+    meaning = _MEANING.format(below=sum(map(_is_below, panels)), count=len(panels))
+    parts = ["# Error against condition number", f"`{run.provenance['command']}`", _origin(run), meaning]
     parts += [f"![Error against condition number, one panel a formulation]({name})" for name in _pictures(files)]
     parts += ["## One sentence for each formulation", "\n".join(sentences)]
     parts += ["## ω, the error over u κ", "\n".join(_table(panels))]
@@ -42,6 +45,11 @@ def stability_page(run: Run, files: Mapping[str, str]) -> str:
 def _origin(run: Run) -> str:
     version, commit = (run.provenance.get(name, "unknown") for name in ("contactverif_version", "commit"))
     return f"The command above wrote these files with contactverif {version}, commit {commit}."
+
+
+def _is_below(panel: SweepPanel) -> bool:
+    """Return whether all errors are below u κ."""
+    return panel.worst is not None and panel.worst.roundings <= 1
 
 
 def _pictures(files: Mapping[str, str]) -> list[str]:
@@ -59,13 +67,15 @@ def _table(panels: Sequence[SweepPanel]) -> list[str]:
 
 
 def _how_to_replay(panels: Sequence[SweepPanel], report: str) -> str:
-    """Return how a point is judged again, with the worst one above the line for an example, if there is one."""
+    """Return how a point that fails is judged again, with the worst one for an example, if there is one."""
     above = [point for panel in panels for point in panel.above]
-    if not above:
-        return f"No point is above the line. `{report}` holds the numbers; `contactverif report {report}` shows them."
-    worst = max(above, key=lambda point: point.roundings)
+    failing = [point for point in above if point.fails]
+    if not failing:
+        line = "the dashed line" if above else "the line"
+        return f"No point is above {line}. `{report}` holds the numbers; `contactverif report {report}` shows them."
+    worst = max(failing, key=lambda point: point.roundings)
     command = f"    contactverif replay {report} --case {worst.case_id}"
-    return f"Each point above the line can be judged again, for example the worst one:\n\n{command}"
+    return f"Each point above the dashed line can be judged again, for example the worst one:\n\n{command}"
 
 
 def sentence_of(panel: SweepPanel) -> str:
@@ -88,6 +98,8 @@ def _times(point: SweepPoint) -> str:
 def _describe_sweeps(panel: SweepPanel) -> str:
     """Return the sweeps in which points are above the line, and what that means."""
     sweeps = [sweep for sweep in SWEEPS if any(point.sweep == sweep for point in panel.above)]
+    if not any(point.fails for point in panel.above):
+        return f"in the sweeps of {', '.join(sweeps)}, and never above {TOLERANCE:g} u κ: it loses a digit there"
     if all(sweep in _FAR for sweep in sweeps):
         return "all of them far from the origin: it rounds positions there before it subtracts them"
     if panel.roundings_at("gap-1e-1") > LINE_FACTOR:
