@@ -1,7 +1,8 @@
 """See an interface lock: the same two blocks at three penalties, once with springs at many points and once with mortar.
 
-A pressure of 1 + 0.8 cos(2πx/L) presses on an interface of 8 on 12 segments. With stiff springs, segment-to-segment has
-more conditions than the surfaces can follow. Most of its points open, and few of them carry the load.
+A pressure of p̄ (1 + 0.8 cos(2πx/L)), with the mean p̄ = E/128, presses on an interface of 8 on 12 segments. With stiff
+springs, segment-to-segment has more conditions than the surfaces can follow. Most of its points open, and few of them
+carry the load.
 """
 
 from dataclasses import replace
@@ -11,12 +12,14 @@ import numpy as np
 
 from contactverif import Rectangle, Scene, block, load_formulation, solve
 
-MEAN, LENGTH, N_SLAVE, N_MASTER = 1e-2, 4.0, 8, 12
-rows, t = np.linspace(0, 1, 5), np.linspace(0, 1, N_MASTER + 1)
-slave_x, master_x = np.linspace(0, LENGTH, N_SLAVE + 1), LENGTH * (t + 0.15 * t * (1 - t))  # No node faces a node.
+MEAN, LENGTH, N_SLAVE, N_MASTER = 1 / 128, 4.0, 8, 12
+rows, t = np.linspace(0, 1, 5), np.linspace(-0.5, 0.5, N_MASTER + 1)
+slave_x = LENGTH * np.linspace(-0.5, 0.5, N_SLAVE + 1)
+master_x = LENGTH * (t + 0.15 * (0.25 - t**2))  # No node faces a node.
 slave = block(Rectangle(slave_x, rows, poisson=0.3), contact="bottom", pressure=MEAN, lowered=MEAN / 20)
 master = block(Rectangle(master_x, rows - 1, poisson=0.3), contact="top", approach=0.0)
-wave = 1 + 0.8 * np.cos(2 * np.pi * slave.nodes[:, :1] / LENGTH)
+shape = np.sinc(1 / N_SLAVE) ** 2  # What a node's shape function leaves of a wave.
+wave = 1 + 0.8 * shape * np.cos(2 * np.pi * slave.nodes[:, :1] / LENGTH)
 scene = Scene((replace(slave, load=slave.load * wave), master))
 
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constrained")

@@ -29,7 +29,8 @@ from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
-from contactverif.problems.hertz import WinklerContact, half_width, layer_half_width, solve_winkler_contact
+from contactverif.problems.hertz import half_width, layer_half_width, solve_winkler_contact
+from contactverif.problems.line_pressure import LinePressure
 
 # Lengths in half-widths of the contact after Hertz.
 UNIFORM = 1.6  # The foundation's elements are equally wide up to this distance from the middle.
@@ -78,7 +79,7 @@ class DiskProblem:
         """The half-width of the contact if the penalty's layer alone gave way, a length."""
         return layer_half_width(self.force, self.radius, self.penalty)
 
-    def winkler_contact(self) -> WinklerContact:
+    def winkler_contact(self) -> LinePressure:
         """Return the contact after Hertz with the penalty as a Winkler layer, to which a penalty method converges."""
         return solve_winkler_contact(self.force, self.radius, self.stiffness, self.penalty)
 

@@ -24,6 +24,7 @@ from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_reports.netcdf import schema
 
 PAPER = DiskProblem()
+ENERGY = 1e-15  # The paper's energy norm. Its unit is not said; here it is taken over the energy of the first step.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +35,7 @@ class DiskSolution:
     problem: DiskProblem
     # From the disk lowered to roundoff; −1 without a solution.
     iterations: Annotated[int, Column("", "1", "linear systems")]
+    by_energy: Annotated[int, Column("", "1", "linear systems until the energy of a step is 1e-15 of the first")]
     # The contact points from left to right.
     x: Annotated[FloatArray, Column("point", schema.LENGTH, "x along the interface", fill=np.nan)]
     pressure: Annotated[FloatArray, Column("point", schema.STRESS, "contact pressure", fill=np.nan)]
@@ -70,10 +72,17 @@ def solve_disk(
         formulation=formulation,
         problem=problem,
         iterations=trace.n_iterations if trace.converged else -1,
+        by_energy=steps_until_energy(trace.energies[np.isfinite(trace.energies)]),
         x=x,
         pressure=pressure[order],
         half_width=_half_width(x, gap),
     )
+
+
+def steps_until_energy(energies: FloatArray) -> int:
+    """Return the number of linear systems solved until a step's energy is `ENERGY` of the first; all if none is."""
+    below = np.flatnonzero(energies <= ENERGY * energies[0])
+    return int(below[0]) + 1 if len(below) else len(energies)
 
 
 @lru_cache(maxsize=2)

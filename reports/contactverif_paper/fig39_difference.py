@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from contactverif.contract.arrays import FloatArray
 from contactverif_paper.disk_solutions import difference, solve_disk
@@ -28,7 +27,6 @@ from contactverif_reports.netcdf.groups import Group
 REFINE = (1, 2)
 MESHES = ("our base meshes", "meshes twice as fine")
 X_AXIS, AXIS = (0.0, 0.4), (-1.0e3, 1.5e3)  # Ends of the printed axes.
-_STYLES: tuple[dict[str, Any], ...] = ({"color": "0.45", "linestyle": "--"}, {"color": "black", "linestyle": "-"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,25 +76,26 @@ def statements(differences: tuple[Difference, ...]) -> Iterator[Statement]:
 
 @PaperFigure.define(
     "fig39",
-    "Example 2: the pressure of VTS-PPT minus that of VTS-ME, (a) on the paper’s axes, which the curve of the "
-    "base meshes leaves, (b) on axes that hold both.",
+    "Example 2: the pressure of VTS-PPT minus that of VTS-ME, (a) on meshes twice as fine as our base meshes, on the "
+    "paper’s axes; (b) on our base meshes, which leave these axes at the dotted lines.",
 )
 def plot(differences: tuple[Difference, ...]) -> Figure:
-    """Draw both differences on the paper's axes, and on axes that hold both."""
-    figure, (printed, whole) = new_panels(3.6, 2)
-    for axes in (printed, whole):
+    """Draw the difference on the finer meshes on the paper's axes, and that on the base meshes on axes that hold it."""
+    figure, panels = new_panels(3.3, 2)
+    for axes, row, mesh in zip(panels, reversed(differences), reversed(MESHES), strict=True):
         axes.axhline(0.0, **REFERENCE_LINE)
-        for row, style in zip(differences, _STYLES, strict=True):
-            right = row.x >= 0
-            axes.plot(row.x[right], row.values[right], linewidth=1.0, zorder=3, **style)
-        axes.set_xlabel("x along the interface (length)")
+        right = (row.x >= 0) & (row.x <= X_AXIS[1])
+        axes.plot(row.x[right], row.values[right], linewidth=1.0, zorder=3, color="black")
+        axes.set(xlabel="x along the interface (length)", title=mesh)
         use_round_ticks(axes)
-    printed.set_xlim(*X_AXIS)
+        axes.set_xlim(*X_AXIS)
+    printed, whole = panels
     printed.set_ylim(*AXIS)
-    whole.set_xlim(0.0, None)
+    for end in AXIS:
+        whole.axhline(end, color="0.35", linewidth=0.8, linestyle=":", zorder=1)
+        words_ = "printed\naxis ends" if end > 0 else "printed axis ends"
+        whole.text(X_AXIS[1], 1.05 * end, words_, ha="right", va="bottom" if end > 0 else "top", color="0.35")
     printed.set_ylabel("VTS-PPT − VTS-ME\n(force / length)")
-    handles = [Line2D([], [], label=mesh, **style) for mesh, style in zip(MESHES, _STYLES, strict=True)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block
-from contactverif_paper.figure_style import Series, add_legend, new_panels, plot_logarithmic
+from contactverif_paper.figure_style import Series, add_legend, line_style, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, series_columns
 from contactverif_paper.paper_formulations import BALANCED, MORTAR, NTS_AR, STS, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
@@ -31,6 +31,7 @@ _ERRORS = series_columns(
     "overhang", "1", "part of a slave segment that overhangs", "largest error of a stress over the pressure", np.nan
 )
 _SEGMENT = 2.0  # The length of a slave segment.
+_PASSES = 1e-9  # Errors are at roundoff or far above this.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,13 +95,26 @@ def statements(result: FreeEnds) -> Iterator[Statement]:
 
 @PaperFigure.define(
     "free-ends",
-    "Error of the stress in a uniform patch test whose slave overhangs the master inside a segment. Half a "
-    "segment is an area of competence: nothing is cut there.",
+    "Error of the stress in a uniform patch test whose slave overhangs the master inside a segment. VTS-PPT passes "
+    "where nothing is cut: without an overhang, and at half a segment, where an area of competence ends. At all "
+    "other places it fails.",
 )
 def plot(result: FreeEnds) -> Figure:
     """Draw the errors over the overhang."""
     figure, (axes,) = new_panels(3.8, 1)
-    plot_logarithmic(axes, result.stress_error)
+    errors = result.stress_error
+    others = tuple(row for row in FORMULATIONS if row is not VTS_PPT)
+    plot_logarithmic(axes, Series(others, errors.at, np.stack([errors.row(row) for row in others])))
+    values, passes = errors.row(VTS_PPT), errors.row(VTS_PPT) < _PASSES
+    style = line_style(VTS_PPT, 1)
+    axes.plot(
+        errors.at, np.where(passes, np.nan, values), **style
+    )  # No line leads to the single places where it passes.
+    axes.plot(errors.at[passes], values[passes], **style | {"linestyle": "none", "markersize": 7.0, "zorder": 4})
+    for place, words_ in ((0.0, "VTS-PPT passes:\nno overhang"), (0.5, "VTS-PPT passes: an area of\ncompetence ends")):
+        arrow = {"arrowstyle": "-|>", "linewidth": 0.8, "color": "black"}
+        axes.annotate(words_, (place, 3e-14), (place + 0.03, 3e-10), va="center", arrowprops=arrow)
+    axes.text(0.9, 3e-14, "the three that pass: roundoff", ha="right", color="0.35")
     axes.set_xlabel("part of a slave segment that overhangs the master (–)")
     axes.set_ylabel("largest error of the stress / p (–)")
     add_legend(figure, FORMULATIONS, columns=3)

@@ -110,8 +110,9 @@ def statements(result: Locking) -> Iterator[Statement]:
         f"both lock. From ε̂ = 10 to 1e8 E/h an interface of {FINER[0]} on {FINER[1]} segments loses "
         f"{drift[VTS_PPT]:.0%} (VTS-PPT), {drift[STS]:.0%} (segment-to-segment) and "
         f"{drift[TWO_PASS]:.0%} (two-pass NTS-AR) of its compliance to a wave of pressure; mortar "
-        f"{abs(drift[MORTAR]):.1%}. Under a load of 1 + 0.8 cos(2πx/L) the pressures of "
-        f"segment-to-segment go from {rough} times the mean load at 1e6 E/h, those of mortar from {smooth}",
+        f"{abs(drift[MORTAR]):.1%}. Under a load of p̄ (1 + 0.8 cos(2πx/L)), p̄ = E/{1 / MEAN_PRESSURE:g}, with "
+        f"{REAL[0]} on {REAL[1]} segments the pressures of segment-to-segment go from {rough} times the mean load p̄ at "
+        f"1e6 E/h, those of mortar from {smooth}",
         Agreement.SILENT,
         "locking-stiff",
     )
@@ -121,7 +122,7 @@ def statements(result: Locking) -> Iterator[Statement]:
     "locking-stiff",
     f"(a) The compliance to a wave of pressure that an interface of {FINER[0]} on {FINER[1]} segments loses as "
     f"the penalty rises, beside matching meshes. (b) The pressures of {REAL[0]} on {REAL[1]} segments at "
-    "1e6 E/h under 1 + 0.8 cos(2πx/L), in contact that may open.",
+    f"1e6 E/h under p̄ (1 + 0.8 cos(2πx/L)), p̄ = E/{1 / MEAN_PRESSURE:g}, in contact that may open.",
 )
 def plot(result: Locking) -> Figure:
     """Draw the loss of compliance over the penalty, and pressures of real contact."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from contactverif.contract.arrays import FloatArray, IntArray
@@ -29,6 +32,7 @@ from contactverif_reports.draw.scene_meshes import colour_scale, draw_bodies, ma
 _TALLEST = 2.6  # Inches: the height of a panel with a deformed mesh.
 _SHORT_AXIS = 4.0  # An x axis of this length has a tick at each unit.
 _BROAD_LEGEND = 3  # Columns of a legend under two panels.
+_BAR = 10  # The length of a colour bar beside a row of panels over its width.
 _ARROW = 0.12  # Length of an arrow of pressure over the height of a body.
 
 
@@ -68,8 +72,8 @@ def plot_penetrations(patches: Sequence[PatchSolution]) -> Figure:
     across = 2
     down = -(-len(panels) // across)
     wide, high = np.ptp(np.vstack([body.nodes for body in patches[0].solved.bodies]), axis=0)
-    panel = min((WIDTH - 1.0) / across, _TALLEST * wide / high)
-    figure = new_figure(down * (1.08 * panel * high / wide + 0.4) + 0.5)
+    panel = min((WIDTH - 1.6) / across, _TALLEST * wide / high)
+    figure = new_figure(down * (panel * high / wide + 0.35) + 0.7)
     grid = figure.subplots(down, across, squeeze=False)
     for axes in grid.ravel():
         axes.set_axis_off()
@@ -82,12 +86,23 @@ def plot_penetrations(patches: Sequence[PatchSolution]) -> Figure:
         for axes, curve in zip(panels_of_scene, patch.curves, strict=True):
             draw_bodies(axes, patch.solved, curve.solution, magnified[curve.solution.formulation], scale)
             axes.set_title(f"({next(letters)}) {curve.formulation.legend}{_end_remark(curve)}", loc="left")
-        bar = figure.colorbar(scale, ax=panels_of_scene, shrink=0.8, aspect=16, pad=0.01)
-        bar.set_label("−σₙ (force / length)")
+        rows = -(-len(panels_of_scene) // across)
+        bar = figure.colorbar(scale, ax=panels_of_scene, shrink=0.8, aspect=_BAR * rows, pad=0.01)
         bar.locator = MaxNLocator(5, steps=[1, 2, 5, 10])
         bar.outline.set_linewidth(0.5)
-    figure.supxlabel("\n".join(_above_and_below(list(remarks))), fontsize=LETTERS)
+    title = "\n".join(["colour: −σₙ (force / length)", *_above_and_below(list(remarks))])
+    figure.legend(handles=_surface_handles(), loc="outside lower center", ncols=3, title=title, title_fontsize=LETTERS)
     return figure
+
+
+def _surface_handles() -> list[Line2D | Patch]:
+    """Return the legend of both surfaces and of the penetration, as `draw_bodies` draws them."""
+    pen: dict[str, Any] = {"color": "black", "linewidth": 1.3, "markersize": 3.6, "markeredgecolor": "black"}
+    return [
+        Line2D([], [], label="slave", marker="o", **pen),
+        Line2D([], [], label="master", marker="s", linestyle=(0, (4, 1.5)), markerfacecolor="white", **pen),
+        Patch(facecolor="white", edgecolor="0.35", linewidth=0, hatch="xxxxxx", label="penetration"),
+    ]
 
 
 def plot_meshes(patches: Sequence[PatchSolution]) -> Figure:

@@ -1,0 +1,76 @@
+"""reports/paper/README.md and docs say what the stored results say: files, groups, numbers. Nothing is solved again."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from contactverif.contract.arrays import IntArray
+from contactverif_paper.fig30_convergence import PRINTED_ITERATIONS, RULES
+from contactverif_paper.items import ITEMS
+
+FOLDER = Path(__file__).parents[2] / "reports" / "paper"
+LOCKING = Path(__file__).parents[2] / "docs" / "concepts" / "locking.md"
+README = (FOLDER / "README.md").read_text(encoding="utf-8")
+BASIC = "vts-ppt-basic"
+
+
+@cache
+def read_paper() -> xr.DataTree:
+    return xr.open_datatree(FOLDER / "paper.nc").load()
+
+
+def first_cells(heading: str) -> set[str]:
+    """Return what stands in code in the first column of the table with that heading."""
+    table = README.partition(f"\n| {heading} |")[2].partition("\n\n")[0]
+    cells = [line.split("|")[1] for line in table.splitlines()[2:]]
+    return {word for cell in cells for word in re.findall(r"`(.+?)`", cell)}
+
+
+def words(values: xr.DataArray) -> list[str]:
+    return [word.decode() if isinstance(word, bytes) else str(word) for word in np.ravel(values.values).tolist()]
+
+
+def test_the_table_of_files_lists_the_stored_figures() -> None:
+    names = set(words(read_paper()["figures"].to_dataset()["name"]))
+    assert first_cells("file") == names == {path.stem for path in FOLDER.glob("*.svg")}
+
+
+def test_the_table_of_groups_lists_the_stored_groups() -> None:
+    listed = {name for name in first_cells("group") if name.startswith("/")}
+    assert listed <= set(read_paper().groups)
+    assert {name.split("/")[1] for name in listed} == set(read_paper().children)
+    assert set(read_paper().children) == {item.name for item in ITEMS} | {"statements", "figures"}
+
+
+def test_the_iterations_of_fig_30_are_the_stored_ones() -> None:
+    group = read_paper()["fig30_convergence"].to_dataset()
+    column = words(group.formulation).index(BASIC)
+    assert words(group.rule) == list(RULES)
+    counts: IntArray = group.iterations.values[..., column].astype(int)  # (n_rules, n_ratios)
+    ours, decade, end, energy = counts.tolist()
+    text = " ".join(README.split())
+    assert f"needs {PRINTED_ITERATIONS} iterations in Fig. 30" in text
+    assert f"needs {ours[0]} or {ours[1]} iterations until the residual is down to its own roundoff" in text
+    assert f"{min(decade + end)} to {max(decade + end)} until it reaches the last decades" in text
+    assert f"{energy[0]} or {energy[1]} to the energy norm of Example 2" in text
+
+
+def test_fig_39_fits_on_the_meshes_that_the_page_names() -> None:
+    statements = read_paper()["statements"].to_dataset()
+    (condition,) = [
+        condition
+        for place, condition in zip(words(statements.place), words(statements.condition), strict=True)
+        if place == "Fig. 39"
+    ]
+    assert condition == "on meshes twice as fine only"
+    assert "Fig. 39 fits the printed axis on meshes twice as fine as our base meshes only" in " ".join(README.split())
+
+
+def test_the_page_on_locking_has_the_stored_pressures() -> None:
+    sts, mortar = (read_paper()[f"locking/{name}"].to_dataset().pressure.values for name in ("sts", "mortar"))
+    text = " ".join(LOCKING.read_text(encoding="utf-8").split())
+    assert f"they go from {sts.min():.0f} to {sts.max():.1f}." in text
+    assert f"follow the load at every penalty, from {mortar.min():.1f} to {mortar.max():.1f}." in text
