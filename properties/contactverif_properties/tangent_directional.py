@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations
+from itertools import chain, combinations, permutations
 
 import numpy as np
 from scipy.sparse import csgraph, csr_array
@@ -275,33 +275,29 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
     is one whose changes do not count, as those of points that are not active.
     """
     case, direction = state.case, directions[0]
-    central = _central_steps(case, case.shortest_segment)
-    step = central[-1]
+    step = _central_steps(case, case.shortest_segment)[-1]
 
     def pair(shifts: Iterable[float]) -> list[Pairing | None]:
         return [state.formulation.pair(case.interface, case.z + shift * step * direction) for shift in shifts]
 
     if state.pairing is not None and pair((1, -1)) == [state.pairing] * 2:
         return "", ""
-    undecided = find_kink(state, 4 * step, direction)
-    if undecided or state.pairing is None:
-        return undecided, ""
+    if (kink := find_kink(state, 4 * step, direction)) or state.pairing is None:
+        return kink, ""
     beside = [pair(sign * 2.0**-10 * np.arange(1, 4)) for sign in (1, -1)]
-    if all(first == second == third for first, second, third in beside):
+    if all(map(_all_agree, beside)):
         return "a kink: the pairing changes here, and is steady on either side", ""
     around = [pair(scale * np.arange(-2, 4)) for scale in (1, 2.0**-5, 2.0**-10)]
-    if all(map(_all_differ, around)):
-        steps = np.concatenate([central, -central, np.array(TAYLOR_STEPS) * case.shortest_segment])
-        if _change_forces([pairing for pairings in around for pairing in pairings], state, directions, steps):
-            return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
+    if all(map(_all_differ, around)) and _change_forces(list(chain(*around)), state, directions):
+        return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
     return "", ""
 
 
-def _change_forces(
-    pairings: Sequence[Pairing | None], state: FrozenState, directions: FloatArray, steps: FloatArray
-) -> bool:
-    """Return whether any pairing changes the residual by more than roundoff does, at a state or a step from it."""
+def _change_forces(pairings: Sequence[Pairing | None], state: FrozenState, directions: FloatArray) -> bool:
+    """Return whether any pairing changes the residual by more than roundoff, where differences are taken of it."""
     case = state.case
+    central = _central_steps(case, case.shortest_segment)
+    steps = np.concatenate([central, -central, np.array(TAYLOR_STEPS) * case.shortest_segment])
     moves = (steps[:, None, None] * directions).reshape(-1, case.z.size)
     places = np.concatenate([case.z[None], case.z + moves])
     forces = state.residual_at(places)
@@ -309,6 +305,11 @@ def _change_forces(
     roundoff = COORDINATE_ROUNDING * case.largest_coordinate * slope
     others = (replace(state, pairing=pairing).residual_at(places) for pairing in pairings)
     return any(np.abs(other - forces).max() > roundoff for other in others)
+
+
+def _all_agree(pairings: Sequence[Pairing | None]) -> bool:
+    """Return whether all of some pairings are alike."""
+    return all(pairing == pairings[0] for pairing in pairings)
 
 
 def _all_differ(pairings: Sequence[Pairing | None]) -> bool:
