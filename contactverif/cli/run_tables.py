@@ -81,9 +81,10 @@ def headline(provenance: Mapping[str, str]) -> str:
 
 
 def summary(run: Run) -> Text:
-    """Say in the last line whether every promise is kept, and if not what is wrong."""
+    """Say in the last lines whether every promise is kept, and how many there are, or what is wrong."""
     signs = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
-    return conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
+    text = conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
+    return text.append(f"\n{run.promises}") if run.promises_kept else text
 
 
 def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequence[str] = ()) -> Text:
@@ -170,8 +171,18 @@ def _remark(row: Row) -> str:
         f"{row.undecided} undecided" if row.undecided else "",
         f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",
         row.suspicion,
+        _finding(row) if row.verdict is Verdict.PASS else "",
     ]
     return "; ".join(part for part in parts if part)
+
+
+def _finding(row: Row) -> str:
+    """Return the sentence that a property says of the case with the closest number although it passes."""
+    if row.closest is None or row.closest.case is None:
+        return ""
+    measurement = row.outcomes[row.closest.case].measurement
+    finding = measurement.finding if measurement is not None else None
+    return "" if finding is None or finding.found else str(finding)
 
 
 def _list(names: Sequence[str]) -> str:

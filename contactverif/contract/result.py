@@ -342,6 +342,12 @@ class Run:
         """Return the number of rows with one of these results."""
         return sum(row.result in results for row in self.rows)
 
+    @property
+    def promises(self) -> str:
+        """The numbers of rows by promise, in a sentence; a property that makes no sense for a formulation is none."""
+        counts = Counter(row.promise for row in self.rows if row.verdict is not Verdict.NOT_APPLICABLE)
+        return f"Properties promised to pass: {counts[True]}, to fail: {counts[False]}, neither: {counts[None]}."
+
     def only(self, property_ids: Collection[str]) -> Run:
         """Return the run without all other properties."""
         return replace(self, rows=tuple(row for row in self.rows if row.property_id in property_ids))

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from itertools import product
+from itertools import accumulate, product
 from math import cos, radians, sin
 
 import numpy as np
@@ -170,6 +170,33 @@ def node_hit_states() -> tuple[Case, ...]:
         master = flat_master([-1.0, x + step * rounding, 3.0])
         cases.append(flat_state(f"{place} {label}{turn_label}", [0.0, 1.0, 2.0], master, 2.0**-4, turn=turn))
     return tuple(cases)
+
+
+_EIGHT = (1.0, 0.75, 1.25, 1.0, 0.5, 1.5, 1.25, 0.75), (0.75, 1.25, 1.5, 0.875, 1.25, 0.875, 0.5, 1.0)
+
+
+@cache
+def equal_length_states() -> tuple[Case, ...]:
+    """Return flat states whose slave and master are equally long, with as many segments of the mean length 1.
+
+    No segment at an end is longer than that, and inner nodes do not face each other. One spring more at each node, or
+    one less at an end, is then no more than 1/n of all springs, whatever the unit of the penalty.
+    """
+    slave, master = _EIGHT
+    sixteen = (*slave, *slave), (master[0] - 0.125, *master[1:], master[0] + 0.125, *master[1:])
+    return tuple(
+        flat_state(name, _ends(lengths), flat_master(_ends(opposite)), depth, turn=turn, penalty=penalty)
+        for name, (lengths, opposite), depth, turn, penalty in (
+            ("8 segments", _EIGHT, 2.0**-4, UPRIGHT, 16.0),
+            ("8 segments, upright, soft and shallow", _EIGHT, 2.0**-12, (0, 1, 1), 2.0**-4),
+            ("16 segments, stiff", sixteen, 2.0**-4, UPRIGHT, 2.0**20),
+        )
+    )
+
+
+def _ends(lengths: Sequence[float]) -> list[float]:
+    """Return 0 and the places where segments of these lengths end, one behind the other."""
+    return [*accumulate(lengths, initial=0.0)]
 
 
 @cache

@@ -30,7 +30,7 @@ from contactverif.problems.hard_corner_states import (
     free_end_states,
     steep_slave_states,
 )
-from contactverif_properties.shared.applicability import knows_total
+from contactverif_properties.shared.applicability import knows_total, may_act_twice
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
 from contactverif_properties.shared.uniform_pressure import pushing_forces, uniform_state
@@ -207,7 +207,7 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
     - Where `penalty` and `area` are stated, the areas add up to L, so s = 1.
     - Other distributed springs may act on both surfaces, so s = 1 + L_master/L.
     - A nodal spring has the stiffness ε̂ L/n for n slave segments. So s is the number of slave nodes over n, (n + 1)/n
-      for one chain. Unless `unbiased` is False, the nodes of the master count too.
+      for one chain. Where they are `unbiased`, the nodes of the master count too.
     - Where the unit of the penalty is not stated, ε̂ may be that of a node, and the largest of these counts.
 
     A tangent is exact if differences confirm it, so s is allowed to be larger by their 30 (uX/ℓ)^(2/3), as in
@@ -247,7 +247,7 @@ def _all_springs(case: Case, traits: Traits) -> float:
     interface, rules = case.interface, traits.rules
     if knows_total(traits):
         return 1.0
-    n_nodes = interface.n_slave_nodes if traits.promises.unbiased is False else interface.n_nodes
+    n_nodes = interface.n_nodes if may_act_twice(traits) else interface.n_slave_nodes
     nodal = n_nodes / len(interface.slave)
     distributed = 1 + float(interface.master.lengths(case.positions).sum()) / case.slave_length
     # Without a unit the penalty ε̂ may be taken for the stiffness of a node.

@@ -1,4 +1,4 @@
-"""Hard states of a flat interface with a uniform penetration: far away, deep, over a node, or near other surfaces.
+"""Named states of a flat interface with a uniform penetration: far away, deep, over a node, or near other surfaces.
 
 All rules for gaps agree there, so every formulation is asked something: no force along the surface, and a push out of
 the master (everybody); the total (who states `penalty` and `area`); each nodal force (unless `patch.flat` is
@@ -15,13 +15,19 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.measurement import Measurement
+from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.problems.flat_states import deep_states, node_hit_states, offset_states, search_states
+from contactverif.problems.flat_states import (
+    deep_states,
+    equal_length_states,
+    node_hit_states,
+    offset_states,
+    search_states,
+)
 from contactverif_properties.shared import uniform_pressure
-from contactverif_properties.shared.applicability import knows_total
+from contactverif_properties.shared.applicability import knows_total, may_act_twice
 from contactverif_properties.shared.roundoff import gap_tolerance, ratio, rounding_distance, stated_gap_quantity
 
 TOTAL = stated_gap_quantity("error of the total force")
@@ -150,3 +156,76 @@ def hard_search(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never.
     """
     return measure_flat(case, subject)
+
+
+_END_SPRINGS = "Nodal springs are n + 1 for n segments, and roundoff may lose the two halves at the ends."
+MOST = Quantity("your springs, over ε̂ L", "k (1 + 1/n) + u(8Z/|g| + 4N)", f"k is 1 or 2 passes. {_END_SPRINGS}")
+LEAST = Quantity(
+    "your springs, over ε̂ L, at least", "k (1 − 1/n) − u(8Z/|g| + 4N)", f"As above. {_END_SPRINGS}", sense="at least"
+)
+
+
+@Property.define(
+    id="scale",
+    family="patch",
+    quantities=(MOST, LEAST),
+    cases=Cases.from_list(equal_length_states),
+    promise=lambda traits: True,
+    asks=frozenset({"penalty"}),
+)
+def scale(case: Case, subject: Subject) -> Measurement:
+    """The springs of a flat interface have the stiffness ε̂ L together, or 2 ε̂ L in two passes.
+
+    **Question.** Slave and master are flat, equally long, and penetrate each other by the same depth everywhere. Is the
+    force the penalty times the penetration times the length, or twice that?
+
+    **Why it matters.** The penalty is the one number that a user gives, and an error of its factor shows in nothing but
+    the penetration. Most questions about sizes are asked of those who state `penalty` and `area`. This one is asked of
+    everybody, whatever is promised, so that no formulation is three times too stiff in silence.
+
+    **How it is judged.** The number is the force that pushes the slave over ε̂ |g| L. It must lie within 1/n of 1, or
+    within 2/n of 2 where the traits leave room for springs on both surfaces; n is the number of slave segments, 8 or
+    16. Nodal springs of ε̂ L/n at n + 1 nodes give 1 + 1/n. A node that faces the end of the master exactly may be lost
+    to roundoff, which takes no more than 1/n either. Segments have the mean length 1, so that it does not matter
+    whether the unit of the penalty is stated. A factor of 2 on one pass looks like two passes, so the row says that the
+    springs are 2 ε̂ L, unless the traits say `unbiased`.
+
+    A law that is not linear has no stiffness. The state is asked again at half the depth, and where the number changes
+    by more than u(8Z/|g| + 4N), it is kept as a detail and not judged.
+
+    **Undecided.** Never.
+    """
+    n, traits, depth = len(case.interface.slave), subject.traits, case.parameter("penetration")
+    away = np.zeros_like(case.positions)
+    away[: case.interface.n_slave_nodes] = depth / 2 * uniform_pressure.normal_of(case)
+    parameters = {**case.parameters, "penetration": np.array(depth / 2)}
+    half = replace(case, z=(case.positions + away).reshape(-1), parameters=parameters)
+    springs, shallow = _springs(case, subject), _springs(half, subject)
+    tolerance = gap_tolerance(half, depth / 2, rounding_distance(case, traits))
+    details = {"springs over ε̂ L": springs}
+    if abs(shallow - springs) > 2 * tolerance * abs(springs):
+        return Measurement(details=details)
+    passes = 2 if springs > np.sqrt(2) and may_act_twice(traits) else 1
+    numbers = [
+        MOST.check(springs, passes * (1 + 1 / n) + tolerance),
+        LEAST.check(springs, passes * (1 - 1 / n) - tolerance),
+    ]
+    finding = (
+        None if passes == 1 or traits.promises.unbiased else Finding(_say(springs, "two passes, or twice too stiff"))
+    )
+    if any(number.ratio > 1 for number in numbers):
+        right = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if may_act_twice(traits) else "")
+        finding = Finding(_say(springs, right))
+    return Measurement(numbers, details=details, finding=finding)
+
+
+def _say(springs: float, remark: str) -> str:
+    """Return a sentence about the stiffness of all springs over ε̂ L."""
+    return f"your springs are {springs:#.3g} ε̂ L: {remark}"
+
+
+def _springs(case: Case, subject: Subject) -> float:
+    """Return the force that pushes the slave out of the master over ε̂ |g| L."""
+    forces = -uniform_pressure.uniform_state(case, subject).forces[: case.interface.n_slave_nodes]
+    push = float((forces @ uniform_pressure.normal_of(case)).sum())
+    return push / (case.penalty * case.parameter("penetration") * case.slave_length)

@@ -271,7 +271,10 @@ def test_verify_says_what_was_asked_and_how_it_came_out(ask: Ask) -> None:
     assert set(rows(answer.out)) == {
         ("vts-ppt-balanced", property_id) for property_id in ("balance.force", "balance.moment", "purity")
     }
-    assert answer.out.endswith("\nEvery promise is kept and every property was judged.\n")
+    assert answer.out.splitlines()[-2:] == [
+        "Every promise is kept and every property was judged.",
+        "Properties promised to pass: 3, to fail: 0, neither: 0.",
+    ]
     promise, verdict, judged, _, worst, sign, tolerance = rows(answer.out)["vts-ppt-balanced", "balance.force"]
     assert (promise, verdict, judged, sign) == ("passes", "pass", "7/7", "≤")
     assert 0 <= float(worst) <= float(tolerance) < 1e-6

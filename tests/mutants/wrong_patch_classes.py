@@ -1,19 +1,21 @@
 """Mutants of formulations that state that they fail the patch test: their mistakes hid behind that statement.
 
-Each has the traits of the right formulation. What it promises on smaller classes of meshes, or states of its forces,
-is what catches it.
+Each has the traits of the right formulation, or none. What it promises on smaller classes of meshes, or states of
+its forces, is what catches it.
 """
 
 from functools import partial
 from typing import Any
 
 from mutate import Mutant, changed_line, reports, wrap
+from subjects import ResidualAlone
 
 import contactverif_nts
+from contactverif.contract.traits import Traits
 
 NORMAL, NORMAL_SOLVE = "patch.flat.normal", "patch.flat.normal.solve"
 SINGLE, SINGLE_SOLVE = "patch.flat.single", "patch.flat.single.solve"
-NODAL, PUBLISHED = "patch.flat.nodal", "patch.flat.published"
+NODAL, PUBLISHED, SCALE = "patch.flat.nodal", "patch.flat.published", "scale"
 SMALL = "1e-12"  # The relative size of graded mistakes.
 
 _PLACES = "c = -1 + (2 * np.arange(n) + 1) / n"
@@ -40,6 +42,17 @@ def _softens_both_passes(*, penalty: float) -> Any:
 
     make = partial(contactverif_nts.two_pass, inner=contactverif_nts.nts_ar)
     return wrap(penalty, make, residual=soften, tangent=soften)
+
+
+def _stiffens(factor: float) -> Any:
+    """Return the forces of NTS-AR with another stiffness, and nothing else: no other part, and no promise."""
+
+    def make(*, penalty: float) -> Any:
+        springs = ResidualAlone(contactverif_nts.nts_ar(penalty=factor * penalty))
+        springs.traits = Traits()
+        return springs
+
+    return make
 
 
 def _line(name: str, caught_by: str, old: str, new: str, factory: str, module: str = "eq6") -> Mutant:
@@ -71,4 +84,7 @@ MUTANTS = (
     _line("points of VTS-ME moved apart over a master node", PUBLISHED, _POINT.format("places[slot[i]]"), _MOVED,
           "vts_me"),
     Mutant("two passes of NTS-AR a tenth too soft", PUBLISHED, _softens_both_passes),
+    Mutant("three times too stiff, without a promise", SCALE, _stiffens(3.0)),
+    Mutant("a third as stiff, without a promise", SCALE, _stiffens(1 / 3)),
+    Mutant("half again too stiff, without a promise", SCALE, _stiffens(1.5)),
 )  # fmt: skip

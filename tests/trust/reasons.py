@@ -29,7 +29,7 @@ SHARED = {
     **dict.fromkeys(("patch.flat.nodal", "patch.flat.normal", "patch.flat.normal.solve"), CLASS),
     **dict.fromkeys(("patch.flat.published", "patch.flat.resultant"), CLASS),
     **dict.fromkeys(("patch.flat.single", "patch.flat.single.solve"), CLASS),
-    **dict.fromkeys(("patch.tilted.nodal", "patch.tilted.resultant"), TILTED),
+    "patch.tilted.nodal": TILTED,
     **dict.fromkeys(("nodal-push", "projection.activity", "projection.segment", "unilateral"), POINTS),
     **dict.fromkeys(("newton.units", "scaling"), UNITS),
     **dict.fromkeys(("newton.attainable", "stability.local", "stability.stiffness"), DIGITS),

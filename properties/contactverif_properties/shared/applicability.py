@@ -37,3 +37,11 @@ def refuse_unknown_pressure(traits: Traits) -> str:
 def knows_total(traits: Traits) -> bool:
     """Return whether the traits say what the total force of a uniform penetration is."""
     return traits.rules.penalty == "distributed" and traits.rules.area is not None
+
+
+def may_act_twice(traits: Traits) -> bool:
+    """Return whether the traits leave room for springs on both surfaces.
+
+    They do not where areas add up to the slave's length, or where nodal springs stand on the slave alone.
+    """
+    return bool(traits.promises.unbiased) if traits.rules.penalty == "nodal" else not knows_total(traits)
