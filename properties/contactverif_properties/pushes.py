@@ -22,6 +22,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.strategies import flat_cases, general_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import freeze_state, prepare_state, random_moves
+from contactverif_properties.shared.applicability import may_act_twice
 from contactverif_properties.shared.constraint_rows import check_constraint_rows
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.passes import Pass
@@ -240,7 +241,8 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case is undecided where every node that is pulled belongs to a segment of the master round
     a corner: the neighbour of the one that a point faces, turned by more than 60°. Where an area of competence reaches
     round such a corner, a part of its force has its foot far past the ends of the neighbour, and Eq. 6 leaves that ξ
-    unclipped, too. Points do not report their parts.
+    unclipped, too. Points do not report their parts. Where no points are reported, it is undecided as well if master
+    nodes alone are pulled, or any nodes where the traits leave room for two passes.
 
     **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
     """
@@ -261,6 +263,10 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     undecided = ""
     if pulled and pulled <= _nodes_round_corners(state):
         undecided = "a point faces the master beside a corner, and parts of its force may lie round it"
+    twice = subject.traits.promises.unbiased or may_act_twice(subject.traits)
+    first_master = 0 if twice else case.interface.n_slave_nodes
+    if pulled and not state.has_points and min(pulled) >= first_master:
+        undecided = "a foot may lie past the end of a segment, and no point says how far"
     return Measurement([PULL_OF_NODE.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided)
 
 

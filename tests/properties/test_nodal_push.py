@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import change_verbs, load_subject
+from subjects import Changed, change_verbs, load_subject
 
 from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif_nts import vts_ppt
@@ -13,6 +13,9 @@ from contactverif_properties.pushes import nodal_push
 SLAVE = [[0.446875, -0.875], [1.446875, -0.375]]
 CORNER = Interface.from_chains(SLAVE, [[1.005, 0.0], [1.0025, -0.5], [0.0025, -0.5], [0.0, 0.0]])
 STRAIGHT = Interface.from_chains([[0.0, -0.25], [1.0, -0.25]], [[1.5, 0.0], [0.5, 0.0], [-0.5, 0.0]])
+
+
+VALLEY = Interface.from_chains([[-0.05, -0.2], [0.05, -0.2]], [[1.0, 0.5], [0.0, 0.0], [-1.0, 0.5]])
 
 
 def pull(node: int, sign: float) -> Subject:
@@ -47,3 +50,22 @@ def test_a_node_that_is_pulled_where_there_is_no_corner_is_found() -> None:
 
 def test_a_slave_node_that_is_pulled_beside_a_corner_is_found() -> None:
     assert _judge(pull(0, -1.0), CORNER) is Verdict.FAIL
+
+
+@pytest.mark.parametrize("name", ["nts-ar", "nts", "two-pass/nts-ar"])
+def test_without_points_a_foot_past_the_end_of_a_segment_is_no_reason_to_accuse(name: str) -> None:
+    """Both slave nodes are nearest to the vertex of the valley, and so lever the outer nodes of the master up."""
+    inner = load_subject(name)
+    assert _judge(inner, VALLEY) is Verdict.PASS
+
+    def make(*, penalty: float) -> Changed:
+        return Changed(inner.with_penalty(penalty).plugin, contact_points=None)
+
+    assert _judge(Subject(name, make), VALLEY) is Verdict.UNDECIDED
+
+
+def test_without_points_a_slave_node_that_is_pulled_is_found() -> None:
+    def make(*, penalty: float) -> Changed:
+        return Changed(pull(0, -1.0).with_penalty(penalty).plugin, contact_points=None)
+
+    assert _judge(Subject("pulled", make), STRAIGHT) is Verdict.FAIL
