@@ -19,6 +19,7 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
 from contactverif.strategies import flat_cases, general_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import freeze_state, prepare_state, random_moves
@@ -260,14 +261,19 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     )
     tolerance = roundoff.segment_tolerance(case, state.forces, case.largest_coordinate)
     pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
-    undecided = ""
-    if pulled and pulled <= _nodes_round_corners(state):
-        undecided = "a point faces the master beside a corner, and parts of its force may lie round it"
-    twice = subject.traits.promises.unbiased or may_act_twice(subject.traits)
-    first_master = 0 if twice else case.interface.n_slave_nodes
-    if pulled and not state.has_points and min(pulled) >= first_master:
-        undecided = "a foot may lie past the end of a segment, and no point says how far"
+    undecided = _excuse_pulls(state, pulled, subject.traits) if pulled else ""
     return Measurement([PULL_OF_NODE.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided)
+
+
+def _excuse_pulls(state: FrozenState, pulled: set[int], traits: Traits) -> str:
+    """Return why some nodes may be pulled, or an empty string."""
+    if pulled <= _nodes_round_corners(state):
+        return "a point faces the master beside a corner, and parts of its force may lie round it"
+    twice = traits.promises.unbiased or may_act_twice(traits)
+    first_master = 0 if twice else state.case.interface.n_slave_nodes
+    if not state.has_points and min(pulled) >= first_master:
+        return "a foot may lie past the end of a segment, and no point says how far"
+    return ""
 
 
 def _nodes_round_corners(state: FrozenState) -> set[int]:

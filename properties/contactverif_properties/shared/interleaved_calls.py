@@ -93,10 +93,9 @@ def count_changes_in_life(
         How many entries of answers to the question change, and whether the pairing does.
     """
     interface, z = question.interface, question.z
-    order = ("residual", "tangent", "contact_points", BOTH)
-    verbs = [verb for verb in order if verb in {"residual", *formulation.provides}]
-    slow = "tangent" if "tangent" in formulation.provides else "residual"
-    first = dict(_ask(formulation, [(verb, 0) for verb in verbs], [question]))
+    verbs = {"residual", *formulation.provides} & {"residual", "tangent", "contact_points", BOTH}
+    slow = "tangent" if "tangent" in verbs else "residual"
+    first = dict(_ask(formulation, [(verb, 0) for verb in sorted(verbs)], [question]))
     changed, pairs_otherwise = 0.0, False
     for number, state in enumerate(states):
         repeats = number % 2 == 1
