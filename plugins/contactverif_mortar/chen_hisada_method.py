@@ -197,7 +197,8 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     area : str
         "current" or "reference": the configuration in which lengths are measured.
     tau : float
-        The part of a master segment by which a node's foot may lie past its free end and still count.
+        The part of a master segment by which a node's foot may lie past its free end and still count. With 0 a node
+        that faces a free end exactly is lost to roundoff, and neither patch tests nor convergence are promised.
 
     References
     ----------
@@ -205,8 +206,10 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     """
     quadrature = Quadrature.gauss(N_POINTS, choose("area", area, AREAS))
     traits = CELL_TRAITS.revise(
+        # With τ = 0 roundoff decides whether a node is in contact that faces a free end exactly.
+        **(dict.fromkeys(("flat", "normal", "single", "kinked", "converges"), None) if tau == 0 else {}),
         overhang=False,
-        area=area,
+        area=area if tau > 0 else None,
         gap="cells and nodes",
         witnesses={"patch.dead-zone": "dead-zone", **CELL_TRAITS.evidence.witnesses},
         source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",

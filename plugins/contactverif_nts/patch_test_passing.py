@@ -54,6 +54,10 @@ _PRINTED = POINT_TRAITS.revise(
     conserves_force=False,
     conserves_moment=False,
     integrates_linear_gap=False,
+    # Where a walk stops before a segment that is seen edge-on, the segment before it is continued. The share of its
+    # other node is below zero as soon as what is continued is longer than the segment. "cover" cuts the area there, but
+    # in the frame of the segment of the uncut V, and the walk of V′ may stop earlier in its own frame.
+    nodes_push=None,
     area="current",
     penalty="distributed",
     witnesses={
@@ -261,9 +265,7 @@ def vts_ppt_balanced(
 @cache
 def _promises_as_printed(free_end: int, n: int) -> Traits:
     """Return the promises of `vts_ppt`."""
-    # A segment that is continued past its free end has shares below zero.
-    pushes = None if free_end == walk.EXTEND else True
-    return add_locking(_PRINTED.revise(overhang=free_end == walk.COVER, nodes_push=pushes), n)
+    return add_locking(_PRINTED.revise(overhang=free_end == walk.COVER), n)
 
 
 @cache
@@ -286,7 +288,6 @@ def _balanced_promises(free_end: int, n: int, current: bool) -> Traits:
         overhang=covers,
         conserves_force=True,
         conserves_moment=None if free_end == walk.TRUNCATE else True,
-        nodes_push=covers or None,
         area="current" if current else "reference",
         witnesses={**({} if covers else {"patch.dead-zone": "dead-zone"}), **POINT_TRAITS.evidence.witnesses},
     )

@@ -137,13 +137,18 @@ def _traits(inner: Traits) -> Traits:
     """Return what two passes promise, from what one pass promises.
 
     With a penalty, a penetration gives twice the pressure that it should, and where one pass is wrong, the other does
-    not make it right. Springs twice as stiff as the penalty leave an error that falls as h alone. With nodal
-    multipliers all gaps vanish at the nodes of both surfaces. Where force and moment balance, the force of a node is
-    spread over the segment that it meets by the lever rule. The exact forces of a uniform pressure are such forces,
-    with an overhang or without: they are those of trapezoids between neighbours in the union of the nodes that face a
-    segment.
+    not make it right. Where each pass is exact on a kink, so are both, and nothing is stated of what stiff springs do
+    there. Springs twice as stiff as the penalty leave an error that falls as h alone. With nodal multipliers all gaps
+    vanish at the nodes of both surfaces. Where force and moment balance, the force of a node is spread over the segment
+    that it meets by the lever rule. The exact forces of a uniform pressure are such forces, with an overhang or
+    without: they are those of trapezoids between neighbours in the union of the nodes that face a segment.
     """
-    passes, independent, converges, inf_sup, locks = None, None, None, None, None
+    passes, kinked, independent, converges, inf_sup, locks = None, None, None, None, None, None
+    # In the second pass nodes of the master enter past the ends of the slave. Who does not cover an overhang counts
+    # such a node at once, so that its force jumps.
+    continuity = inner.promises.continuity
+    if continuity != "jumps" and not inner.promises.patch.overhang:
+        continuity = None
     witnesses = {
         part: name for part, name in inner.evidence.witnesses.items() if not part.startswith(("patch", "multipliers"))
     }
@@ -155,18 +160,21 @@ def _traits(inner: Traits) -> Traits:
         witnesses |= dict.fromkeys(("accuracy.wavy", "accuracy.wavy-curved"), "upper slave, 10 E/h")
         witnesses["accuracy.hertz"] = "parabola-layer"
     if inner.rules.enforcement == "penalty" and inner.promises.patch.flat is not None:
-        passes, witnesses["patch"], witnesses["patch.kinked"] = False, "a1", "edge of 53°, lower slave"
+        passes, witnesses["patch"] = False, "a1"
+        kinked = False if inner.promises.patch.kinked is False else None
+        witnesses["patch.kinked"] = "edge of 53°, lower slave"
     elif inner.rules.enforcement == "multiplier":
         independent = inf_sup = False  # two nodes in one place have two multipliers for one gap
         witnesses |= {"multipliers": "a1", "stability.inf-sup": "matching"}
         if inner.rules.penalty == "nodal" and inner.promises.conserves_force and inner.promises.conserves_moment:
-            passes = True
+            passes = kinked = True
     return inner.revise(
         flat=passes,
         normal=passes if passes or inner.promises.patch.normal is not None else None,
         single=passes if passes or inner.promises.patch.single is not None else None,
-        kinked=passes,
+        kinked=kinked,
         overhang=passes,
+        continuity=continuity,
         converges=converges,
         inf_sup=inf_sup,
         locks=locks,

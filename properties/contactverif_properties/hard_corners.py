@@ -145,7 +145,23 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define(id="hard.steep-slave", cases=Cases.from_list(steep_slave_states))
+def promise_no_wild_force(traits: Traits) -> bool | None:
+    """Return None where theory has no bound: dual shapes, and multipliers of two passes.
+
+    Dual shapes on a sliver of a segment have forces of both signs, each many times larger than their sum. Multipliers
+    are set to press here, and where the second pass sees the slave's back, they would press across an open gap.
+    """
+    both_passes = bool(traits.promises.unbiased) and traits.rules.enforcement == "multiplier"
+    return None if traits.promises.nodes_push is False or both_passes else True
+
+
+@Property.define(
+    id="hard.steep-slave",
+    family="hard",
+    quantities=(DIRECTION, TOTAL, SIZE),
+    promise=promise_no_wild_force,
+    cases=Cases.from_list(steep_slave_states),
+)
 def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
     """A slave segment at 89.9°, 90° or 180° to the master gives no wild force and no pull.
 
@@ -158,7 +174,8 @@ def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** A formulation may see such a segment or not. What every right formulation fulfils: all numbers
     are finite; the force points between the master's normal and the direction into the slave's body (at 180°: along the
     master's normal); it is at most ε̂ D L, since no gap is longer than the interface's diameter D. Where `penalty` and
-    `area` are not stated, springs may act in two passes, and 4 ε̂ D L is allowed.
+    `area` are not stated, springs may act in two passes, and 4 ε̂ D L is allowed. Dual shapes (`nodes_push=False`),
+    whose forces have both signs, and multipliers of two passes are asked, but need not pass.
 
     **Undecided.** Never.
     """

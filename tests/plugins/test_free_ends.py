@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from subjects import judge_as, load_property, load_subject
 from surfaces import contact_forces, make_bent, make_flat
 
-from contactverif import Interface, Surface
+from contactverif import Case, Interface, Surface, Verdict
 from contactverif_nts import vts_ppt, vts_ppt_balanced
 
 PENALTY = 8.0
@@ -62,6 +63,18 @@ def test_at_a_free_end_the_master_loses_what_lies_past_it() -> None:
         forces = contact_forces(vts_ppt(penalty=PENALTY, free_end=free_end), interface, z)
         assert forces[:2, 1].sum() == 4.0
         assert -forces[2:, 1].sum() == pytest.approx(carried, rel=1e-15)
+
+
+def test_beside_a_step_of_the_master_a_node_is_pulled_so_vts_ppt_promises_no_push() -> None:
+    """The walk stops before the step, 0.7 before a segment of 0.2, so that a < −1 on it."""
+    slave, master = [[-0.4, -0.1], [1.4, -0.1]], [[3.0, 0.0], [0.5, 0.0], [0.3, 0.0], [0.3, -1.0]]
+    interface = Interface.from_chains(slave, master)
+    case = Case(interface, interface.nodes.ravel(), PENALTY)
+    question = load_property("nodal-push")
+    for name in ("vts-ppt:n=1", "vts-ppt-balanced:n=1,free_end=truncate"):
+        judge_as(Verdict.FAIL, question, case, load_subject(name))
+        assert load_subject(name).traits.promises.nodes_push is None
+    judge_as(Verdict.PASS, question, case, load_subject("vts-ppt-balanced:n=1"))
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

@@ -10,6 +10,7 @@ from subjects import judge_as, load_subject
 from wave_strangers import Heights
 
 from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
+from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.problem import PRESSURE
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
 from contactverif_properties.convergence import accuracy_wavy, accuracy_wavy_curved, promise_without_locking
@@ -137,3 +138,21 @@ def test_who_converges_and_does_not_lock_promises_the_curved_interface(
     converges: bool | None, locks: bool | None, promise: bool | None
 ) -> None:
     assert promise_without_locking(Traits(promises=Promises(converges=converges, locks=locks))) is promise
+
+
+def test_pressures_of_one_point_a_segment_alternate_on_a_finer_slave_so_their_convergence_is_not_promised() -> None:
+    """The inf-sup constant falls as h. Forces and the means of two neighbours converge."""
+    case, subject = _case(accuracy_wavy, CONTRAST_NAMES[0]), load_subject("vts-ppt-lm:n=1")
+    outcome = judge_as(Verdict.FAIL, accuracy_wavy, case, subject)
+    assert outcome.reason.startswith("rate of pressures")
+    assert subject.traits.promises.converges is None
+    study, errors = WAVY_STUDIES.read(case), []
+    for mesh in study.meshes[-3:]:
+        instance = study.pose(mesh, subject.traits)
+        points = solve_for_accuracy(instance.scene, subject, instance.start, instance.step).points
+        assert points is not None
+        error = (points.pressure - instance.pressure(points.position)) / instance.pressure_scale
+        errors.append([np.sqrt(np.mean(each**2)) for each in (error, (error[1:] + error[:-1]) / 2)])
+    alternating, means = np.transpose(errors)
+    assert (alternating > 0.02).all()
+    assert means[-1] < 0.3 * means[0] < 0.003

@@ -44,7 +44,7 @@ def test_half_passes_tend_to_forces_of_their_own(area: str) -> None:
     """The fit of formulations that balance stays more than 1e-3 off on every mesh, here up to 6e-3."""
     subject, study, errors = load_subject(f"mortar-two-half-pass:n=5,area={area}"), RingStudy(FIT, "outer", 1e2), []
     balanced = study.fit(subject.traits.revise(conserves_force=True))
-    for refine in (3, 6):
+    for refine in (2, 4):
         solution = solve_for_accuracy(study.pose(refine, subject.traits).scene, subject)
         outwards = solution.interface.nodes / np.linalg.norm(solution.interface.nodes, axis=1)[:, None]
         radial = np.abs((solution.forces * outwards).sum(axis=1)) / (np.pi / 2)
@@ -52,8 +52,8 @@ def test_half_passes_tend_to_forces_of_their_own(area: str) -> None:
         totals = np.array([radial[:n_slave].sum(), radial[n_slave:].sum()])
         errors.append([totals / [fit.force, fit.master_force] - 1 for fit in (study.fit(subject.traits), balanced)])
     of_half_passes, of_balanced = np.abs(4 * np.array(errors[1]) - errors[0]).max(axis=1) / 3
-    assert of_half_passes < 2e-4
-    assert of_balanced > 1e-3
+    assert of_half_passes < 5e-4  # 7e-6 on meshes twice as fine
+    assert of_balanced > 1.5e-3  # and as much there
 
 
 @pytest.mark.parametrize(
