@@ -1,12 +1,15 @@
-"""Pressures between the slave's nodes that fit the gaps best in the sense of least squares, with a consistent mass.
+"""Pressures between the slave's nodes that fit those of the springs best, in the sense of least squares.
 
-After Puso and Laursen, "A mortar segment-to-segment contact method" (2004), with the projection of L2 in place of gaps
-that each node weighs by itself: the nodal gaps solve M ĝ = ∫N g, with M = ∫N Nᵀ over what is covered.
+After Puso and Laursen, "A mortar segment-to-segment contact method" (2004), with the consistent mass of a projection in
+L2 in place of gaps that each node weighs by itself: of all pressures p = ΣN_j p_j with p_j ≥ 0, the formulation takes
+the one for which ∫(p + ε̂ g)² over what is covered is least. Its active nodes A solve Σ_A M_ij p_j = −ε̂ ∫N_i g, with M =
+∫N_i N_j. Nodes whose weighted gap is open are never active, since no entry of M is negative.
 """
 
 from typing import Any
 
 import numpy as np
+from scipy.optimize import nnls
 
 from contactverif import Abilities, PatchPromises, Promises, Rules, Traits
 from strangers.strips import add_at, dot, share_of, visible_strips
@@ -15,11 +18,7 @@ PLACES, WEIGHTS = np.array([0.5 - 12**-0.5, 0.5 + 12**-0.5]), np.array([0.5, 0.5
 
 
 class NodalLeastSquares:
-    """Nodal springs of a projected gap, in batches of real or complex states; no tangent, and no contact points.
-
-    A node is in contact if its projected gap and its weighted gap are both closed, so that a projection which swings
-    past zero beside a deep penetration begins no contact.
-    """
+    """Springs with projected pressures, in batches of real or complex states; no tangent, and no contact points."""
 
     traits = Traits(
         promises=Promises(
@@ -42,8 +41,16 @@ class NodalLeastSquares:
     def pair(self, interface: Any, z: Any) -> Any:
         x = z.reshape(-1, 2)
         strips = visible_strips(interface.slave.segments, interface.master.segments, x)
-        sums, gaps = self._project(interface, strips, self._at_points(interface, strips, x))
-        return {"strips": strips, "active": (gaps < 0) & (sums < 0)}
+        sums, mass = self._integrals(interface, strips, self._at_points(interface, strips, x))
+        covered = np.flatnonzero(mass.diagonal() > 0)
+        active = np.zeros(interface.n_slave_nodes, bool)
+        if (sums < 0).any():
+            # Shapes of one size, however little of a node is covered, and forces of one size in any unit.
+            scale, size = np.sqrt(mass.diagonal()[covered]), np.abs(sums).max()
+            factor = np.linalg.cholesky(mass[np.ix_(covered, covered)] / np.outer(scale, scale))
+            fit, _ = nnls(factor.T, np.linalg.solve(factor, -sums[covered] / size / scale))
+            active[covered] = fit > 0
+        return {"strips": strips, "active": active}
 
     def _at_points(self, interface: Any, strips: Any, x: Any) -> Any:
         """Return gap, s, t, weight (..., n, 2) and normal (..., n, 2) of the points of each strip."""
@@ -59,8 +66,8 @@ class NodalLeastSquares:
         gap = -(dot(first - a, normal)[..., None] + t * dot(second - first, normal)[..., None])
         return gap, s, t, ((high - low) * size)[..., None] * WEIGHTS, normal
 
-    def _project(self, interface: Any, strips: Any, points: Any) -> Any:
-        """Return ∫N g and the projected gaps (..., n_slave_nodes); 0 at nodes that see nothing."""
+    def _integrals(self, interface: Any, strips: Any, points: Any) -> Any:
+        """Return ∫N g (..., n_slave_nodes) and M (..., n_slave_nodes, n_slave_nodes)."""
         gap, s, _, weight, _ = points
         n, ends = interface.n_slave_nodes, interface.slave.segments[strips[:, 0]]
         mass = np.zeros((*gap.shape[:-2], n, n), gap.dtype)
@@ -70,18 +77,24 @@ class NodalLeastSquares:
             np.add.at(sums, (..., ends[:, i]), (shapes[i] * weight * gap).sum(axis=-1))
             for j in range(2):
                 np.add.at(mass, (..., ends[:, i], ends[:, j]), (shapes[i] * shapes[j] * weight).sum(axis=-1))
-        diagonal = np.diagonal(mass, axis1=-2, axis2=-1)
-        covered = (diagonal.real > 0).all(axis=tuple(range(diagonal.ndim - 1)))
-        scale = np.sqrt(np.where(covered, diagonal, 1))  # Shapes of one size, however little of a node is covered.
-        scaled = np.where(covered[:, None] | covered, mass / scale[..., None] / scale[..., None, :], 0) + np.diag(
-            (~covered).astype(float)
-        )
-        return sums, np.linalg.solve(scaled, (sums / scale)[..., None])[..., 0] / scale
+        return sums, mass
+
+    def _pressures(self, interface: Any, pairing: Any, points: Any) -> Any:
+        """Return the nodal pressures (..., n_slave_nodes), 0 where a node is not active."""
+        sums, mass = self._integrals(interface, pairing["strips"], points)
+        nodes = np.flatnonzero(pairing["active"])
+        pressures = np.zeros_like(sums)
+        size = np.abs(np.diagonal(mass, axis1=-2, axis2=-1).real[..., nodes])
+        scale = np.sqrt(np.where(size > 0, size, 1))  # It cancels, and keeps digits where little is covered.
+        scaled = mass[..., nodes[:, None], nodes] / (scale[..., None] * scale[..., None, :])
+        fit = np.linalg.solve(scaled, (-sums[..., nodes] / scale)[..., None])[..., 0]
+        pressures[..., nodes] = self.penalty * fit / scale
+        return pressures
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         x, strips = z.reshape(*z.shape[:-1], -1, 2), pairing["strips"]
         points = self._at_points(interface, strips, x)
-        nodal = self.penalty * np.where(pairing["active"], self._project(interface, strips, points)[1], 0)
+        nodal = -self._pressures(interface, pairing, points)
         _, s, t, weight, normal = points
         slave, master = interface.slave.segments[strips[:, 0]], interface.master.segments[strips[:, 1]]
         pull = (1 - s) * nodal[..., slave[:, 0], None] + s * nodal[..., slave[:, 1], None]

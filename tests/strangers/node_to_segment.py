@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif import Promises, Rules, Traits
+from contactverif import Handle, Promises, Rules, Traits
 from strangers.closest import closest_segments
 
 
@@ -112,10 +112,22 @@ class NodesWithAreas:
 
 
 class NodesWithPotential(NodesWithAreas):
-    """Springs with areas of the reference: forces are the gradient of Σ ε̂ A g²/2, so the tangent is symmetric."""
+    """Springs with areas of the reference: forces are the gradient of Σ ε̂ A g²/2, so the tangent is symmetric.
+
+    All decisions are in a handle, as those of a library are.
+    """
 
     area = "reference"
     traits = NodesWithAreas.traits.revise(area="reference", symmetric=True)
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        return {"contacts": Handle(super().pair(interface, z))}
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return super().residual(interface, pairing.handle, z)
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return super().tangent(interface, pairing.handle, z)
 
 
 class NodesWithMultipliers:

@@ -114,22 +114,27 @@ class BothSidesHalved:
     """
 
     traits = SegmentPenalty.traits.revise(
-        area=None,
-        force_along=None,
-        integrates_linear_gap=None,
-        unbiased=True,
-        tangent=None,
-        batched=False,
-        takes_complex=False,
+        area=None, force_along=None, integrates_linear_gap=None, unbiased=True, tangent=None
     )
 
     def __init__(self, *, penalty: float) -> None:
         self.inner = SegmentPenalty(penalty=penalty / 2)
 
+    def _sides(self, interface: Interface) -> Any:
+        """Yield both choices of the slave: a prefix, the interface, and by how much the state is rolled."""
+        yield "slave ", interface, 0
+        yield "master ", interface.swap_roles(), 2 * interface.n_slave_nodes
+
+    def pair(self, interface: Interface, z: Any) -> Any:
+        return {
+            prefix + name: values
+            for prefix, each, shift in self._sides(interface)
+            for name, values in self.inner.pair(each, np.roll(z, -shift)).items()
+        }
+
     def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
         total = np.zeros_like(z)
-        n_slave = 2 * interface.n_slave_nodes
-        for each, shift in ((interface, 0), (interface.swap_roles(), n_slave)):
-            state = np.roll(z, -shift)
-            total += np.roll(self.inner.residual(each, self.inner.pair(each, state), state), shift)
+        for prefix, each, shift in self._sides(interface):
+            decisions = {name: pairing[prefix + name] for name in ("strips", "active")}
+            total += np.roll(self.inner.residual(each, decisions, np.roll(z, -shift, axis=-1)), shift, axis=-1)
         return total

@@ -56,7 +56,7 @@ class SmoothedNormals:
             counts = (gap[points, other] < 0) & (depth[points, other] <= depth.min(axis=1, initial=np.inf))
             load = np.where(counts, -self.penalty * gap[points, other] * weight, 0.0)
             load = load * (high - low)[number, other] * size
-            t = t[points, other]
+            t = np.where(counts, t[points, other], 0.0)
             shares = ((slave[number], 1 - s, s), (master[other], t - 1, -t))
             for ends, first, second in shares:
                 np.add.at(forces, ends[:, 0], (first * load)[:, None] * n)

@@ -5,7 +5,7 @@ lie behind one another, a strip sees the nearest. A strip is a row of integers, 
 """
 
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,29 +23,42 @@ def visible_strips(slave: Any, master: Any, x: Any) -> Any:
 
     `slave` and `master` are the nodes (n, 2) of segments. −1 in place of a node stands for an end of the slave segment.
     """
-    strips = [strip for number in range(len(slave)) for strip in _strips_of(number, slave[number], master, x)]
+    a = x[slave[:, 0]][:, None, None]
+    along = x[slave[:, 1]][:, None, None] - a
+    offset = x[master] - a  # (n_slave, n_master, 2, 2)
+    places, heights = dot(offset, along) / dot(along, along), cross(along, offset)
+    first, second = places[..., 0], places[..., 1]  # A master segment that faces the slave runs the other way.
+    candidates: list[list[Candidate]] = [[] for _ in slave]
+    for number, segment in np.argwhere((second < first) & (second < 1) & (first > 0)).tolist():
+        ends = zip(master[segment].tolist(), places[number, segment].tolist(), strict=True)
+        candidates[number].append(Candidate(segment, tuple(ends), heights[number, segment].tolist()))
+    strips = [strip for number, seen in enumerate(candidates) for strip in _strips_of(number, seen)]
     return np.array(strips, dtype=np.int64).reshape(-1, 4)
 
 
-def _strips_of(number: int, ends: Any, master: Any, x: Any) -> list[list[int]]:
-    a, along = x[ends[0]], x[ends[1]] - x[ends[0]]
-    offset = x[master] - a
-    places, heights = dot(offset, along) / dot(along, along), cross(along, offset)
-    second, first = places[:, 1], places[:, 0]  # A master segment that faces the slave runs the other way.
-    candidates = np.flatnonzero((second < first) & (second < 1) & (first > 0))
-    marks = {0.0: -1, 1.0: -1}
-    for segment in candidates:
-        marks.update({place: int(node) for place, node in zip(places[segment], master[segment], strict=True)
-                      if 0 < place < 1})  # fmt: skip
-    cuts = sorted(marks)
+class Candidate(NamedTuple):
+    """A master segment that faces a slave segment: (node, place) of its ends, and their heights."""
+
+    segment: int
+    ends: tuple[tuple[int, float], ...]
+    heights: list[float]
+
+    def height(self, place: float) -> float:
+        (_, first), (_, second) = self.ends
+        share = (place - first) / (second - first)
+        return (1 - share) * self.heights[0] + share * self.heights[1]
+
+
+def _strips_of(number: int, candidates: list[Candidate]) -> list[list[int]]:
+    marks = {place: node for each in candidates for node, place in each.ends if 0 < place < 1}
+    marks |= {0.0: -1, 1.0: -1}
     strips: list[list[int]] = []
-    for low, high in pairwise(cuts):
+    for low, high in pairwise(sorted(marks)):
         middle = (low + high) / 2
-        over = candidates[(second[candidates] <= middle) & (middle <= first[candidates])]
-        if not len(over):
+        over = [each for each in candidates if each.ends[1][1] <= middle <= each.ends[0][1]]
+        if not over:
             continue
-        share = (middle - first[over]) / (second[over] - first[over])
-        nearest = int(over[np.argmin(np.abs((1 - share) * heights[over, 0] + share * heights[over, 1]))])
+        nearest = min((abs(each.height(middle)), each.segment) for each in over)[1]
         if strips and strips[-1][1] == nearest and strips[-1][3] == marks[low] != -1:
             strips[-1][3] = marks[high]
         else:
