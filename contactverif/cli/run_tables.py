@@ -82,9 +82,10 @@ def headline(provenance: Mapping[str, str]) -> str:
 
 def summary(run: Run) -> Text:
     """Say in the last lines whether every promise is kept, and how many there are, or what is wrong."""
+    if run.promises_kept:
+        return Text(f"{run.praise}\n{run.promises}", style="green")
     signs = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
-    text = conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
-    return text.append(f"\n{run.promises}") if run.promises_kept else text
+    return conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
 
 
 def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequence[str] = ()) -> Text:
@@ -95,11 +96,7 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequ
         names += not_loaded if result is Result.NOT_LOADED else []
         if names:
             sentences.append(f"{len(names)} {singular if len(names) == 1 else plural}: {'; '.join(names)}.")
-    if sentences:
-        return Text(" ".join(sentences), style="red")
-    if not rows:
-        return Text("Nothing was checked.", style="red")
-    return Text("Every promise is kept and every property was judged.", style="green")
+    return Text(" ".join(sentences) or "Nothing was checked.", style="red")
 
 
 def _name(row: Row) -> str:

@@ -343,6 +343,14 @@ class Run:
         return sum(row.result in results for row in self.rows)
 
     @property
+    def praise(self) -> str:
+        """What to say of a run whose promises are kept; what stayed undecided was not judged."""
+        names = [f"{row.formulation} {row.property_id}" for row in self.rows if row.result is Result.UNDECIDED]
+        if not names:
+            return "Every promise is kept and every property was judged."
+        return f"Every promise that was judged is kept. Undecided: {'; '.join(names)}."
+
+    @property
     def promises(self) -> str:
         """The numbers of rows by promise, in a sentence; a property that makes no sense for a formulation is none."""
         counts = Counter(row.promise for row in self.rows if row.verdict is not Verdict.NOT_APPLICABLE)

@@ -82,7 +82,7 @@ MISTAKES = [
     (["verify", "nts", "-p", "patch.*", "-p", "pach.*"], r"property: found 'pach.\*'; needed .*"),
     (["verify", "nts", "--known", "purity"], r"--known: found 'purity'; needed ID=REASON, .*"),
     (["verify", "nts", "--known", "=why"], r"--known: found '=why'; needed ID=REASON, .*"),
-    (["verify", "nts", "--known", "puritty=why"], r"--known: found 'puritty'; needed .* nearest: purity"),
+    (["verify", "nts", "--known", "puritty=why"], r"--known: found 'puritty'; needed .* nearest: purity, purity.long"),
     (["verify", "nts", "-p", "patch.*", "--known", "purity=why"], r"--known: found 'purity'; needed .*patch.flat.*"),
     (["verify", "nts", "--profile", "nigthly"], r"--profile: found 'nigthly'; needed .* nearest: nightly"),
     (["verify", "nts", "--examples", "0"], r"--examples: found 0; needed at least 1, at most 1000000000"),

@@ -61,3 +61,11 @@ def test_what_makes_no_sense_for_a_formulation_is_no_promise(ask: Ask) -> None:
     answer = ask("verify", "nts", "nts-lm", *OPTIONS)
     assert answer.status == 0
     assert answer.out.endswith("\nProperties promised to pass: 1, to fail: 4, neither: 0.\n")
+
+
+def test_nobody_says_that_all_was_judged_where_something_is_undecided(ask: Ask) -> None:
+    """On scene c a kink is so near that the order of Newton's method cannot be told."""
+    answer = ask("verify", "vts-ppt-balanced", "--scene", "c", "-p", "newton.*", "--seed", "1")
+    assert answer.status == 0
+    assert "\nEvery promise that was judged is kept. Undecided: vts-ppt-balanced newton.order.\n" in answer.out
+    assert "every property was judged" not in answer.out

@@ -98,7 +98,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
 def headline(run: Run) -> str:
     """Say in one line how the run came out."""
     if run.promises_kept:
-        return f"Every promise is kept and every property was judged. {run.promises}"
+        return f"{run.praise} {run.promises}"
     counts = (
         ("formulation with the opposite sign", "formulations with the opposite sign", len(run.opposite_signs)),
         ("broken promise", "broken promises", run.count(Result.BROKEN_PROMISE)),
