@@ -168,7 +168,13 @@ def _traits(inner: Traits) -> Traits:
         witnesses |= {"multipliers": "a1", "stability.inf-sup": "matching"}
         if inner.rules.penalty == "nodal" and inner.promises.conserves_force and inner.promises.conserves_moment:
             passes = kinked = True
+    # The second pass of a formulation that prefers no side reports each of its points once more, so that no length is
+    # stated that weights add up to.
+    penalty = inner.rules.penalty
+    if inner.promises.unbiased and penalty == "distributed":
+        penalty = None
     return inner.revise(
+        penalty=penalty,
         flat=passes,
         normal=passes if passes or inner.promises.patch.normal is not None else None,
         single=passes if passes or inner.promises.patch.single is not None else None,

@@ -276,3 +276,13 @@ def test_on_matching_meshes_half_of_them_are_too_many() -> None:
     trace = solve_scene("two-pass/nts-lm", MATCHING)
     assert error_of(trace) < ROUNDOFF
     assert (len(trace.multipliers), trace.deficiency) == (8, 4)
+
+
+def test_two_passes_state_less_where_the_second_pass_shows_more() -> None:
+    """Nodes enter past ends, points of two sides are reported twice, and two exact passes are exact on a kink."""
+    half_passes, nodal = (load_subject(f"two-pass/{name}").traits for name in ("mortar-two-half-pass", "two-pass/nts"))
+    assert (half_passes.rules.penalty, nodal.rules.penalty) == (None, "nodal")
+    smooth = [load_subject(f"two-pass/{name}").traits.promises.continuity for name in ("mortar", "chen-hisada", "nts")]
+    assert smooth == ["C0", None, "jumps"]
+    kinked = [load_subject(f"two-pass/{name}").traits.promises.patch.kinked for name in ("sts", "nts-ar", "nts-lm")]
+    assert kinked == [None, False, True]
