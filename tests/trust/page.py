@@ -5,10 +5,12 @@ from collections import defaultdict
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from option_names import is_pair
+from options import SEED, SLOW
 from tables import COMMITS, FOLDER, SURVIVES, UNKNOWN, read
 
 PAGE, FIGURE = "README.md", "kills.svg"
-_TABLES = ("campaign.csv", "kills.csv", "smallest_cases.csv", "smallest_errors.csv")
+_TABLES = ("campaign.csv", "options.csv", "kills.csv", "smallest_cases.csv", "smallest_errors.csv")
 COUNTS = ("cases", "accusations", "undecided", "idle")
 
 INTRODUCTION = """# Trust
@@ -25,6 +27,16 @@ largest number over its tolerance in a case that passes, and the formulation tha
 In *idle* cases nothing is in contact. The campaign has random cases alone: no scene with a name, such as those of the
 paper, and no finite list, such as those of `hard.*` and `accuracy.*`. These are the same for every seed, and the tests
 ask them.
+
+"""
+OPTIONS = """## Every option of every formulation
+
+{formulations} names of built-in formulations, each option with each of its words or numbers and {pairs} pairs of them,
+were asked every property: {cases:,} cases, random ones with seed {seed} and all named ones. Options and words are read
+from the factories themselves. {accusations} An accusation is a promise that is broken, a statement to fail that is not
+true, a crash, or a breach of the contract. Pairs of options are not asked about long lists of scenes ({slow}). The
+table has the formulations by name, and how many of their variants were asked. *Not judged* counts the rows in which too
+few cases touch or are decided, and names the properties.
 
 """
 KILLS = """## Who catches whom
@@ -139,6 +151,48 @@ def campaign() -> str:
     return text + table(["property", "cases", "accused", "undecided", "idle", "nearest", "by"], lines)
 
 
+def option_rows() -> list[Row]:
+    """Return the rows of all formulations with their options."""
+    return read("options.csv")
+
+
+def base_name(formulation: str) -> str:
+    """Return a formulation's name without its options; what a wrapper wraps is left out, too."""
+    outer, slash, _ = formulation.partition("/")
+    return outer.partition(":")[0] + slash
+
+
+def options() -> str:
+    """Return the part about options."""
+    rows, groups = option_rows(), defaultdict[str, list[Row]](list)
+    for row in rows:
+        groups[base_name(row["formulation"])].append(row)
+    n_accused = sum(int(row["accusations"]) for row in rows)
+    accused = "; ".join(f"`{row['formulation']}`, {row['accused']}" for row in rows if row["accused"])
+    text = OPTIONS.format(
+        formulations=len(rows),
+        pairs=sum(is_pair(row["formulation"]) for row in rows),
+        cases=sum(int(row["cases"]) for row in rows),
+        seed=SEED,
+        accusations=f"There are {n_accused} accusations: {accused}." if accused else "Nobody was accused.",
+        slow=", ".join(f"`{name}`" for name in SLOW),
+    )
+    lines = []
+    for name, members in groups.items():
+        heads = [text.partition(":")[0] for row in members for text in row["not judged"].split("; ")]
+        open_rows = [head for head in heads if head and " " not in head]  # Else it is a part of a reason.
+        properties = dict.fromkeys(open_rows)
+        undecided = sum(int(row["undecided"]) for row in members)
+        counts = (
+            len(members),
+            sum(int(row["cases"]) for row in members),
+            sum(int(row["accusations"]) for row in members),
+        )
+        cells = [*map(str, (*counts, undecided, len(open_rows))), ", ".join(f"`{each}`" for each in properties)]
+        lines.append([f"`{name}{'…' if name.endswith('/') else ''}`", *cells])
+    return text + table(["formulation", "variants", "cases", "accused", "undecided", "not judged", "in"], lines)
+
+
 def kills() -> str:
     """Return the part about formulations that are wrong."""
     ids, rows, survivors = kill_rows()
@@ -198,7 +252,7 @@ def page() -> str:
     commits = ", ".join(
         f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in _TABLES
     )
-    return INTRODUCTION.format(commits=commits) + "\n".join([campaign(), kills(), small_cases(), smallest()])
+    return INTRODUCTION.format(commits=commits) + "\n".join([campaign(), options(), kills(), small_cases(), smallest()])
 
 
 def draw() -> None:

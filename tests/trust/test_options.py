@@ -1,0 +1,39 @@
+"""A few random cases of every built-in formulation with every option; `tox -e trust` asks each of them everything."""
+
+from functools import cache
+
+import pytest
+from option_names import all_variants
+from subjects import load_property, load_subject
+
+from contactverif import Case, Verdict, judge_case
+from contactverif.run.draw import draw_cases
+
+# Properties that solve nothing, and have hardly an idle or an undecided case.
+QUICK = (
+    *("balance.force", "balance.moment", "mirror", "objectivity", "projection.forces", "purity", "renumbering"),
+    *("scaling", "swap", "symmetric", "unilateral", "nodal-push", "stability.translation", "tangent.sparsity"),
+)
+EXAMPLES, EACH = 2, 3  # Random cases of a property; properties for each name, in rotation.
+
+
+@cache
+def cases_of(property_id: str) -> tuple[Case, ...]:
+    return tuple(draw_cases(load_property(property_id).cases(None), seed=1, examples=EXAMPLES).cases)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_a_formulation_with_an_option_keeps_its_promises(part: int) -> None:
+    accused = []
+    for number, name in list(enumerate(all_variants()))[part::4]:
+        subject = load_subject(name)
+        for property_id in (QUICK[(EACH * number + each) % len(QUICK)] for each in range(EACH)):
+            question = load_property(property_id)
+            if question.refusal(subject.traits) or question.needs - subject.provides:
+                continue
+            for case in cases_of(property_id):
+                outcome = judge_case(question, case, subject)
+                broken = question.promise(subject.traits) is True and outcome.verdict is Verdict.FAIL
+                if broken or outcome.breach or outcome.verdict is Verdict.CRASHED:
+                    accused.append(f"{name}, {property_id}: {outcome.reason}")
+    assert not accused
