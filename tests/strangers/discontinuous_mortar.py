@@ -72,7 +72,8 @@ class DiscontinuousMortar:
         along = x[..., slave[:, 1], :] - a
         to_first, to_second = x[..., master[:, 0], :] - a, x[..., master[:, 1], :] - a
         square = dot(along, along)
-        t = (s * square[..., None] - dot(to_first, along)[..., None]) / dot(to_second - to_first, along)[..., None]
+        run = x[..., master[:, 1], :] - x[..., master[:, 0], :]
+        t = (s * square[..., None] - dot(to_first, along)[..., None]) / dot(run, along)[..., None]
         size = np.sqrt(square)
         gap = -((1 - t) * cross(along, to_first)[..., None] + t * cross(along, to_second)[..., None]) / size[..., None]
         share = ((end - start) / (high - low)[..., part] / 2)[..., None]  # Of the part's length, for each point

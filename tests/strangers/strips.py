@@ -28,8 +28,9 @@ def visible_strips(slave: Any, master: Any, x: Any) -> Any:
     offset = x[master] - a  # (n_slave, n_master, 2, 2)
     places, heights = dot(offset, along) / dot(along, along), cross(along, offset)
     first, second = places[..., 0], places[..., 1]  # A master segment that faces the slave runs the other way.
+    faces = (second < first) & (dot(x[master[:, 1]] - x[master[:, 0]], along[:, 0]) < 0)
     candidates: list[list[Candidate]] = [[] for _ in slave]
-    for number, segment in np.argwhere((second < first) & (second < 1) & (first > 0)).tolist():
+    for number, segment in np.argwhere(faces & (second < 1) & (first > 0)).tolist():
         ends = zip(master[segment].tolist(), places[number, segment].tolist(), strict=True)
         candidates[number].append(Candidate(segment, tuple(ends), heights[number, segment].tolist()))
     strips = [strip for number, seen in enumerate(candidates) for strip in _strips_of(number, seen)]
