@@ -208,8 +208,8 @@ BROKEN, NOT_FAILING = "promised to pass, but fails", "stated to fail, but passes
         ("vts_ppt", PATCH, {"flat": False, "witnesses": {PATCH: "c"}}, NOT_FAILING),
         ("vts_ppt_balanced", FORCE, {"conserves_force": False, "witnesses": {FORCE: "tilted"}}, NOT_FAILING),
         ("vts_me", TANGENT, {"tangent": "approximate", "witnesses": {TANGENT: "offset-c"}}, NOT_FAILING),
-        ("vts_ppt", PATCH, {"flat": False, "witnesses": {}}, "crashed"),
-        ("vts_ppt", PATCH, {"flat": False, "witnesses": {PATCH: "no such case"}}, "crashed"),
+        ("vts_ppt", PATCH, {"flat": False, "witnesses": {}}, "wrong traits"),
+        ("vts_ppt", PATCH, {"flat": False, "witnesses": {PATCH: "no such case"}}, "wrong traits"),
     ],
 )
 def test_a_promise_that_is_not_true_is_found_out(

@@ -28,6 +28,7 @@ STYLES = {  # Red only where the run fails by it. What a formulation states abou
     Result.FAIL: "magenta",
     Result.BROKEN_PROMISE: "bold red",
     Result.CRASHED: "red",
+    Result.WRONG_TRAITS: "red",
     Result.NOT_LOADED: "red",
     Result.NOT_JUDGED: "yellow",
     Result.UNDECIDED: "yellow",

@@ -33,6 +33,7 @@ _MEANINGS = {  # The results that are explained below the table where they occur
     Result.FAILS_AS_STATED: "the formulation states itself that it fails here, or --known lists it",
     Result.BROKEN_PROMISE: "the formulation does not do what it states",
     Result.CRASHED: "the plugin raised an exception",
+    Result.WRONG_TRAITS: "a mistake in the traits: they state a failure, and name no case that shows it (a witness)",
     Result.UNDECIDED: "roundoff or a kink leaves open whether it passes; the reason stands beside it",
     Result.NOT_JUDGED: "fewer than 90 % of the planned cases could be decided, or too few were in contact",
     Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
@@ -42,6 +43,7 @@ _MOST_NAMES = 6  # Named cases that a remark lists.
 _COUNTED = {  # {result: (words for one, words for several)} in the last line
     Result.BROKEN_PROMISE: ("broken promise", "broken promises"),
     Result.CRASHED: ("crash", "crashes"),
+    Result.WRONG_TRAITS: ("mistake in the traits", "mistakes in the traits"),
     Result.NOT_JUDGED: ("property not judged", "properties not judged"),
     Result.NOT_LOADED: ("plugin not loaded", "plugins not loaded"),
 }

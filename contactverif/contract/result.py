@@ -32,6 +32,8 @@ JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its 
 BROKEN_BY_FAILING = "promised to pass, but fails"
 BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"
+WRONG_TRAITS = "wrong traits"
+OF_TRAITS = "traits: "  # The beginning of the reason of a row whose traits name no witness that can be judged.
 OPPOSITE_SIGN = (
     "your forces have the opposite sign: contact must push the slave along the master's outward normal; "
     "see docs/concepts/signs.md"
@@ -46,6 +48,7 @@ class Result(StrEnum):
     FAILS_AS_STATED = "fails as stated"
     BROKEN_PROMISE = "BROKEN PROMISE"
     CRASHED = "crashed"
+    WRONG_TRAITS = "wrong traits"
     UNDECIDED = "undecided"
     NOT_JUDGED = "not judged"
     NOT_APPLICABLE = "not applicable"
@@ -243,11 +246,16 @@ class Row:
         return self.outcomes[self.closest.case].case_or_summary.name
 
     @property
+    def traits_are_wrong(self) -> bool:
+        """Return whether nothing was judged, since the traits state a failure and name no case that shows it."""
+        return self.verdict is Verdict.CRASHED and self.reason.startswith(OF_TRAITS)
+
+    @property
     def unexpected(self) -> str:
         """The reason why this row makes the run fail; empty if it does not."""
         match self.verdict:
             case Verdict.CRASHED:
-                return "" if self.known else "crashed"
+                return "" if self.known else WRONG_TRAITS if self.traits_are_wrong else "crashed"
             case Verdict.NOT_JUDGED:
                 return NOT_JUDGED
             case Verdict.FAIL if not self.known:
@@ -268,7 +276,7 @@ class Row:
         failed = self.verdict in (Verdict.FAIL, Verdict.CRASHED)
         if failed and not self.unexpected and (self.promise is False or self.known):
             return Result.FAILS_AS_STATED
-        return Result[self.verdict.name]
+        return Result.WRONG_TRAITS if self.traits_are_wrong else Result[self.verdict.name]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

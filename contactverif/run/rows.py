@@ -18,7 +18,7 @@ from typing import overload
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.result import NotLoaded, Row, Run
+from contactverif.contract.result import OF_TRAITS, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.isolation.remote_formulation import count_ends
 from contactverif.problems.named_states import named_case
@@ -262,7 +262,7 @@ def _with_witness(row: OpenRow) -> OpenRow | Row:
     try:
         witness = find_witness(row.subject, row.question, row.listed or ()) if row.row.promise is False else None
     except MisuseError as error:
-        return replace(row.row, verdict=Verdict.CRASHED, reason=f"traits: {error}")
+        return replace(row.row, verdict=Verdict.CRASHED, reason=f"{OF_TRAITS}{error}")
     row.set_witness(witness)
     return row
 

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_info
 from contactverif import Case, Interface, MisuseError, Outcome, Property, Subject, Verdict, judge_case
 from contactverif.contract.counterexample import Origin, counterexamples
 from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.result import NotLoaded, Row, Run
+from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.traits import Traits
 from contactverif.run.profiles import PROFILES
 from contactverif.run.run import run
@@ -390,7 +390,7 @@ def test_a_failure_of_the_witness_alone_keeps_the_promise_and_is_not_shrunk() ->
 @pytest.mark.usefixtures("witnesses")
 def test_a_promise_to_fail_needs_a_witness(named: dict[str, str], reason: str) -> None:
     row = one_row(subject(from_size(2), flat=False, witnesses=named))
-    assert (row.verdict, row.unexpected) == (Verdict.CRASHED, "crashed")
+    assert (row.verdict, row.result, row.unexpected) == (Verdict.CRASHED, Result.WRONG_TRAITS, "wrong traits")
     assert row.reason.startswith(reason)
 
 

@@ -40,6 +40,7 @@ MARKS: dict[Verdict | Result, str] = {
     Verdict.NOT_JUDGED: "?",
     Result.FAILS_AS_STATED: "✗",
     Result.BROKEN_PROMISE: "✗",
+    Result.WRONG_TRAITS: "✗✗",
 }
 _SVG = "{http://www.w3.org/2000/svg}"
 _HREF = "{http://www.w3.org/1999/xlink}href"

@@ -103,6 +103,7 @@ def headline(run: Run) -> str:
         ("formulation with the opposite sign", "formulations with the opposite sign", len(run.opposite_signs)),
         ("broken promise", "broken promises", run.count(Result.BROKEN_PROMISE)),
         ("crash", "crashes", sum(row.result is Result.CRASHED for row in run.unexpected)),
+        ("mistake in the traits", "mistakes in the traits", run.count(Result.WRONG_TRAITS)),
         ("property not judged", "properties not judged", run.count(Result.NOT_JUDGED)),
         ("plugin not loaded", "plugins not loaded", len(run.not_loaded)),
     )

@@ -69,7 +69,7 @@ def _counts(run: Run) -> dict[str, int]:
         "n_failed": run.count(Result.FAIL),
         "n_failed_as_stated": run.count(Result.FAILS_AS_STATED),
         "n_broken_promises": run.count(Result.BROKEN_PROMISE),
-        "n_crashed": run.count(Result.CRASHED),
+        "n_crashed": run.count(Result.CRASHED, Result.WRONG_TRAITS),
         "n_not_judged": run.count(Result.NOT_JUDGED, Result.UNDECIDED),
         "n_not_applicable": run.count(Result.NOT_APPLICABLE),
         "n_not_provided": run.count(Result.NOT_PROVIDED),
