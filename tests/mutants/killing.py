@@ -3,6 +3,7 @@
 from functools import cache
 
 from mutate import Mutant
+from without_points import CAUGHT_BY, count_points, take_points_away
 
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
 from contactverif.run.draw import Sampling, draw_cases
@@ -48,10 +49,23 @@ def caught_at(question: Property, subject: Subject, examples: int | None) -> int
     return 0
 
 
-def first_kill(mutant: Mutant) -> int:
-    """Return `caught_at` of the property that is meant to catch a mutant."""
-    (question,) = (question for question in properties() if question.id == mutant.caught_by)
-    return caught_at(question, Subject(mutant.name, mutant.make), None)
+def property_named(property_id: str) -> Property:
+    """Return the installed property of an id."""
+    (question,) = (question for question in properties() if question.id == property_id)
+    return question
+
+
+def first_kill(mutant: Mutant) -> tuple[int, bool]:
+    """Return `caught_at` of the property that is meant to catch a mutant, and whether it looked at contact points."""
+    calls: list[None] = []
+    number = caught_at(property_named(mutant.caught_by), Subject(mutant.name, count_points(mutant.make, calls)), None)
+    return number, bool(calls)
+
+
+def first_kill_without_points(mutant: Mutant) -> int:
+    """Return `caught_at` of a mutant without contact points, of its property or of the one that `CAUGHT_BY` names."""
+    question = property_named(CAUGHT_BY.get(mutant.name, mutant.caught_by))
+    return caught_at(question, Subject(mutant.name, take_points_away(mutant.make)), None)
 
 
 def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:

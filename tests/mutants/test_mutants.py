@@ -4,9 +4,19 @@ import json
 from collections.abc import Callable
 
 import pytest
-from killing import KEY, OTHERS_FOR_A_SURVIVOR, as_lines, cases, first_kill, kills, properties
+from killing import (
+    KEY,
+    OTHERS_FOR_A_SURVIVOR,
+    as_lines,
+    cases,
+    first_kill,
+    first_kill_without_points,
+    kills,
+    properties,
+)
 from mutate import Mutant, changed_line
 from subjects import load_property, load_subject
+from without_points import CAUGHT_BY, RIGHT_WITHOUT, reports_alone
 from wrong import MUTANTS, SURVIVORS
 
 from contactverif import Subject, Verdict, judge_case
@@ -22,9 +32,19 @@ def mutant_named(name: str) -> Mutant:
 def test_the_mutant_is_caught_by_the_property_that_is_meant_to(
     mutant: Mutant, record_property: Callable[[str, object], None]
 ) -> None:
-    number = first_kill(mutant)
+    number, looks_at_points = first_kill(mutant)
     record_property(KEY, json.dumps([mutant.name, mutant.caught_by, number]))
     assert number, f"survives; caught by {[name for name, case in kills(mutant).items() if case]}"
+    if looks_at_points:
+        survives = mutant.name in RIGHT_WITHOUT or reports_alone(mutant)
+        assert bool(first_kill_without_points(mutant)) is not survives, "without contact points"
+
+
+def test_each_remark_on_mutants_without_points_is_about_one_of_them() -> None:
+    remarks = [*CAUGHT_BY, *RIGHT_WITHOUT]
+    assert set(remarks) <= {mutant.name for mutant in MUTANTS}
+    assert len(set(remarks)) == len(remarks)
+    assert not [name for name in remarks if reports_alone(mutant_named(name))]
 
 
 @pytest.mark.parametrize("mutant", SURVIVORS, ids=lambda mutant: mutant.name)
