@@ -21,7 +21,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.problems.line_pressure import LinePressure, layer_contact
 
-_ROUNDED = 1 - 1e-9  # A layer that counts for nothing leaves the digits of a solution.
+_ROUNDED = 1 - 1e-7  # The least half-width over that without a layer, or without half-planes: roundoff may lower it.
 
 
 def half_width(force: float, radius: float, stiffness: float) -> float:
@@ -50,7 +50,8 @@ def solve_winkler_contact(force: float, radius: float, stiffness: float, penalty
     """Solve Hertz on a Winkler layer for the force F > 0 per unit of thickness.
 
     The equation is p/ε̂ − (2/πE*) ∫ p(s) ln|x − s| ds = δ − x²/2R in contact, and p = 0 at its edge: there the layer is
-    not pressed any more. It is solved to 1e-10 for a given half-width; the half-width is the one that carries F.
+    not pressed any more. It is solved to 1e-10 for a given half-width, or to 1e-8 if E*/(ε̂ a) is below 1e-8. The
+    half-width is the one that carries F.
     """
 
     def missing(half_width: float) -> float:

@@ -31,7 +31,7 @@ TERMS = 16  # Number of Legendre polynomials on a panel: a root or a logarithm o
 _HERTZ_LEVELS = 40
 # The last panel is this share of the boundary layer E*/ε̂: what is left of d² ln d there is below 1e-10 of the peak.
 _LAST_PANEL = 2.0**-18
-_MOST_LEVELS = 48  # Shorter panels at the edge x = a are not told apart from roundoff of a.
+_MOST_LEVELS = 40  # Places on shorter panels at the edge x = a have few digits. With 2^-40 some 1e-9 are left.
 # One line load stands for the strip of this share of a next to each edge. Its error is that share squared, times the
 # share 3e-5 of the force.
 _EDGE_STRIP = 2.0**-10

@@ -81,10 +81,10 @@ def test_a_stiff_layer_lowers_the_peak_of_a_given_force(ratio: float, shortfall:
     assert (1 - pressure.peak / rigid.peak) / ratio == pytest.approx(shortfall, abs=1e-3)
 
 
-@pytest.mark.parametrize("layer", [1e-9, 1e-12])
-def test_a_layer_thinner_than_roundoff_is_that_of_hertz(layer: float) -> None:
+@pytest.mark.parametrize("layer", [1e-12, 1e-15])
+def test_a_layer_that_counts_for_nothing_leaves_the_pressure_of_hertz(layer: float) -> None:
     pressure, rigid = layer_contact(1.0, RADIUS, 1.0, 1 / layer), hertz_contact(1.0, RADIUS, 1.0)
-    assert pressure.force == pytest.approx(rigid.force, rel=1e2 * layer + 1e-10)
+    assert abs(pressure.force / rigid.force - 1) <= 1e-8
 
 
 def test_a_stiffer_layer_comes_nearer_to_hertz() -> None:
