@@ -23,35 +23,20 @@ K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache, partial
-from itertools import product
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
 from math import ceil, gcd, log1p, sqrt
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.body import Body
-from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import grade
 from contactverif.problems.half_plane import displacements, side_forces, surface_displacements
 from contactverif.problems.line_pressure import LinePressure, hertz_contact, layer_contact
-from contactverif.problems.problem import (
-    FORCES,
-    ITERATIONS,
-    MOTIONS,
-    PRESSURE,
-    Bound,
-    Errors,
-    Problem,
-    ProblemInstance,
-    Studies,
-)
 
 # Lengths over the half-width of the contact.
 SIDE, DEPTH = 4.0, 8.0
@@ -218,7 +203,7 @@ def _exact_displacements(box: HertzBox, penalty: float | None, number: int, plac
     return freeze(moves, np.float64)
 
 
-def _number(side: str, parabola_is_slave: bool) -> int:
+def body_number(side: str, parabola_is_slave: bool) -> int:
     """Return the number of the body, parabola (0) or flat (1), that is the slave or the master."""
     return 0 if (side == "slave") == parabola_is_slave else 1
 
@@ -230,7 +215,7 @@ def exact_forces(
     pressure, forces = box.pressure(penalty), np.zeros(positions.shape)
     for side, nodes in _sides(interface):
         order = nodes[np.argsort(positions[nodes, 0])]
-        up = 1.0 if _number(side, parabola_is_slave) == 0 else -1.0
+        up = 1.0 if body_number(side, parabola_is_slave) == 0 else -1.0
         forces[order, 1] = up * pressure.nodal_forces(positions[order, 0])
     return forces
 
@@ -240,7 +225,7 @@ def exact_moves(box: HertzBox, penalty: float | None, scene: Scene, parabola_is_
     places = scene.interface.nodes
     moves = np.zeros(places.shape)
     for side, nodes in _sides(scene.interface):
-        number = _number(side, parabola_is_slave)
+        number = body_number(side, parabola_is_slave)
         moves[nodes] = exact_displacements(box, penalty, number, places[nodes, 0], across)
     return moves
 
@@ -249,149 +234,3 @@ def _sides(interface: Interface) -> tuple[tuple[str, IntArray], tuple[str, IntAr
     """Return the numbers of the slave's nodes and of the master's."""
     numbers, n_slave = np.arange(interface.n_nodes), interface.n_slave_nodes
     return ("slave", numbers[:n_slave]), ("master", numbers[n_slave:])
-
-
-BOX = HertzBox()
-PEAK, WIDTH = "peak", "half-width"  # Kinds of error
-MESHES = (COARSEST, 20, 26, 33)  # Numbers of the parabola's segments across the contact.
-# The penalties of studies: their stiffness, and whether that is ε̂ over E/a, the same on all meshes, or ε̂ over E/h.
-PENALTIES = {"layer": (1.0, True), "soft": (1.0, False), "stiff": (100.0, False)}
-
-
-@dataclass(frozen=True, slots=True)
-class HertzStudy:
-    """One choice of slave and penalty, on meshes of any fineness."""
-
-    parabola_is_slave: bool
-    stiffness: float  # The penalty ε̂ over E/h, with E and the segments h of the parabola
-    fixed: bool = False  # The stiffness is ε̂ over E/a instead, with the half-width a, the same on all meshes.
-
-    @property
-    def meshes(self) -> tuple[int, ...]:
-        """The numbers of the parabola's segments across the contact."""
-        return MESHES
-
-    def size(self, across: int) -> float:
-        """Return half the length of the parabola's segments over the half-width of the contact."""
-        return 1 / (across + 1 / 3)
-
-    def penalty(self, across: int) -> float:
-        """Return the penalty ε̂ on a mesh."""
-        length = BOX.half_width if self.fixed else 2 * BOX.half_width / (across + 1 / 3)
-        return self.stiffness * BOX.young[0] / length
-
-    def pose(self, across: int, traits: Traits) -> ProblemInstance:
-        """Return the problem on a mesh. With a penalty, Newton's method starts at the exact displacements."""
-        multipliers, role = traits.rules.enforcement == "multiplier", self.parabola_is_slave
-        penalty = self.penalty(across)
-        law = None if multipliers else penalty
-        scene = hertz_box(BOX, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
-        start, pressure = None, BOX.pressure(law)
-        if not multipliers:  # Exact gaps of multipliers are 0 and do not say what is in contact; penetration does.
-            start = scene.transformation.T @ exact_moves(BOX, law, scene, role, across).reshape(-1)
-
-        def motion(places: FloatArray) -> FloatArray:
-            return exact_displacements(BOX, law, _number("slave", role), places[:, 0], across)
-
-        forces = partial(exact_forces, BOX, law, scene.interface, role)
-        return ProblemInstance(
-            scene=scene,
-            forces=forces,
-            motions=(motion,),
-            pressure=lambda places: pressure.pressure(places[:, 0]),
-            pressure_scale=pressure.peak,
-            deformed=False,
-            further=partial(_shape_errors, forces(scene.interface.nodes)),
-            start=start,
-        )
-
-    def group(self, traits: Traits) -> str:
-        """Return the word of the penalty; multipliers are as stiff as can be."""
-        penalties = {penalty: word for word, penalty in PENALTIES.items()}
-        return "stiff" if traits.rules.enforcement == "multiplier" else penalties[self.stiffness, self.fixed]
-
-    @classmethod
-    def from_case(cls, case: Case) -> HertzStudy:
-        """Return the study that a case stands for."""
-        slave, stiffness, fixed = map(case.parameter, ("parabola_is_slave", "stiffness", "fixed"))
-        return cls(bool(slave), stiffness, bool(fixed))
-
-
-def _shape_errors(exact: FloatArray, solution: Solution) -> Errors:
-    """Return the errors of the largest pressure on the slave and of the width of the forces."""
-    interface = solution.interface
-    lengths = shape_integrals(interface.slave, interface.nodes)
-    numbers = [_peak_and_width(forces, interface.nodes, lengths) for forces in (solution.forces, exact)]
-    return {kind: abs(found / right - 1) for kind, found, right in zip((PEAK, WIDTH), *numbers, strict=True)}
-
-
-def _peak_and_width(forces: FloatArray, nodes: FloatArray, lengths: FloatArray) -> tuple[float, float]:
-    """Return the largest force over its node's length, and 2 √(Σ F x² / Σ F), which is a for Hertz' pressure."""
-    counted = lengths > 0
-    pushes = np.abs(forces[counted, 1])
-    total = pushes.sum()
-    width = 2 * np.sqrt(pushes @ nodes[counted, 0] ** 2 / total) if total > 0 else 0.0
-    return float((pushes / lengths[counted]).max()), float(width)
-
-
-@cache
-def hertz_cases() -> tuple[Case, ...]:
-    """Return six studies, each as the scene of its coarsest mesh: either body as the slave, three penalties."""
-    cases = []
-    for slave, (word, penalty) in product(("parabola", "flat"), PENALTIES.items()):
-        study = HertzStudy(slave == "parabola", *penalty)
-        role = study.parabola_is_slave
-        scene = hertz_box(BOX, penalty=study.penalty(COARSEST), parabola_is_slave=role, name=f"{slave}-{word}")
-        facts = {name: np.array(float(getattr(study, name))) for name in ("parabola_is_slave", "stiffness", "fixed")}
-        cases.append(replace(scene, facts=facts).case())
-    return tuple(cases)
-
-
-_ROOT = "The pressure's edge allows 1, and 1.5 on a layer of fixed stiffness; measured 0.97 and 1.28, at 100 E/h 0.86."
-_MEASURED = "Twice what formulations that pass the patch test have on the finest mesh."
-_RATES = {"layer": 1.1, "soft": 0.85, "stiff": 0.75}
-HERTZ_STUDIES = Studies(
-    cases=hertz_cases,
-    read=HertzStudy.from_case,
-    bounds=(
-        Bound(name="rate of slave forces", kinds=FORCES[:1], rate=True, limits=_RATES, reason=_ROOT),
-        Bound(name="rate of master forces", kinds=FORCES[1:], rate=True, limits=_RATES, reason=_ROOT),
-        Bound(
-            name="rate of reported pressures",
-            kinds=(PRESSURE,),
-            rate=True,
-            limits={"layer": 0.9, "soft": 0.65, "stiff": 0.65},
-            reason="As for forces; measured 0.78, on a layer 1.14.",
-        ),
-        *(
-            Bound(name=name, kinds=kinds, limits=dict(zip(PENALTIES, limits, strict=True)), reason=_MEASURED)
-            for name, kinds, limits in (
-                ("error of nodal forces", FORCES, (9e-3, 1.6e-2, 6e-2)),
-                ("error of reported pressures", (PRESSURE,), (8e-3, 2.5e-2, 3e-1)),
-                ("error of the peak", (PEAK,), (2.5e-3, 4e-3, 8e-3)),
-                ("error of the half-width", (WIDTH,), (3.5e-3, 5.5e-3, 7e-3)),
-                ("error of displacements", MOTIONS[:1], (4e-3, 6e-3, 6e-3)),
-            )
-        ),
-    ),
-    series={
-        "E_F of the slave": FORCES[0],
-        "E_F of the master": FORCES[1],
-        "reported pressures": PRESSURE,
-        "peak": PEAK,
-        "half-width": WIDTH,
-        "displacements": MOTIONS[0],
-        "iterations": ITERATIONS,
-    },
-    nearly=1e-4,  # Newton's method may alternate over a kink at an edge, where residuals are small.
-)
-
-
-HERTZ = Problem(
-    label="Hertz' contact in boxes",
-    unit="E/h",
-    meshes=(COARSEST, 22, 30, 42),
-    penalties=(1.0, 10.0, 100.0),
-    pose=lambda across, stiffness, traits: HertzStudy(True, stiffness).pose(across, traits),
-    rank=2,
-)

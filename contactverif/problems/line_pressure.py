@@ -92,6 +92,20 @@ class LinePressure:
         forces[:-1] += force - towards_second
         return forces
 
+    def linear_error(self, x: FloatArray) -> float:
+        """Return the L2 error of the best continuous function that is linear between ascending nodes x (n,).
+
+        It is over the L2 norm of the pressure. The nodes reach beyond the strip.
+        """
+        lengths, forces = np.diff(x), self.nodal_forces(x)
+        mass = np.diag((np.append(lengths, 0) + np.insert(lengths, 0, 0)) / 3)
+        mass += np.diag(lengths / 6, 1) + np.diag(lengths / 6, -1)
+        return self._error_of_best(float(forces @ np.linalg.solve(mass, forces)))
+
+    def constant_error(self, x: FloatArray) -> float:
+        """Return the same error of the best function that is constant between ascending nodes x (n,)."""
+        return self._error_of_best(float((np.diff(self.force_up_to(x)) ** 2 / np.diff(x)).sum()))
+
     def line_loads(self) -> tuple[FloatArray, FloatArray]:
         """Return places (n,) and forces (n,) of line loads that are as good as the pressure some way off.
 
@@ -117,6 +131,16 @@ class LinePressure:
     @property
     def _n_terms(self) -> int:
         return int(self.coefficients.shape[1])
+
+    @cached_property
+    def square(self) -> float:
+        """The integral ∫ p² ds."""
+        squares = (self.coefficients**2 / (np.arange(self._n_terms) + 0.5)).sum(axis=1)
+        return float(self.half_width * (self._halves @ squares))
+
+    def _error_of_best(self, square: float) -> float:
+        """Return the error of an orthogonal projection from its own ∫ p² ds."""
+        return float(np.sqrt(max(0.0, 1 - square / self.square)))
 
     @cached_property
     def _middles(self) -> FloatArray:

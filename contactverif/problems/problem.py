@@ -122,6 +122,9 @@ class Bound:
     limits: Mapping[str, float]  # {group of studies: limit}; the group "" is for all that are not named.
     reason: str
     rate: bool = False  # The number is a rate, which is at least the limit.
+    # A rate is asked only where the error on the finest mesh is above this multiple of the best approximation's error,
+    # and no error there is above its limit.
+    only_above: float = 0.0
     of_best: str = ""  # The formula of the best approximation's error, if the limit is a multiple of that
 
     @property
@@ -133,6 +136,22 @@ class Bound:
     def limit(self, group: str) -> float:
         """Return the limit for a group of studies."""
         return self.limits[group if group in self.limits else ""]
+
+    def is_reported(self, errors: Errors) -> bool:
+        """Return whether all errors that it needs are reported."""
+        return errors.keys() >= set(self.kinds)
+
+    def size(self, errors: Errors) -> float:
+        """Return the largest error on the finest mesh."""
+        return max(errors[kind] for kind in self.kinds)
+
+    def best(self, best: Mapping[str, float]) -> float:
+        """Return the error of the best approximation there, by which a limit is multiplied if `of_best` says so."""
+        return max(best[kind] for kind in self.kinds)
+
+    def tolerance(self, group: str, best: Mapping[str, float]) -> float:
+        """Return the tolerance for a group of studies on a finest mesh with these best approximations."""
+        return self.limit(group) * (self.best(best) if self.of_best else 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
