@@ -181,8 +181,12 @@ HERTZ_STUDIES = Studies(
             Bound(name=f"rate of {kind}", kinds=(kind,), rate=True, limits=_RATES, only_above=2.0, reason=_ROOT)
             for kind in FORCES
         ),
-        Bound(name="error of reported pressures", kinds=(PRESSURE,), limits=_WHOLE, of_best=" (P0 + facets)", reason=_P0),
-        Bound(name="error of the half-width", kinds=(WIDTH,), limits=_WHOLE, of_best=" h/a", reason="One slave segment."),
+        Bound(
+            name="error of reported pressures", kinds=(PRESSURE,), limits=_WHOLE, of_best=" (P0 + facets)", reason=_P0
+        ),
+        Bound(
+            name="error of the half-width", kinds=(WIDTH,), limits=_WHOLE, of_best=" h/a", reason="One slave segment."
+        ),
     ),
     series={
         "E_F of the slave": FORCES[0],
