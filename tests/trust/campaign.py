@@ -6,6 +6,8 @@ and the tests run it.
 """
 
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cache
 
 from every_formulation import FORMULATIONS
@@ -13,7 +15,7 @@ from expected_verdicts import FAILS
 from strangers import STRANGERS
 from tables import fill
 
-from contactverif import Subject, judge_case, load_formulation, load_properties
+from contactverif import Case, Subject, judge_case, load_formulation, load_properties
 from contactverif.contract.property import Property, Verdict, checked_numbers
 from contactverif.run.draw import draw_cases
 
@@ -39,36 +41,58 @@ def questions() -> dict[str, Property]:
     return {question.id: question for question in loaded if not isinstance(question.cases(None), tuple)}
 
 
-def count(key: str) -> list[str]:
-    """Return the cells of a line, whose key is the seed of a run's cases, such as "1/mirror".
+@dataclass
+class Count:
+    """What came of some cases, and the number that came nearest to its tolerance in one that passes, where it must."""
 
-    The nearest number is the largest over its tolerance in a case that passes, where it must.
-    """
-    seed, _, name = key.partition("/")
-    question = questions()[name]
-    examples = round(EXAMPLES[int(seed)] * (SOLVED if question.bodies else 1))
-    cases = draw_cases(question.cases(None), seed=key, examples=examples).cases
-    n_cases = n_undecided = n_idle = n_formulations = 0
-    nearest, formulation = 0.0, ""
-    accused: list[str] = []
-    for subject in right_formulations():
+    cases: int = 0
+    undecided: int = 0
+    idle: int = 0
+    nearest: float = 0.0
+    whose: str = ""
+    accused: list[str] = field(default_factory=list)
+
+    def ask(self, question: Property, cases: Sequence[Case], subject: Subject) -> None:
+        """Judge the cases, if the property makes sense for the formulation."""
         if question.refusal(subject.traits) or question.needs - subject.provides:
-            continue
-        n_formulations += 1
+            return
         promised = question.promise(subject.traits) is True
         for number, case in enumerate(cases, 1):
             outcome = judge_case(question, case, subject)
-            n_cases += 1
-            n_undecided += outcome.verdict is Verdict.UNDECIDED
-            n_idle += outcome.measurement is not None and outcome.measurement.idle
+            self.cases += 1
+            self.undecided += outcome.verdict is Verdict.UNDECIDED
+            self.idle += outcome.measurement is not None and outcome.measurement.idle
             if outcome.verdict is Verdict.CRASHED or outcome.breach or (promised and outcome.verdict is Verdict.FAIL):
-                accused.append(f"{subject.name}, case {number}: {outcome.reason}")
+                self.accused.append(f"{subject.name}, {question.id}, case {number}: {outcome.reason}")
             if promised and outcome.verdict is Verdict.PASS:
                 ratios = [number.ratio for number in checked_numbers(question.info, outcome.measurement)]
-                if max(ratios, default=0.0) > nearest:
-                    nearest, formulation = max(ratios), subject.name
-    numbers = [str(number) for number in (n_cases, len(accused), n_undecided, n_idle)]
-    return [*numbers, f"{nearest:.3g}", formulation, str(n_formulations), "; ".join(accused)]
+                if max(ratios, default=0.0) > self.nearest:
+                    self.nearest, self.whose = max(ratios), f"{subject.name}, {question.id}"
+
+    @property
+    def numbers(self) -> list[str]:
+        """The cells of a table, by `NUMBERS`."""
+        counts = (self.cases, len(self.accused), self.undecided, self.idle)
+        return [*map(str, counts), f"{self.nearest:.3g}"]
+
+
+def random_cases(question: Property, seed: str, examples: int) -> tuple[Case, ...]:
+    """Return random cases of a property; of those that solve bodies, a share."""
+    return draw_cases(
+        question.cases(None), seed=seed, examples=round(examples * (SOLVED if question.bodies else 1))
+    ).cases
+
+
+def count(key: str) -> list[str]:
+    """Return the cells of a line, whose key is the seed of a run's cases, such as "1/mirror"."""
+    seed, _, name = key.partition("/")
+    question = questions()[name]
+    cases, total, n_formulations = random_cases(question, key, EXAMPLES[int(seed)]), Count(), 0
+    for subject in right_formulations():
+        before = total.cases
+        total.ask(question, cases, subject)
+        n_formulations += total.cases > before
+    return [*total.numbers, total.whose.rpartition(", ")[0], str(n_formulations), "; ".join(total.accused)]
 
 
 if __name__ == "__main__":

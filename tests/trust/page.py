@@ -7,10 +7,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from option_names import is_pair
 from options import SEED, SLOW
+from strangers_campaign import EXAMPLES as STRANGER_EXAMPLES
+from strangers_campaign import SEEDS
 from tables import COMMITS, FOLDER, SURVIVES, UNKNOWN, read
 
 PAGE, FIGURE = "README.md", "kills.svg"
-_TABLES = ("campaign.csv", "options.csv", "kills.csv", "smallest_cases.csv", "smallest_errors.csv")
+_TABLES = ("campaign.csv", "strangers.csv", "options.csv", "kills.csv", "smallest_cases.csv", "smallest_errors.csv")
 COUNTS = ("cases", "accusations", "undecided", "idle")
 
 INTRODUCTION = """# Trust
@@ -27,6 +29,13 @@ largest number over its tolerance in a case that passes, and the formulation tha
 In *idle* cases nothing is in contact. The campaign has random cases alone: no scene with a name, such as those of the
 paper, and no finite list, such as those of `hard.*` and `accuracy.*`. These are the same for every seed, and the tests
 ask them.
+
+"""
+STRANGERS = """## Right formulations of strangers
+
+{formulations} formulations are written from papers and textbooks, and share no code with the plugins. Each was asked
+every property that makes sense for it: {examples} random cases of each with seeds {seeds}, or 5/12 as many where bodies
+are solved, and all named cases. {cases:,} cases, {accusations} accusations. *Nearest* is as above.
 
 """
 OPTIONS = """## Every option of every formulation
@@ -151,6 +160,29 @@ def campaign() -> str:
     return text + table(["property", "cases", "accused", "undecided", "idle", "nearest", "by"], lines)
 
 
+def stranger_rows() -> list[Row]:
+    """Return the rows of all seeds and formulations of strangers."""
+    return read("strangers.csv")
+
+
+def strangers() -> str:
+    """Return the part about right formulations of strangers."""
+    groups = defaultdict[str, list[Row]](list)
+    for row in stranger_rows():
+        groups[row["seed/formulation"].partition("/")[2]].append(row)
+    lines, sums = [], [0, 0]
+    for name, members in groups.items():
+        counts = [sum(int(row[count]) for row in members) for count in COUNTS]
+        sums = [sums[0] + counts[0], sums[1] + counts[1]]
+        nearest = max(members, key=lambda row: float(row["nearest"]))
+        lines.append([name, *map(str, counts), nearest["nearest"], f"`{nearest['property']}`"])
+    seeds = ", ".join(map(str, SEEDS))
+    text = STRANGERS.format(
+        formulations=len(groups), seeds=seeds, examples=STRANGER_EXAMPLES, cases=sums[0], accusations=sums[1]
+    )
+    return text + table(["formulation", "cases", "accused", "undecided", "idle", "nearest", "in"], lines)
+
+
 def option_rows() -> list[Row]:
     """Return the rows of all formulations with their options."""
     return read("options.csv")
@@ -252,7 +284,9 @@ def page() -> str:
     commits = ", ".join(
         f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in _TABLES
     )
-    return INTRODUCTION.format(commits=commits) + "\n".join([campaign(), options(), kills(), small_cases(), smallest()])
+    return INTRODUCTION.format(commits=commits) + "\n".join(
+        [campaign(), strangers(), options(), kills(), small_cases(), smallest()]
+    )
 
 
 def draw() -> None:
