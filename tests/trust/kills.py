@@ -21,7 +21,7 @@ NAMED = {mutant.name: mutant for mutant in MUTANTS} | {SURVIVES + mutant.name: m
 # Cases of properties that are not meant to catch the mutant, where they are not OTHERS: these take seconds each.
 SLOW = {
     **dict.fromkeys(("accuracy.arc", "accuracy.hertz", "accuracy.wavy", "accuracy.wavy-curved"), 1),
-    **dict.fromkeys(("hard.touch", "patch.kinked", "stability.locking", "tangent.long"), 1),
+    **dict.fromkeys(("hard.touch", "patch.kinked", "purity.long", "stability.locking", "tangent.long"), 1),
     "tangent.directional": 5,
 }
 
@@ -36,9 +36,9 @@ def examples(question: Property) -> int:
 def cells(name: str) -> list[str]:
     """Return the property that is meant to catch a mutant, and the number of the first case that did, for each one."""
     mutant = NAMED[name]
-    subject, row = Subject(mutant.name, mutant.make), dict[str, str]()
+    row = dict[str, str]()
     for question in sorted(properties(), key=lambda question: question.id in SLOW):
-        intended = question.id == mutant.caught_by
+        intended, subject = question.id == mutant.caught_by, Subject(mutant.name, mutant.make)
         if question.id in SLOW and not intended and sum(map(bool, row.values())) > 1:
             row[question.id] = UNKNOWN
         else:

@@ -30,9 +30,9 @@ SHARED = {
     **dict.fromkeys(("patch.flat.published", "patch.flat.resultant"), CLASS),
     **dict.fromkeys(("patch.flat.single", "patch.flat.single.solve"), CLASS),
     "patch.tilted.nodal": TILTED,
-    **dict.fromkeys(("nodal-push", "projection.activity", "projection.segment", "unilateral"), POINTS),
+    **dict.fromkeys(("nodal-push", "projection.activity", "projection.segment"), POINTS),
     **dict.fromkeys(("newton.units", "scaling"), UNITS),
     **dict.fromkeys(("newton.attainable", "stability.local", "stability.stiffness"), DIGITS),
     **dict.fromkeys(("stability.sweep", "stability.translation"), DIGITS),
-    **dict.fromkeys(("multipliers.rank", "objectivity", "swap"), SIDES),
+    **dict.fromkeys(("objectivity", "swap"), SIDES),
 }
