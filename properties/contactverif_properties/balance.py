@@ -109,7 +109,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     over r. A formulation that says that its tangent is approximate is asked for the matrix alone.
 
     Without a pairing, a loop in which work is left and that may cross a kink is followed by one with r = 2^-15 ℓ, then
-    by one with 2^-20 ℓ.
+    by one with 2^-20 ℓ. Kinks are looked for at √2 r along the two directions that span a circle, which none within the
+    circle escapes.
 
     **Undecided.** A loop in which work is left is undecided where the formulation has no pairing, and a kink is nearer
     than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
@@ -130,7 +131,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
             if values[WORK] <= tolerances[WORK] or state.pairing is not None:
                 break
             directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
-            kinks = (find_kink(state, radius, direction) for direction in directions)
+            # Two directions of a plane that reach √2 as far enclose the circle.
+            kinks = (find_kink(state, np.sqrt(2) * radius, direction) for direction in directions)
             undecided = next(filter(None, kinks), "")
             if not undecided:
                 break

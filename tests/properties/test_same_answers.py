@@ -14,7 +14,7 @@ from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 import contactverif_nts
 from contactverif import Case, Interface, Subject, Surface, Verdict, judge_case
 from contactverif.run.draw import draw_cases
-from contactverif_properties.balance import symmetric
+from contactverif_properties.balance import RADII, symmetric
 from contactverif_properties.invariants import (
     BEHIND,
     CLOSED,
@@ -26,6 +26,7 @@ from contactverif_properties.invariants import (
     renumbering,
     renumbering_cases,
 )
+from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.same_answer import BITS
 
 PROMISED_BY_ALL = ("mirror", "renumbering", "remote")
@@ -116,6 +117,26 @@ def test_without_a_pairing_a_kink_inside_the_loop_is_undecided() -> None:
     judge_as(Verdict.UNDECIDED, symmetric, state, Subject("decides", Decides))
     beside = replace(state, z=state.z + np.array([0.25, 0, 0.25, 0, 0, 0, 0, 0, 0, 0]))
     assert judge_case(symmetric, beside, Subject("decides", Decides)).verdict is Verdict.PASS
+
+
+def test_a_kink_that_only_the_circle_reaches_is_no_work_in_a_loop() -> None:
+    """A force with a potential begins between r and √2 r from the state, past both directions of the plane."""
+    state = case(seed=1)
+    radius = RADII[0] * state.shortest_segment
+    first, second = random_directions(state.seed, 6, state.z.size)[:2]
+    towards = first + second
+    begins = 1.2 * radius * max(towards @ first, towards @ second)
+    assert begins < radius * np.hypot(towards @ first, towards @ second)
+
+    class Begins(Springs):
+        pair = tangent = None
+
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            further = self.penalty * towards * ((z - state.z) @ towards > begins)
+            return super().residual(interface, pairing, z) + further
+
+    outcome = judge_as(Verdict.PASS, symmetric, state, subject(Begins, symmetric=True))
+    assert outcome.measurement is not None
 
 
 def test_a_tangent_made_symmetric_does_not_hide_the_work_in_a_loop() -> None:

@@ -50,8 +50,8 @@ class SmoothedNormals:
             n = (1 - s)[:, None] * normals[number, 0] + s[:, None] * normals[number, 1]
             n = n / np.sqrt(dot(n, n))[:, None]
             t, gap = self._shoot(a[number], along[number], s, n, x[master])
-            seen = (places[number, :, 1] <= s[:, None]) & (s[:, None] <= places[number, :, 0])
-            depth = np.where(seen, np.abs(gap), np.inf)
+            visible = (places[number, :, 1] <= s[:, None]) & (s[:, None] <= places[number, :, 0])
+            depth = np.where(visible, np.abs(gap), np.inf)
             points = np.arange(len(number))
             counts = (gap[points, other] < 0) & (depth[points, other] <= depth.min(axis=1, initial=np.inf))
             load = np.where(counts, -self.penalty * gap[points, other] * weight, 0.0)

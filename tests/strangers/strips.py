@@ -33,7 +33,7 @@ def visible_strips(slave: Any, master: Any, x: Any) -> Any:
     for number, segment in np.argwhere(faces & (second < 1) & (first > 0)).tolist():
         ends = zip(master[segment].tolist(), places[number, segment].tolist(), strict=True)
         candidates[number].append(Candidate(segment, tuple(ends), heights[number, segment].tolist()))
-    strips = [strip for number, seen in enumerate(candidates) for strip in _strips_of(number, seen)]
+    strips = [strip for number, facing in enumerate(candidates) for strip in _strips_of(number, facing)]
     return np.array(strips, dtype=np.int64).reshape(-1, 4)
 
 
