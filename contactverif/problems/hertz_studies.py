@@ -163,7 +163,7 @@ def hertz_cases() -> tuple[Case, ...]:
 # five points a segment, and more with fewer. On stiff springs a rate tells more than a size.
 _SIZES = {"layer": 1.5, "soft": 2.0, "parabola stiff": 3.0, "flat stiff": 8.0}
 _RATES = {"parabola stiff": 0.75, "flat stiff": 0.75}
-_WHOLE = {"": 1.0}
+_UNIT = {"": 1.0}
 _LINEAR = (
     "P1 is the L2 error of the best continuous linear pressure on the side's nodes; right ones reach 1.2 to 2.2 P1."
 )
@@ -182,10 +182,10 @@ HERTZ_STUDIES = Studies(
             for kind in FORCES
         ),
         Bound(
-            name="error of reported pressures", kinds=(PRESSURE,), limits=_WHOLE, of_best=" (P0 + facets)", reason=_P0
+            name="error of reported pressures", kinds=(PRESSURE,), limits=_UNIT, of_best=" (P0 + facets)", reason=_P0
         ),
         Bound(
-            name="error of the half-width", kinds=(WIDTH,), limits=_WHOLE, of_best=" h/a", reason="One slave segment."
+            name="error of the half-width", kinds=(WIDTH,), limits=_UNIT, of_best=" h/a", reason="One slave segment."
         ),
     ),
     series={

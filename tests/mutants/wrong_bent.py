@@ -35,6 +35,21 @@ def _less_by_depth_over_radius(look: Look) -> Any:
     return 1 - 30 * (depth * curvature) ** 2
 
 
+def _stiffer_where_turns_are_small(look: Look) -> Any:
+    """Return 1.003 where a slave segment turns from a neighbour by 0.3° to 2.9°, else 1."""
+    turns = [abs(look.turns("slave", look.slave, end).real) for end in (0, 1)]
+    return np.where(
+        (np.maximum(*turns) > np.sin(np.radians(0.3))) & (np.maximum(*turns) < np.sin(np.radians(2.9))), 1.003, 1
+    )
+
+
+def _less_at_the_ends_of_arcs(look: Look) -> Any:
+    """Return 0.99 where the slave ends and the other end of the segment turns from its neighbour, else 1."""
+    ends = (look.interface.slave.neighbours[look.slave] < 0).any(axis=1)
+    turns = abs(look.turns("slave", look.slave, 0)) + abs(look.turns("slave", look.slave, 1))
+    return np.where(ends & (turns.real > LEAST_TURN), 0.99, 1)
+
+
 @replaces("contact_points", contactverif_nts.vts_g)
 def _reports_a_fifth_less(right: Any, interface: Any, pairing: Any, z: Any) -> ContactPoints:
     """Make VTS-G, whose reported pressures are 20 % too small unless both segments are parallel."""
@@ -69,6 +84,8 @@ def stiffer_at_sharp_kinks(*, penalty: float) -> Any:
 MUTANTS = (
     make_factored("springs a quarter as stiff where the slave bends", CURVED, _quarter_where_the_slave_bends),
     make_factored("springs softer by the square of depth over radius", ARC, _less_by_depth_over_radius),
+    make_factored("springs 0.3 % stiffer where segments turn by 0.3° to 2.9°", ARC, _stiffer_where_turns_are_small),
+    make_factored("springs 1 % softer at the ends of arcs", ARC, _less_at_the_ends_of_arcs),
     Mutant("pressures reported a fifth too small off the parallel", ARC, _reports_a_fifth_less),
     Mutant("normals averaged over kinks said to pass there", KINKED,
            says(partial(contactverif_mortar.mortar, normals="averaged"), kinked=True, witnesses={})),

@@ -13,6 +13,7 @@ from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.kinked_patch import KinkedPatch, kinked_patch
 from contactverif.problems.shrink_fit import FIT, RingStudy
+from contactverif_properties.patch_bent import bound_of_rings
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 
@@ -76,12 +77,38 @@ def test_the_traits_say_which_exact_forces_count(unbiased: Any, balanced: Any, k
         judge_as(Verdict.PASS, question, question.cases(None)[0], stated)
 
 
-def test_springs_that_are_two_percent_too_soft_are_found_out() -> None:
-    soft = change("sts", residual=lambda right, *state: 0.98 * right(*state))
-    verdicts = [outcome.verdict for outcome in judge_all("patch.curved", soft)]
-    assert verdicts == [Verdict.FAIL] * 4
-    soft = change("sts", residual=lambda right, *state: 0.995 * right(*state))
-    assert {outcome.verdict for outcome in judge_all("accuracy.arc", soft)} == {Verdict.FAIL}
+@pytest.mark.parametrize(
+    ("property_id", "factor", "names"),
+    [
+        ("accuracy.arc", 1 - 1e-4, {"convex slave", "concave slave"}),
+        ("patch.curved", 0.98, {"inner slave, ε̂ = 1000", "outer slave, ε̂ = 1000"}),
+        ("patch.curved", 0.995, {"inner slave, ε̂ = 100", "outer slave, ε̂ = 100"}),
+        ("patch.curved", 0.999, {"inner slave, ε̂ = 100, finer"}),
+    ],
+)
+def test_springs_that_are_a_little_too_soft_are_caught(property_id: str, factor: float, names: set[str]) -> None:
+    soft, question = change("sts", residual=lambda right, *state: factor * right(*state)), load_property(property_id)
+    cases = [case for case in question.cases(None) if case.name in names]
+    assert len(cases) == len(names)
+    assert {judge_case(question, case, soft).verdict for case in cases} == {Verdict.FAIL}
+
+
+def test_forces_that_are_turned_by_a_milliradian_are_caught_on_arcs() -> None:
+    def turn(right: Any, *state: Any) -> Any:
+        forces = right(*state).reshape(-1, 2)
+        return (forces + 1e-3 * np.stack([-forces[:, 1], forces[:, 0]], axis=1)).reshape(-1)
+
+    turned = change("mortar", residual=turn)
+    for outcome in judge_all("accuracy.arc", turned):
+        assert outcome.verdict is Verdict.FAIL
+        assert "tangential" in outcome.reason
+
+
+def test_half_passes_have_a_bound_of_their_own_where_facets_are_high() -> None:
+    half_passes, balanced = (load_subject(name).traits for name in ("mortar-two-half-pass", "mortar"))
+    assert bound_of_rings(2, 1e3, half_passes) == 4 * bound_of_rings(2, 1e3, balanced)
+    assert bound_of_rings(2, 1e2, half_passes) == bound_of_rings(2, 1e2, balanced)
+    assert bound_of_rings(2, 1e3, load_subject("two-pass/nts").traits) == bound_of_rings(2, 1e3, balanced)
 
 
 @pytest.mark.parametrize("property_id", BENT)
