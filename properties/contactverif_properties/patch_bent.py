@@ -209,13 +209,11 @@ _REASON = (
     "of width w, where the gap grows by s tan(φ). Gaps are differences of positions, and N forces are summed."
 )
 STRESS = Quantity("stress error", _TOLERANCE, _REASON)
-SLAVE = Quantity("slave force error", _TOLERANCE, _REASON)
-MASTER = Quantity("master force error", _TOLERANCE, _REASON)
-PRESSURE = Quantity(
-    "reported pressure error",
-    f"{_TOLERANCE} + p (1 + ν)(1 − 2ν)/E",
-    f"{_REASON} Lengths of the reference are longer than current ones by the contraction of the blocks.",
-)
+_LENGTHS = f"{_TOLERANCE} + p (1 + ν)(1 − 2ν)/E"
+_CONTRACTION = f"{_REASON} Lengths of the reference are longer than current ones by the contraction of the blocks."
+SLAVE = Quantity("slave force error", _LENGTHS, _CONTRACTION)
+MASTER = Quantity("master force error", _LENGTHS, _CONTRACTION)
+PRESSURE = Quantity("reported pressure error", _LENGTHS, _CONTRACTION)
 APPROACH = Quantity(
     "error of the approach",
     "((1 + ε̂ h/E) T + p (1 + ν)(1 − 2ν)/E)/sin(φ/2)",
@@ -280,9 +278,9 @@ def patch_kinked(case: Case, subject: Subject) -> Measurement:
       mean absolute error of the reported pressures, with the plugin's weights, over p are at most T = (g/ℓ) tan(φ/2) (4
       + tan(φ/2) tan(φ)/2) + u (8X/g + 4N) at p = 1e-6 E: penetration moves the slave's kink along the facet by g
       tan(φ/2), beyond which the gap along the slave's normal grows by tan(φ), and gaps are differences of positions.
-      The reported pressure may count current or reference lengths, which differ by the contraction of the blocks. As in
-      `patch.flat.solve` the residual alone is asked, by differences. Newton's method starts at the first guess, and
-      where it ends elsewhere, again at the exact solution.
+      Forces and reported pressures may count current or reference lengths, which differ by the contraction of the
+      blocks. As in `patch.flat.solve` the residual alone is asked, by differences. Newton's method starts at the first
+      guess, and where it ends elsewhere, again at the exact solution.
     - *The approach.* Where the traits say how stiff the springs are, and for multipliers, the mean motion of the
       slave's nodes past those of the master is the exact one, g along each normal. Right formulations are within 1.1e-6
       g; springs that are 1 % too stiff are off by 1e-2 g, and no stress shows it.
@@ -324,13 +322,13 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
         SLAVE: float(errors[:n_slave].max()),
         MASTER: float(errors[n_slave:].max()),
     }
-    tolerances = dict.fromkeys(values, _floor(problem, start, gap))
     if _knows_its_pressure(contact, traits):
         values[PRESSURE] = _pressure_error(contact.points, pressure)
-        tolerances[PRESSURE] = tolerances[STRESS] + problem.contraction
+    floor = _floor(problem, start, gap)
+    tolerances = dict.fromkeys(values, floor + problem.contraction) | {STRESS: floor}
     if multiplier or not refuse_unknown_total(traits):
         values[APPROACH] = _approach_error(scene, q, uniform[: scene.n_free], gap)
-        tolerances[APPROACH] = _approach_tolerance(problem, start, tolerances[STRESS])
+        tolerances[APPROACH] = _approach_tolerance(problem, start, floor)
     idle = not by_contact.any()
     undecided = "Newton's method: the matrix at the exact state is singular" if singular and not idle else ""
     return Measurement(check_all(values, tolerances), undecided, details=end_details(trace), idle=idle)
