@@ -77,7 +77,8 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
 
     - The best central difference over three steps differs by at most 30 (uS/ℓ)^(2/3) at each node. That is relative to
       the largest derivative there, or its change over ℓ, or the largest block of the tangent in the columns that the
-      node feels. No norm over the whole matrix hides a small row.
+      node feels. No norm over the whole matrix hides a small row, unless it is below uS/ℓ of the largest derivative:
+      so much roundoff leaves at a node that a cell reaches by a rounding.
     - The Taylor remainder |R(x+hd) − R − hKd| falls with a slope of at least 1.9. A remainder at roundoff is exact.
 
     Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ, likewise. Where the
@@ -222,9 +223,14 @@ def _row_sizes(state: FrozenState, derivatives: FloatArray, turns: FloatArray) -
 def _worst_row(
     case: Case, errors: FloatArray, sizes: FloatArray, derivative: FloatArray, difference: FloatArray
 ) -> tuple[float, Finding]:
-    """Return the largest error over the size of its row, and that row."""
+    """Return the largest error over the size of its row, and that row.
+
+    Rounding the positions moves the ends of what a point, a cell or an area reaches by uS. A node that is reached by no
+    more than that has a derivative of uS/ℓ of the largest one, and whether it is 0 or as large is no error.
+    """
+    dust = UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment * np.abs(difference).max()
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where(errors > 0, errors / sizes, 0.0)
+        relative = np.where(errors > dust, errors / sizes, 0.0)
     number, row = divmod(int(relative.argmax()), relative.shape[1])
     place = f"row {row} ({groups_of(case).describe(row)})"
     found, right = (derivative[number, row],), (difference[number, row],)

@@ -2,11 +2,13 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from strangers import STRANGERS
-from subjects import load_property
+from strangers.segment_penalty import SimpsonPoints
+from subjects import judge_as, load_property
 
-from contactverif import Subject, Verdict, judge_case
+from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif.contract.property import Property
 from contactverif.run.draw import draw_cases
 from contactverif.run.registry import property_ids
@@ -37,3 +39,14 @@ def test_a_right_formulation_of_a_stranger_is_not_accused_of_anything(name: str)
             outcome = judge_case(question, case, subject)
             assert not outcome.breach
             assert outcome.verdict in (Verdict.PASS, Verdict.UNDECIDED), f"{question.id}: {outcome.reason}"
+
+
+@pytest.mark.parametrize("property_id", ["tangent.directional", "tangent.sparsity"])
+def test_dust_at_a_node_that_a_strip_reaches_by_a_rounding_is_no_wrong_row(property_id: str) -> None:
+    """Where the shape of a node is 0 but for roundoff, the tangent said 0 and the derivative 1e-18, or the reverse."""
+    question, subject = load_property(property_id), Subject("Simpson", SimpsonPoints)
+    for number in range(1, 40):
+        slave = np.array([[0.0, -0.63], [1.0, -0.44], [4.0, 0.12]]) + [number / 112, 0.0]
+        interface = Interface.from_chains(slave, master=[[x, 0.0] for x in (6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0)])
+        case = Case(interface, interface.nodes.reshape(-1), 1.0)
+        judge_as(Verdict.PASS, question, case, subject)

@@ -14,7 +14,7 @@ from strangers.middle_line import MiddleLine
 from strangers.nodal_least_squares import NodalLeastSquares
 from strangers.node_to_segment import NodesWithAreas, NodesWithMultipliers, NodesWithPotential
 from strangers.one_point import OnePoint
-from strangers.segment_penalty import BothSidesHalved, SegmentPenalty
+from strangers.segment_penalty import BothSidesHalved, SegmentPenalty, SimpsonPoints
 from strangers.smoothed_normals import SmoothedNormals
 from strangers.springs_at_points import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
 
@@ -28,6 +28,7 @@ STRANGERS: dict[str, Callable[..., Any]] = {
     "nodal least squares": NodalLeastSquares,
     "discontinuous quadratic mortar": DiscontinuousMortar,
     "exact segments with three Gauss points": SegmentPenalty,
+    "exact segments with Simpson's rule": SimpsonPoints,
     "both sides with half the stiffness": BothSidesHalved,
     "half passes in both directions": HalfPasses,
     "smoothed normals": SmoothedNormals,

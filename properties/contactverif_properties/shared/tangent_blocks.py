@@ -47,7 +47,8 @@ BLOCK = Quantity(
 COMPLEX_BLOCK = Quantity(
     "error of a block against a complex step",
     "1e-11 + 1024 s uS/ℓ",
-    "A complex step has no truncation; s is the largest block of the row or the column over this one.",
+    "A complex step has no truncation; s is the largest block of the row or the column over this one. An error below "
+    "uS/ℓ of the largest derivative is that of a node which a cell reaches by a rounding.",
 )
 LACKING = Quantity("entries that the pattern lacks", "0", "A derivative that is not zero needs an entry in the matrix.")
 
@@ -105,7 +106,9 @@ class BlockJudge:
             derivative = np.take_along_axis(derivatives, best[np.ix_(numbers, numbers)][None], axis=0)[0]
         largest = np.maximum(groups.largest(self.tangent), groups.largest(derivative))
         surroundings = groups.surroundings(largest)
-        tolerance = self.tolerate(largest, surroundings, np.ones_like(largest))
+        # Rounding moves the ends of cells and areas by uS. A node that they reach by no more has blocks of so little.
+        dust = roundoff(self.state.case, np.float64) * np.abs(derivative).max(initial=0.0)
+        tolerance = self.tolerate(largest, surroundings, np.ones_like(largest)) + dust
         return Comparison(errors.min(axis=0), tolerance, largest, surroundings, derivative)
 
     def tolerate(self, largest: FloatArray, surroundings: FloatArray, bending: FloatArray) -> FloatArray:
