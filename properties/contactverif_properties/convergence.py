@@ -208,7 +208,8 @@ def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
       parabola are straight, so that the gap varies along each by h²/(√180 · 2R) in the mean square; stiff springs turn
       that into pressures, which are allowed too. Constant pressures reach 0.9 of both, others 0.3.
     - The half-width 2 √(Σ F x² / Σ F) of the slave's forces is right up to one slave segment; right ones err by 0.04 of
-      it. Peaks and displacements are kept, and follow from the forces.
+      it. The peak of F/m is right to P1 (0.4 P1 is measured), and displacements of the slave, which are smoother than
+      pressures, to 1.5 P1 on the layer and to P1 elsewhere (0.6 and 0.34).
 
     The trait `converges` is the promise. `docs/concepts/accuracy.md` has a picture.
 
