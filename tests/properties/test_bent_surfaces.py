@@ -13,7 +13,7 @@ from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.kinked_patch import KinkedPatch, kinked_patch
 from contactverif.problems.shrink_fit import FIT, RingStudy
-from contactverif_properties.patch_bent import bound_of_rings
+from contactverif_properties.patch_curved import bound_of_rings
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 
