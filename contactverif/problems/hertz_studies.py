@@ -161,11 +161,12 @@ def hertz_cases() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-# Right formulations reach 1.2, 1.4, 2.2 and 2.2 times P1, strangers among them. On the layer wrong ones have 1.8 with
-# eight Gauss points a segment, 2.7 with five virtual slave nodes, and more with fewer. On stiff springs a rate tells
-# more than a size.
-_SIZES = {"layer": 1.5, "soft": 2.0, "parabola stiff": 3.0, "flat stiff": 8.0}
-_RATES = {"parabola stiff": 0.75, "flat stiff": 0.75}
+# Right formulations reach 1.2, 1.4, 2.2 and 2.2 times P1, strangers among them. One that closes a segment when its last
+# point closes has 2.6 on the layer, and the rate 1.4. Wrong ones with up to five points a segment have 4.1 and more
+# there; with eight Gauss points they have 1.8, and their rate tells.
+_SIZES = {"layer": 3.0, "soft": 3.0, "parabola stiff": 3.0, "flat stiff": 8.0}
+_RATES = {"layer": 1.1, "soft": 0.85, "parabola stiff": 0.75, "flat stiff": 0.75}
+_LARGE = {"layer": 1.5, "soft": 1.5, "parabola stiff": 2.5, "flat stiff": 2.5}
 _SAME = {"": 1}
 _MOVES = {"layer": 1.5, "": 1.0}
 _MIDDLE = "The pressure is smooth there, so that it is better than the mean; right ones have at most 0.4 P1."
@@ -173,7 +174,7 @@ _SMOOTHER = "Displacements are smoother than pressures; right ones have 0.6 P1 o
 _LINEAR = (
     "P1 is the L2 error of the best continuous linear pressure on the side's nodes; right ones reach 1.2 to 2.2 P1."
 )
-_ROOT = "Asked where the error is above 2 P1 and within its limit. The pressure's edge allows 1; measured 0.87 to 1.06."
+_ROOT = "Asked where the error is above 1.5 or 2.5 P1. The pressure's edge allows 1, on a layer of fixed stiffness 1.5."
 _P0 = "P0 is the error of the best constant pressures on slave segments; facets add ε̂h²/(√180 · 2R p0)."
 HERTZ_STUDIES = Studies(
     cases=hertz_cases,
@@ -184,7 +185,7 @@ HERTZ_STUDIES = Studies(
             for kind in FORCES
         ),
         *(
-            Bound(name=f"rate of {kind}", kinds=(kind,), rate=True, limits=_RATES, only_above=2.0, reason=_ROOT)
+            Bound(name=f"rate of {kind}", kinds=(kind,), rate=True, limits=_RATES, only_above=_LARGE, reason=_ROOT)
             for kind in FORCES
         ),
         Bound(name="error of reported pressures", kinds=(PRESSURE,), limits=_SAME, of_best=" P0 + facets", reason=_P0),

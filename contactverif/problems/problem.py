@@ -122,9 +122,9 @@ class Bound:
     limits: Mapping[str, float]  # {group of studies: limit}; the group "" is for all that are not named.
     reason: str
     rate: bool = False  # The number is a rate, which is at least the limit.
-    # A rate is asked only where the error on the finest mesh is above this multiple of the best approximation's error,
-    # and no error there is above its limit.
-    only_above: float = 0.0
+    # {group: multiple}: a rate is asked only where the error on the finest mesh is above this multiple of the best
+    # approximation's error, and no error there is above its limit. Groups that are not named are asked anyway.
+    only_above: Mapping[str, float] = field(default_factory=dict)
     of_best: str = ""  # The formula of the best approximation's error, if the limit is a multiple of that
 
     @property

@@ -43,10 +43,10 @@ def test_the_forces_of_a_picture_are_those_of_the_exact_pressure() -> None:
 
 @pytest.mark.parametrize("name", ["nts", "vts-g:n=3", "vts-me:n=4", "two-pass/nts"])
 def test_the_master_forces_of_others_are_far_from_the_best_even_at_a_fixed_penalty(name: str) -> None:
-    """More points a segment make the error smaller; with four it is still five times what is allowed."""
+    """More points a segment make the error smaller; with four it is still twice what is allowed."""
     outcome = judge_as(Verdict.FAIL, accuracy_hertz, CASES["parabola-layer"], load_subject(name))
     (number,) = (each for each in outcome.measurement.numbers if each.quantity.name == "error of master forces")
-    assert number.value > 5 * number.tolerance
+    assert number.value > 2 * number.tolerance
 
 
 @pytest.mark.parametrize("name", ["vts-ppt:n=1", "vts-ppt-balanced:n=1"])
@@ -58,13 +58,12 @@ def test_one_point_a_segment_is_right_although_its_rate_is_low(name: str) -> Non
     assert all(outcome.measurement.values[f"error of {side}"] < 0.7 * others[f"error of {side}"] for side in FORCES)
 
 
-def test_coarser_meshes_are_solved_where_the_error_does_not_decide() -> None:
-    """Mortar with multipliers has 2.1 P1 where the flat is the slave: its rate is asked there alone."""
-    subject = load_subject("mortar-lm")
-    for name, length in (("flat-stiff", 5), ("parabola-stiff", 1)):
-        measurement = measure_case(accuracy_hertz, CASES[name], subject)
-        assert {len(values) for values in measurement.series.values()} == {length}
-        assert any("rate" in quantity for quantity in measurement.values) == (length > 1)
+@pytest.mark.parametrize(("name", "length"), [("mortar-lm", 1), ("vts-g:n=8", 5), ("vts-g:n=3", 1)])
+def test_coarser_meshes_are_solved_where_the_error_alone_does_not_decide(name: str, length: int) -> None:
+    """Eight Gauss points a segment have 1.8 P1 on the layer; three have 14."""
+    measurement = measure_case(accuracy_hertz, CASES["parabola-layer"], load_subject(name))
+    assert {len(values) for values in measurement.series.values()} == {length}
+    assert any("rate" in quantity for quantity in measurement.values) == (length > 1)
 
 
 @pytest.mark.parametrize("penalty", [None, 8.0])
