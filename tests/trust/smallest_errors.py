@@ -27,7 +27,7 @@ EXAMPLES, EXAMPLES_SOLVED = 20, 3  # Cases that an error may show in; of slow pr
 Verbs = dict[str, Callable[..., Any]]
 
 
-def _of_forces(change: Callable[[Any, Any, float], Any]) -> Callable[[float], Verbs]:
+def forces_error(change: Callable[[Any, Any, float], Any]) -> Callable[[float], Verbs]:
     """Return an error that a function (interface, forces (..., n_nodes, 2), size) makes in the forces, in place."""
 
     def verbs(size: float) -> Verbs:
@@ -129,12 +129,12 @@ def _rounded_positions(size: float) -> Verbs:
 
 
 KINDS: dict[str, Callable[[float], Verbs]] = {
-    "all forces": _of_forces(_all_forces),
-    "forces of the master": _of_forces(_master_forces),
-    "one nodal force": _of_forces(_one_force),
-    "direction of the forces": _of_forces(_turned_forces),
-    "forces along one axis": _of_forces(_one_axis),
-    "forces by a length in its unit": _of_forces(_units),
+    "all forces": forces_error(_all_forces),
+    "forces of the master": forces_error(_master_forces),
+    "one nodal force": forces_error(_one_force),
+    "direction of the forces": forces_error(_turned_forces),
+    "forces along one axis": forces_error(_one_axis),
+    "forces by a length in its unit": forces_error(_units),
     "forces by the last call": _memory,
     "positions": _rounded_positions,
     "whole tangent": _of_tangent(_whole_tangent),

@@ -14,7 +14,7 @@ from contactverif import Subject, load_properties
 from contactverif.contract.property import Property
 
 FILE = "strangers.csv"
-SEEDS, EXAMPLES = (1, 2, 3), 60
+SEEDS, EXAMPLES = (1, 2, 3), 300
 HEADS = ("seed/formulation", *NUMBERS, "property", "accused")
 
 
