@@ -14,7 +14,7 @@ DIGITS = "Lost digits show in several ways of asking: near or far, on named or o
 SIDES = "A formulation that prefers a side, an axis or a number gives forces that are wrong in an exact answer too."
 
 SHARED = {
-    **dict.fromkeys(("accuracy.arc", "accuracy.hertz", "accuracy.wavy", "patch.curved"), SCENE),
+    **dict.fromkeys(("accuracy.hertz", "accuracy.wavy", "patch.curved"), SCENE),
     **dict.fromkeys(("patch.flat.solve", "patch.variants", "patch.dead-zone"), SCENE),
     **dict.fromkeys(("balance.force", "balance.moment"), BALANCE),
     **dict.fromkeys(
