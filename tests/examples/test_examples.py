@@ -26,9 +26,9 @@ PROMISES = {
     ],
     "figure_30": [r"vts-ppt-basic: converged after 1\d iterations", r"vts-ppt: converged after [3-6] iterations"],
     "first_residual": [r"25\.", r"balance\.force: pass", r"patch\.flat\.transmission: fail"],
-    "hertz_rates": [
-        r"nts-ar +rate +-?0\.[0-3]\d, last error [4-9]\.\de-02",
-        r"vts-ppt +rate +1\.[2-4]\d, last error 1\.\de-03",
+    "hertz_errors": [
+        r"nts-ar +parabola-layer 3\d, parabola-soft [89]\.\d, parabola-stiff 5\.\d",
+        r"vts-ppt +parabola-layer 0\.4\d, parabola-soft 0\.5\d?, parabola-stiff 1\.\d",
     ],
     "inf_sup": [
         r"nts-lm +.*2:3: 1\.00 of β left, 0% .*3:2: 1\.00 of β left, 0% .*matching: 1\.00 of β left, 0%",
