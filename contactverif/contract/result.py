@@ -352,7 +352,7 @@ class Run:
 
     @property
     def praise(self) -> str:
-        """What to say of a run whose promises are kept; what stayed undecided was not judged."""
+        """The sentence about a run whose promises are kept; what stayed undecided was not judged."""
         names = [f"{row.formulation} {row.property_id}" for row in self.rows if row.result is Result.UNDECIDED]
         if not names:
             return "Every promise is kept and every property was judged."

@@ -43,7 +43,7 @@ def test_a_right_formulation_of_a_stranger_is_not_accused_of_anything(name: str)
 
 @pytest.mark.parametrize("property_id", ["tangent.directional", "tangent.sparsity"])
 def test_dust_at_a_node_that_a_strip_reaches_by_a_rounding_is_no_wrong_row(property_id: str) -> None:
-    """Where the shape of a node is 0 but for roundoff, the tangent said 0 and the derivative 1e-18, or the reverse."""
+    """The tangent said 0 and the derivative 1e-18, or the reverse, where the shape of a node is 0 but for roundoff."""
     question, subject = load_property(property_id), Subject("Simpson", SimpsonPoints)
     for number in range(1, 40):
         slave = np.array([[0.0, -0.63], [1.0, -0.44], [4.0, 0.12]]) + [number / 112, 0.0]

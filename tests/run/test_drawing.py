@@ -96,7 +96,7 @@ def test_installed_properties_share_strategies() -> None:
     questions = [question for question in load_properties() if isinstance(question, Property)]
     names = [strategy_name(question) for question in questions]
     assert names.count("contactverif.strategies.general.smooth_cases") >= 6
-    assert len(random_sources()) <= 21
+    assert len(random_sources()) <= 22
 
 
 def test_the_choice_and_the_order_of_properties_change_no_case() -> None:

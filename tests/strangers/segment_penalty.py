@@ -109,7 +109,7 @@ class SegmentPenalty:
 
 
 class SimpsonPoints(SegmentPenalty):
-    """The same with Simpson's rule: points lie at the ends of strips, where a shape is 0 or what roundoff leaves."""
+    """Springs at the points of Simpson's rule: at the ends of strips a shape is 0, or what roundoff leaves."""
 
     places, weights = np.array([0.0, 0.5, 1.0]), np.array([1.0, 4.0, 1.0]) / 6
 

@@ -43,13 +43,13 @@ def questions() -> dict[str, Property]:
 
 @dataclass
 class Count:
-    """What came of some cases, and the number that came nearest to its tolerance in one that passes, where it must."""
+    """The outcomes of some cases, and the number nearest to its tolerance in one that passes, where it must."""
 
     cases: int = 0
     undecided: int = 0
     idle: int = 0
     nearest: float = 0.0
-    whose: str = ""
+    closest: str = ""
     accused: list[str] = field(default_factory=list)
 
     def ask(self, question: Property, cases: Sequence[Case], subject: Subject) -> None:
@@ -67,7 +67,7 @@ class Count:
             if promised and outcome.verdict is Verdict.PASS:
                 ratios = [number.ratio for number in checked_numbers(question.info, outcome.measurement)]
                 if max(ratios, default=0.0) > self.nearest:
-                    self.nearest, self.whose = max(ratios), f"{subject.name}, {question.id}"
+                    self.nearest, self.closest = max(ratios), f"{subject.name}, {question.id}"
 
     @property
     def numbers(self) -> list[str]:
@@ -92,7 +92,7 @@ def count(key: str) -> list[str]:
         before = total.cases
         total.ask(question, cases, subject)
         n_formulations += total.cases > before
-    return [*total.numbers, total.whose.rpartition(", ")[0], str(n_formulations), "; ".join(total.accused)]
+    return [*total.numbers, total.closest.rpartition(", ")[0], str(n_formulations), "; ".join(total.accused)]
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ def count(key: str) -> list[str]:
             total.ask(question, random_cases(question, f"{seed}/{question.id}", EXAMPLES), subject)
         elif int(seed) == SEEDS[0]:
             total.ask(question, listed, subject)
-    return [*total.numbers, total.whose.rpartition(", ")[2], "; ".join(total.accused)]
+    return [*total.numbers, total.closest.rpartition(", ")[2], "; ".join(total.accused)]
 
 
 if __name__ == "__main__":
