@@ -112,6 +112,7 @@ class OtherAttributes(TypedDict, total=False):
     usual_undecided: float
     applicable: Callable[[Traits], str]
     asks: frozenset[str]
+    shown_by: frozenset[str]
     bodies: bool
     exact: Callable[[Case], FloatArray] | None
 
@@ -134,6 +135,9 @@ class Property(PropertyInfo):
         enforcement is among `asks`.
     asks : frozenset[str]
         The enforcements of the formulations that the property is asked of.
+    shown_by : frozenset[str]
+        The parts of the contract that show a failure which the traits state. Where one is left out, the statement is
+        not held against the formulation.
     bodies : bool
         The cases are scenes, which are solved; else they are states of an interface alone.
     exact : Callable[[Case], FloatArray] | None
@@ -148,6 +152,7 @@ class Property(PropertyInfo):
     promise: Callable[[Traits], bool | None]
     applicable: Callable[[Traits], str] = lambda traits: ""
     asks: frozenset[str] = WITHOUT_BARRIER
+    shown_by: frozenset[str] = frozenset()
     bodies: bool = False
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""

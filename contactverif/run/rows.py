@@ -252,7 +252,8 @@ def open_row(
         )
     if source is None:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")
-    if sampling.scene is not None and promise is False:  # The formulation fails on some scene, not on every one.
+    # The formulation fails on some scene, not on every one, and where it reports what shows it.
+    if promise is False and (sampling.scene is not None or question.shown_by - subject.provides):
         row = replace(row, promise=None)
     return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None))
 

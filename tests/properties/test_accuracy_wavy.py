@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import judge_as, load_subject
+from subjects import Changed, judge_as, load_subject
 from wave_strangers import Heights
 
+import contactverif_nts
 from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
 from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.problem import PRESSURE
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
+from contactverif.run.run import run
 from contactverif_properties.convergence import accuracy_wavy, accuracy_wavy_curved, promise_without_locking
 
 NAMES = ("upper slave, 10 E/h", "upper slave, 1000 E/h", "lower slave, 10 E/h", "lower slave, 1000 E/h")
@@ -138,6 +140,16 @@ def test_who_converges_and_does_not_lock_promises_the_curved_interface(
     converges: bool | None, locks: bool | None, promise: bool | None
 ) -> None:
     assert promise_without_locking(Traits(promises=Promises(converges=converges, locks=locks))) is promise
+
+
+def test_who_locks_and_reports_no_pressure_is_not_held_to_fail() -> None:
+    """Its pressures alone show it here, so that "stated to fail, but passes" accused a right formulation."""
+    silent = Subject(
+        "silent", lambda *, penalty: Changed(contactverif_nts.vts_ppt(penalty=penalty), contact_points=None)
+    )
+    row = run([silent], [accuracy_wavy_curved], shrink="none").rows[0]
+    assert accuracy_wavy_curved.promise(silent.traits) is False
+    assert (row.verdict, row.promise, row.unexpected) == (Verdict.PASS, None, "")
 
 
 def test_pressures_of_one_point_a_segment_alternate_on_a_finer_slave_so_their_convergence_is_not_promised() -> None:
