@@ -28,7 +28,7 @@ from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
 
 _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
-JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of its planned cases was decided.
+JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what right formulations decide was decided.
 BROKEN_BY_FAILING = "promised to pass, but fails"
 BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"

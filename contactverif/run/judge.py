@@ -102,7 +102,7 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
     worst = max(everything, key=lambda outcome: badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         return worst.verdict, _reason_with_name(row, worst)
-    if row.judged < JUDGED_SHARE * row.planned:
+    if row.judged < JUDGED_SHARE * (1 - row.info.usual_undecided) * row.planned:
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
     if reason := _too_idle(row):

@@ -68,6 +68,11 @@ def test_undecided_cases_are_reported_beyond_twice_the_usual_share_and_chance() 
     assert not one_row(200, undecided=19, usual_undecided=0.05).suspicion
 
 
+@pytest.mark.parametrize(("undecided", "verdict"), [(19, Verdict.PASS), (20, Verdict.NOT_JUDGED)])
+def test_nine_tenths_of_what_right_formulations_decide_are_needed(undecided: int, verdict: Verdict) -> None:
+    assert one_row(100, undecided=undecided, usual_undecided=0.1).verdict is verdict
+
+
 def test_a_share_beyond_one_is_refused() -> None:
     with pytest.raises(MisuseError, match=r"least_contact: found 80; needed a share"):
         PropertyInfo("x.y", "x", "A number.", (ERROR,), least_contact=80)
