@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.run_endings import show_what_plugins_printed
-from contactverif.cli.shared_options import IsolationOptions, PropertyGlobs, SamplingOptions, formulation_argument
+from contactverif.cli.shared_options import PropertyGlobs, SamplingOptions, formulation_argument
 from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
 
@@ -61,7 +63,7 @@ def campaign(
         typer.echo(f"shard {piece.text} is done already")
         return
     with hold_journal(folder, "--out"):
-        count = _judge(piece, job, folder, plan)
+        count = _judge(piece, replace(job, hidden=(out.absolute(),)), folder, plan)
     typer.echo(f"shard {piece.text} is done: {count} outcomes")
 
 

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles
 from contactverif.cli.shared_options import (
     RESULT_FILES,
-    IsolationOptions,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,

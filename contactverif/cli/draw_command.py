@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import PICTURES, SOLVED_SCENE, OutputFiles
 from contactverif.cli.run_endings import show_what_plugins_printed
-from contactverif.cli.shared_options import CaseId, IsolationOptions, formulation_option, output_option
+from contactverif.cli.shared_options import CaseId, formulation_option, output_option
 
 
 def draw(

@@ -11,7 +11,13 @@ from contactverif.cli.console import say, show, show_as_it_is
 from contactverif.cli.counterexample_output import draw_outcome
 from contactverif.cli.output_files import PAGE, REPORT, PictureFolder
 from contactverif.cli.progress import Bar
-from contactverif.cli.run_endings import end_run, say_how_to_go_on, show_what_plugins_printed, watch_for_stops
+from contactverif.cli.run_endings import (
+    end_run,
+    say_how_to_go_on,
+    say_where_plugins_ran,
+    show_what_plugins_printed,
+    watch_for_stops,
+)
 from contactverif.cli.verify_job import Plugins, VerifyJob
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
@@ -36,7 +42,7 @@ def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
     if not names:
         others = ", ".join(name for name in formulation_names() if name != reference_name)
         raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")
-    limits, properties = job.options.isolation.limits(), load_properties(job.options.properties)
+    limits, properties = job.limits(), load_properties(job.options.properties)
     try:
         reference = the_formulation(reference_name, limits)
     except MisuseError as error:
@@ -46,8 +52,7 @@ def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
 
 def compare_formulations(job: VerifyJob) -> int:
     """Run all properties, show the tables and write the files; return the exit status."""
-    reference, plugins = _load(job)
-    with watch_for_stops(job), job.journal() as journal:
+    with watch_for_stops(job), job.begin(partial(_load, job)) as ((reference, plugins), journal):
         with worker_pool(job.jobs) as executor, Bar() as bar:
             options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
@@ -58,6 +63,7 @@ def compare_formulations(job: VerifyJob) -> int:
     show_what_plugins_printed()
     end.files.announce()
     show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))
+    say_where_plugins_ran(study.run.provenance)
     if not end.complete:
         say_how_to_go_on(job)
     return end.status

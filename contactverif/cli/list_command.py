@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
-from contactverif.cli.shared_options import IsolationOptions
+from contactverif.cli.isolation_options import IsolationOptions
 
 if TYPE_CHECKING:
     from contactverif.contract.result import NotLoaded

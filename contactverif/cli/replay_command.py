@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import PICTURES, OutputFiles
-from contactverif.cli.shared_options import CaseId, IsolationOptions, ReportPath, formulation_option, output_option
+from contactverif.cli.shared_options import CaseId, ReportPath, formulation_option, output_option
 
 
 def replay(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
+from contactverif.cli.isolation_options import Isolation, place_line
 from contactverif.cli.output_files import OutputFiles
 from contactverif.contract.errors import MisuseError
 
@@ -106,6 +107,13 @@ def say_how_to_go_on(job: VerifyJob) -> None:
         typer.echo(f"what was judged is kept; to go on: {job.resume_line}")
     else:
         typer.echo("with --out FILE.nc a run can go on where it was stopped")
+
+
+def say_where_plugins_ran(provenance: Mapping[str, str]) -> None:
+    """Print in a last line whether plugins were in a box; where they live in this process, the user has said so."""
+    place = provenance.get("isolation", Isolation.INLINE)
+    if place != Isolation.INLINE:
+        typer.echo(place_line(place))
 
 
 def show_what_plugins_printed() -> None:

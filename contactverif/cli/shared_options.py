@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import functools
 import inspect
-import os
 import typing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,7 +23,6 @@ from contactverif.run.profiles import Shrink, profile_named
 if TYPE_CHECKING:
     from contactverif.contract.case import Case
     from contactverif.contract.interface import Interface
-    from contactverif.isolation.limits import Limits
 
 PROFILE_HELP = (
     "dev: 100 cases of each property, new ones in every run. ci: 100 cases, always the same. "
@@ -87,7 +84,6 @@ PropertyGlobs = Annotated[
         autocompletion=complete_property,
     ),
 ]
-ISOLATION_HELP = "process: each plugin in a process of its own, the default. inline: in this one, for debugging."
 ReportPath = Annotated[Path, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")]
 CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the report.", metavar="ID")]
 
@@ -119,43 +115,6 @@ class WorkerOptions:
         if self.jobs is None:
             return default_jobs(n_formulations * n_properties * examples)
         return check_jobs(self.jobs)
-
-
-class Isolation(StrEnum):
-    """The place where plugins live."""
-
-    PROCESS = "process"
-    INLINE = "inline"
-
-
-@dataclass(frozen=True, slots=True)
-class IsolationOptions:
-    """The place where a plugin lives, and the limits of its process."""
-
-    isolation: Annotated[Isolation | None, typer.Option(help=ISOLATION_HELP)] = None
-    time_limit: Annotated[
-        float, typer.Option(help="Longest time of a call in a plugin's process.", metavar="SECONDS")
-    ] = 60.0
-    memory_limit: Annotated[int, typer.Option(help="Memory that a plugin's process may take.", metavar="MEGABYTES")] = (
-        4096
-    )
-
-    def limits(self) -> Limits | None:
-        """Return the limits of a plugin's process; None if plugins live in this process.
-
-        Without a choice of the user a plugin has a process of its own, but under pytest, where a test may want to look
-        into it.
-        """
-        from contactverif.isolation.limits import Limits
-
-        limits = Limits(self.time_limit, self.memory_limit)
-        inline = "PYTEST_CURRENT_TEST" in os.environ if self.isolation is None else self.isolation is Isolation.INLINE
-        if inline:
-            return None
-        from contactverif.isolation.process import adopt_orphans
-
-        adopt_orphans()
-        return limits
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,12 +12,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
-from contactverif.cli.run_endings import End, end_run, say_how_to_go_on, show_what_plugins_printed, watch_for_stops
+from contactverif.cli.run_endings import (
+    End,
+    end_run,
+    say_how_to_go_on,
+    say_where_plugins_ran,
+    show_what_plugins_printed,
+    watch_for_stops,
+)
 from contactverif.cli.shared_options import (
     RESULT_FILES,
     FormulationNames,
-    IsolationOptions,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
@@ -101,8 +108,7 @@ def run_job(job: VerifyJob) -> int:
 
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            plugins = job.load()
-            journal = stack.enter_context(job.journal())  # A plugin that ends us while it is loaded leaves no file.
+            plugins, journal = stack.enter_context(job.begin(job.load))
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
             options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
             result = run(plugins.subjects, plugins.questions, **options)
@@ -129,6 +135,7 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
     if REPORT not in end.files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
     show(f"Not complete: {end.gap}." if end.gap else summary(result))
+    say_where_plugins_ran(result.provenance)
 
 
 def _writers(result: Run, files: OutputFiles) -> dict[str, Callable[[Path], None]]:

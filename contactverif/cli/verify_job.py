@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
+from contactverif.cli.isolation_options import Isolation, IsolationOptions
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
-from contactverif.cli.shared_options import IsolationOptions, PlaceOptions, SamplingOptions, WorkerOptions
+from contactverif.cli.shared_options import PlaceOptions, SamplingOptions, WorkerOptions
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -25,11 +26,13 @@ if TYPE_CHECKING:
     from contactverif.contract.property import Property
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
+    from contactverif.isolation.limits import Limits
     from contactverif.run.draw import Sampling
     from contactverif.run.profiles import Profile
     from contactverif.run.run_journal import Journal, Plan
 
 VERIFY, COMPARE = "verify", "compare"
+_Loaded = TypeVar("_Loaded")
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +85,22 @@ class VerifyJob:
     resumes: bool = False  # The run goes on with its own journal.
     again: str = ""  # The command line that goes on with the run, if it is not that command with `--resume`.
     command: str = VERIFY
+    hidden: tuple[Path, ...] = ()  # Other files of the run that a plugin in a box does not see.
 
     def load(self) -> Plugins:
         """Load the formulations and the properties."""
         from contactverif.run.registry import load_formulation, load_properties
 
-        limits = self.options.isolation.limits()
+        limits = self.limits()
         questions = load_properties(self.options.properties)
         return Plugins([load_formulation(name, limits) for name in self.options.names], questions)
+
+    def limits(self) -> Limits | None:
+        """Return the limits of the plugins' processes; in a box they do not see what this run writes."""
+        from contactverif.run.journal import journal_folder
+
+        files = self.files.paths.values()
+        return self.options.isolation.limits([*files, *map(journal_folder, files), *self.hidden])
 
     def run_options(self, **others: Any) -> dict[str, Any]:
         """Return the options of a run, those of `contactverif.run.run.run`, and others beside them."""
@@ -150,6 +161,17 @@ class VerifyJob:
         )
 
     @contextmanager
+    def begin(self, load: Callable[[], _Loaded]) -> Iterator[tuple[_Loaded, Journal]]:
+        """Open a block with what a function loads, and with the journal of the run.
+
+        The journal is there before a box is, which hides it. A plugin that lives in this process is loaded before: it
+        may end us, and then leaves no file.
+        """
+        first = load() if self.options.isolation.isolation is Isolation.INLINE else None
+        with self.journal() as journal:
+            yield first or load(), journal
+
+    @contextmanager
     def journal(self) -> Iterator[Journal]:
         """Open a block with the journal of the run. In it no other process goes on with the same journal."""
         from contactverif.run.journal import begin_journal, hold_journal, journal_folder, keep_earlier, withdraw_journal
@@ -187,6 +209,7 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
     settled = replace(
         options,
         properties=matching_ids(options.properties or ("*",)),
+        isolation=options.isolation.settle(),
         sampling=replace(sampling, examples=profile.examples, seed=profile.seed, profile=profile.name),
     )
     scene = options.place.make_scene()
@@ -236,6 +259,8 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     except (msgspec.ValidationError, TypeError) as error:
         raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
     check_versions(plan.versions, versions_of(options), argument)
+    if options.isolation.isolation is Isolation.BOX:  # Here there may be none; the results are the same.
+        options = replace(options, isolation=replace(options.isolation, isolation=None))
     if os.getcwd() == plan.folder:
         return options
     base = Path(plan.folder)

@@ -142,6 +142,15 @@ def limit_memory(megabytes: int) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
+def limit_processes(most: int) -> None:
+    """Limit the processes and threads of this user's namespace; the system counts those of other namespaces apart."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limits.
+        return
+    resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
+
+
 def name_of_signal(number: int) -> str:
     """Return the name of a signal, such as SIGSEGV."""
     try:

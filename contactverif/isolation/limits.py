@@ -1,4 +1,4 @@
-"""The limits of a child process."""
+"""The limits of a child process, and the box that it may be in."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from contactverif.contract.errors import MisuseError
+from contactverif.isolation.box import Box
 
 MEGABYTE = 2**20
 _START_FACTOR = 5.0  # Import, first calls and compilation take longer than what follows.
@@ -20,6 +21,8 @@ class Limits:
     seconds: float = 60.0
     # The address space, in megabytes, that the process may take beyond what it has at its start.
     memory: int = 4096
+    # The box of a plugin's process; None for a process without one.
+    box: Box | None = None
 
     def __post_init__(self) -> None:
         for argument, value in (("time limit", self.seconds), ("memory limit", self.memory)):

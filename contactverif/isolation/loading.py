@@ -17,6 +17,7 @@ from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.isolation.child import FORKS
 from contactverif.isolation.host import host_of, raise_failure
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Load, Loaded, Reply, Unloaded, Wraps, encode
@@ -51,7 +52,11 @@ def load_remote(command: tuple[str, ...], name: str, limits: Limits) -> Subject 
 
 
 def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> Iterator[Subject | Wrapper | NotLoaded]:
-    """Yield what is installed under each name. One process loads them all; one that ends is followed by another."""
+    """Yield what is installed under each name.
+
+    One process loads no plugin, and a copy of it loads each one. Where processes are not copied, each name has a new
+    one. A process that ends is followed by another.
+    """
     process: PluginProcess | None = None
     for name in names:
         question = Question(0, "import")
@@ -62,6 +67,9 @@ def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> It
         except ContractError as error:
             process = None if isinstance(error, PluginError) and error.ended else process
             yield _not_loaded(name, error)
+        if process is not None and not FORKS:
+            process.end()
+            process = None
     if process is not None:
         process.end()
 

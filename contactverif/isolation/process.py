@@ -16,13 +16,15 @@ import threading
 import uuid
 from collections.abc import Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from multiprocessing import util
 from typing import IO
 
 import psutil
 
 from contactverif.contract.errors import PluginError
+from contactverif.isolation.box import enclose
+from contactverif.isolation.box import environment as box_environment
 from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
 from contactverif.isolation.child import Child, name_of_signal
 from contactverif.isolation.limits import MEGABYTE, Limits
@@ -40,6 +42,7 @@ _LARGEST_ANSWER = 512  # Megabytes. The judge keeps some answers at a time, in i
 _SECONDS_TO_DIE = 5.0
 _SECONDS_TO_READ = 1.0
 _LAST_WORDS = 2000  # Bytes.
+_SIGNALED = 128  # A box ends with this status plus the number of the signal that ended its process.
 # One thread, as for linear algebra in the judge's process (`contactverif.run.judge.one_thread`): the same bits.
 # A plugin that limits the size of files would cut the compiled modules of the harness, which all runs share.
 _SETTINGS = ONE_THREAD | {"PYTHONDONTWRITEBYTECODE": "1"}
@@ -74,9 +77,14 @@ class PluginProcess:
         self._limits = limits
         self._progress = _file_of_one_byte()
         self.output = Output()
-        numbers = {MARK: _run, MEMORY: str(limits.memory), PROGRESS: str(self._progress.fileno()), "TMPDIR": _folder()}
+        numbers = {MARK: _run, MEMORY: str(limits.memory), PROGRESS: str(self._progress.fileno())}
         largest = min(limits.memory, _LARGEST_ANSWER) * MEGABYTE
         settings, files = _SETTINGS | (_OTHER_SETTINGS if second else {}), [self._progress.fileno()]
+        if limits.box is None:
+            numbers["TMPDIR"] = _folder()
+        else:
+            command = enclose(tuple(command), limits.box, limits.memory)
+            settings |= box_environment(limits.box)
         try:
             with JUDGE.on_one_core():
                 self._child = Child.start(
@@ -143,12 +151,22 @@ class PluginProcess:
         JUDGE.ask()
         if JUDGE.core not in (-1, self._core):
             with suppress(OSError):
-                os.sched_setaffinity(self._child.pid, {JUDGE.core})
+                os.sched_setaffinity(self._worker_pid, {JUDGE.core})
             self._core = JUDGE.core
+
+    @cached_property
+    def _worker_pid(self) -> int:
+        """The number of the process that answers. In a box it is the first child of the first one there."""
+        process = psutil.Process(self._child.pid)
+        for _ in range(0 if self._limits.box is None else 2):
+            process = min(process.children(), key=psutil.Process.create_time, default=process)
+        return int(process.pid)
 
     def _end_with(self, words: str, kind: str) -> PluginError:
         """End the process, and return the error; without a kind, the one that the end of the process tells."""
         status = None if kind else self._child.wait()
+        if self._limits.box is not None and status is not None and status > _SIGNALED:
+            status = _SIGNALED - status
         self.end()
         if not kind and status is None:
             kind, words = "channel", f"{words}: it closed its end of the line"

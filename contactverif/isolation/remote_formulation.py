@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import weakref
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,6 +23,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, Prefetching, Subject
 from contactverif.contract.traits import Traits
+from contactverif.isolation.box import Box, bubblewrap_version
 from contactverif.isolation.host import Host, answer_of, host_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
@@ -44,6 +45,11 @@ class RemoteSubject(Subject):
         """The host in this process of the judge."""
         return self._remote.host
 
+    @property
+    def box(self) -> Box | None:
+        """The box of its process; None if there is none."""
+        return self._remote.limits.box
+
     def restart(self) -> Subject:
         """Return the same formulation in a second process."""
         return RemoteSubject(replace(self._remote, second=True))
@@ -52,6 +58,17 @@ class RemoteSubject(Subject):
 def count_ends(subject: Subject) -> int:
     """Return how often the process of a formulation has ended before it was told to; 0 if it has none of its own."""
     return subject.host.n_ended if isinstance(subject, RemoteSubject) else 0
+
+
+def places(subjects: Iterable[Subject]) -> dict[str, str]:
+    """Return {attribute of the report: value} that say where formulations lived, and what was open to them."""
+    kinds, opened = set[str](), set[str]()
+    for subject in subjects:
+        box = subject.box if isinstance(subject, RemoteSubject) else None
+        inside = "process" if isinstance(subject, RemoteSubject) else "inline"
+        kinds.add(inside if box is None else f"box ({bubblewrap_version()})")
+        opened |= set(box.opened) if box is not None else set()
+    return {"isolation": "; ".join(sorted(kinds)), "opened": "; ".join(sorted(opened))}
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import mmap
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import partial
 from time import perf_counter, process_time
 from typing import Any
 
@@ -25,8 +26,9 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject, copy_entries
+from contactverif.isolation.box import PROCESSES
 from contactverif.isolation.channel import Channel, ClosedError
-from contactverif.isolation.child import limit_memory, socket_of_parent
+from contactverif.isolation.child import FORKS, limit_memory, limit_processes, socket_of_parent
 from contactverif.isolation.messages import (
     Answer,
     Ask,
@@ -47,6 +49,7 @@ from contactverif.isolation.messages import (
 from contactverif.isolation.packed import PackedArray
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.isolation.process import MEMORY, PROGRESS
+from contactverif.isolation.survey_copy import survey_in_copy
 
 _SHORT = 1e-3  # Seconds. Other processes have used the caches before a call, so a shorter one is timed when repeated.
 COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.
@@ -60,6 +63,8 @@ def main(load: Loader, survey: Loader) -> None:
     die_with_parent()
     faulthandler.enable()
     limit_memory(int(os.environ[MEMORY]))
+    if PROCESSES in os.environ:
+        limit_processes(int(os.environ[PROCESSES]))
     channel, desk = Channel(socket_of_parent()), Desk(load, survey)
     progress = mmap.mmap(int(os.environ[PROGRESS]), 1)
     while True:
@@ -125,6 +130,12 @@ class Desk:
         return item
 
     def _load(self, request: Load) -> Reply:
+        if request.survey and FORKS:
+            return survey_in_copy(partial(self._describe, request), request.question)
+        return self._describe(request)
+
+    def _describe(self, request: Load) -> Reply:
+        """Load what a name refers to, and return what it is."""
         item = self._loaders[request.survey](request.name)
         if isinstance(item, NotLoaded):
             return Unloaded(request.question, item.reason)

@@ -1,5 +1,8 @@
 """The store of compiled kernels, beside their source or in the user's cache: damage in it never reaches a formulation.
 
+A process that has another folder for what it compiles (NUMBA_CACHE_DIR) reads the usual stores, too, and leaves them as
+they are. So a plugin in a box, which may write to a folder of its own alone, compiles what nobody has compiled.
+
 numba trusts its files. A truncated one raises an error where a kernel is called, as if the plugin had failed, and a
 changed one may crash the process. Here each file ends with a digest. A file whose digest is wrong counts as absent: the
 kernel is compiled again and the file is replaced. A store that cannot be written is no error either.
@@ -14,21 +17,29 @@ import hashlib
 import pickle
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numba
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import IndexDataCacheFile, InTreeCacheLocator, UserWideCacheLocator
 
 _DIGEST = 32  # Bytes at the end of a file.
 
 
 class CheckedFiles(IndexDataCacheFile):
-    """The files of one kernel: an index and a file for each signature, each with its digest at the end."""
+    """The files of one kernel: an index and a file for each signature, each with its digest at the end.
+
+    `usual` are the files in the stores that are read if a signature is not in this one.
+    """
+
+    usual: tuple[CheckedFiles, ...] = ()
 
     def load(self, key: Any) -> Any:
         """Return what is stored for a signature; None if there is nothing, or it is damaged."""
         name = self._load_index().get(key)
-        return None if name is None else _unpickle(Path(self._data_path(name)))  # type: ignore[no-untyped-call]
+        stored = None if name is None else _unpickle(Path(self._data_path(name)))  # type: ignore[no-untyped-call]
+        if stored is not None:
+            return stored
+        return next((there for files in self.usual if (there := files.load(key)) is not None), None)
 
     def save(self, key: Any, data: Any) -> None:
         """Store what was compiled for a signature; a store that cannot be written stays as it is."""
@@ -60,10 +71,20 @@ def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
         dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # No folder can be written: neither that of the source nor the user's cache.
         return numba.njit(**options)(function)
-    files = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    files: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if type(files) is IndexDataCacheFile:
         files.__class__ = CheckedFiles
+        assert isinstance(files, CheckedFiles)
+        files.usual = _usual_files(function, files) if cast(Any, numba.config).CACHE_DIR else ()
     return dispatcher
+
+
+def _usual_files(function: Callable[..., Any], files: Any) -> tuple[CheckedFiles, ...]:
+    """Return the files of a kernel beside its source and in the user's cache."""
+    base, stamp = files._index_name.removesuffix(".nbi"), files._source_stamp
+    locators = (kind(function, function.__code__.co_filename) for kind in (InTreeCacheLocator, UserWideCacheLocator))
+    folders = [locator.get_cache_path() for locator in locators]  # type: ignore[no-untyped-call]
+    return tuple(CheckedFiles(folder, base, stamp) for folder in folders)  # type: ignore[no-untyped-call]
 
 
 def _unpickle(path: Path) -> Any:

@@ -13,6 +13,7 @@ import difflib
 import inspect
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
@@ -26,6 +27,7 @@ from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
+from contactverif.isolation.box import kernel_folder
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import Wrapper, load_remote, python_program, survey
 
@@ -92,9 +94,19 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
         If the text is malformed, no such formulation is installed, or it has no such option or value.
     """
     if limits is not None:
-        return load_remote(_worker(), text, limits)
+        return load_remote(_worker(), text, _with_kernels(limits, text))
     make = _load_factory(text)
     return make if isinstance(make, NotLoaded) else subject_of(text, make)
+
+
+def _with_kernels(limits: Limits, text: str) -> Limits:
+    """Return the limits with a box that keeps compiled kernels, those of all formulations of the same packages."""
+    if limits.box is None:
+        return limits
+    names = {part.partition(":")[0] for part in text.split("/")}
+    packages = {entry.module.partition(".")[0] for entry in entry_points(group=FORMULATIONS) if entry.name in names}
+    store = kernel_folder("+".join(sorted(packages))) if packages else ""
+    return replace(limits, box=replace(limits.box, store=store))
 
 
 def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:

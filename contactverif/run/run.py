@@ -27,6 +27,7 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.isolation.remote_formulation import places
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
 from contactverif.run.profiles import Profile, Shrink, profile_named
@@ -205,6 +206,7 @@ class RunJobs:
         """Return the run with all rows as far as they are judged; one that is not complete says so."""
         sampling = self._sampling
         provenance = collect_provenance(profile=profile, examples=sampling.examples, seed=sampling.seed)
+        provenance |= places(self._subjects)
         if reason := draw.why_the_engine_draws():
             provenance["drawing"] = reason
         while self._groups:

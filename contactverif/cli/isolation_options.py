@@ -1,0 +1,121 @@
+"""The options that say where a plugin lives, what it may take, and what is open to it."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from contactverif.contract.errors import MisuseError
+
+if TYPE_CHECKING:
+    from contactverif.isolation.limits import Limits
+
+ISOLATION_HELP = (
+    "box: each plugin in a process of its own that can write nothing, and sees no network and no other process; the "
+    "default where the system has boxes. process: without the box. inline: in this process, for debugging."
+)
+OPEN_HELP = "What a plugin in a box may use and write: a file, a folder, a device, or network. Repeatable."
+_SETTINGS = Path("pyproject.toml")
+_TABLE = "tool.contactverif"
+
+
+class Isolation(StrEnum):
+    """The place where plugins live."""
+
+    BOX = "box"
+    PROCESS = "process"
+    INLINE = "inline"
+
+
+@dataclass(frozen=True, slots=True)
+class IsolationOptions:
+    """The place where a plugin lives, the limits of its process, and what is open to it."""
+
+    isolation: Annotated[Isolation | None, typer.Option(help=ISOLATION_HELP)] = None
+    time_limit: Annotated[
+        float, typer.Option(help="Longest time of a call in a plugin's process.", metavar="SECONDS")
+    ] = 60.0
+    memory_limit: Annotated[int, typer.Option(help="Memory that a plugin's process may take.", metavar="MEGABYTES")] = (
+        4096
+    )
+    opened: Annotated[list[str] | None, typer.Option("--open", help=OPEN_HELP, metavar="PATH")] = None
+
+    def settle(self) -> IsolationOptions:
+        """Return the options with the place and with what is open, as the user, the project or the system says.
+
+        Without a choice of the user a plugin is in a box, or in a process where there are no boxes; under pytest it is
+        in this process, where a test may want to look into it.
+        """
+        opened = _absolute(_opened_by_project() if self.opened is None else self.opened)
+        place = self.isolation
+        if place is None and "PYTEST_CURRENT_TEST" in os.environ:
+            place = Isolation.INLINE
+        if place in (None, Isolation.BOX):
+            from contactverif.isolation.box import Box, why_no_box
+
+            reason = why_no_box(Box(tuple(opened)))
+            if reason and place is Isolation.BOX:
+                raise MisuseError("--isolation", f"box, but {reason}", "a system that has boxes, or process")
+            place = Isolation.PROCESS if reason else Isolation.BOX
+        return replace(self, isolation=place, opened=opened)
+
+    def limits(self, hidden: Iterable[Path] = ()) -> Limits | None:
+        """Return the limits of a plugin's process, and its box, in which some paths are not there.
+
+        None if plugins live in this process.
+        """
+        settled = self.settle()
+        if settled.isolation is Isolation.INLINE:
+            return None
+        from contactverif.isolation.box import Box
+        from contactverif.isolation.limits import Limits
+        from contactverif.isolation.process import adopt_orphans
+
+        adopt_orphans()
+        box = Box(tuple(settled.opened or ()), tuple(map(str, hidden)))
+        return Limits(self.time_limit, self.memory_limit, box if settled.isolation is Isolation.BOX else None)
+
+
+def place_line(place: str) -> str:
+    """Say whether the plugins of a run were in a box, as its report has it, and how to get one where there was none."""
+    if place != Isolation.PROCESS:
+        return f"The plugins ran in a {place}."
+    from contactverif.isolation.box import why_no_box
+
+    reason = why_no_box()
+    return f"The plugins ran without a box: {reason or 'as --isolation says'}."
+
+
+def _absolute(opened: Iterable[str]) -> list[str]:
+    """Return what is open by absolute paths, each of which must exist."""
+    from contactverif.isolation.box import NETWORK
+
+    paths = [path if path == NETWORK else os.path.abspath(path) for path in opened]
+    for path in paths:
+        if path != NETWORK and not os.path.exists(path):
+            raise MisuseError("--open", f"{path}, which does not exist", f"a path that exists, or {NETWORK}")
+    return paths
+
+
+def _opened_by_project() -> list[str]:
+    """Return the entries of the key `open` in the table of contactverif of the project's settings, if there are any."""
+    try:
+        settings: Any = tomllib.loads(_SETTINGS.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError) as error:
+        raise MisuseError(f"{_SETTINGS}", " ".join(str(error).split()), "a file of settings that can be read") from None
+    table = settings.get("tool", {}).get("contactverif", {})
+    opened = table.get("open", []) if isinstance(table, dict) else None
+    if not (isinstance(opened, list) and all(isinstance(path, str) for path in opened)):
+        raise MisuseError(f"open in [{_TABLE}] of {_SETTINGS}", repr(opened), "a list of paths")
+    if unknown := sorted(table.keys() - {"open"}):
+        raise MisuseError(f"[{_TABLE}] of {_SETTINGS}", unknown[0], "open, a list of paths")
+    return opened

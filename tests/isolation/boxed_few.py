@@ -1,0 +1,106 @@
+"""A few plugins that try what a box forbids, which this file is the program of; what they manage stands in an error."""
+
+import sys
+
+if __name__ == "__main__":
+    sys.path[:], sys.argv[1:] = sys.argv[1:], []
+
+import os
+import signal
+import socket
+from pathlib import Path
+
+import psutil
+
+from contactverif.isolation.loading import python_program
+from contactverif.isolation.worker import main
+from contactverif.run.registry import subject_of
+
+PROGRAM = python_program(__file__)
+TARGETS = "TARGETS_OF_BOXED_FEW"  # The environment variable with what the attempts aim at, separated by lines.
+
+
+def write_file(path):
+    Path(path).write_text("changed", encoding="utf-8")
+
+
+def delete_file(path):
+    Path(path).unlink()
+
+
+def read_file(path):
+    if Path(path).read_text(encoding="utf-8"):
+        return
+    raise FileNotFoundError
+
+
+def see_process(number):
+    psutil.Process(int(number)).cmdline()
+
+
+def stop_process(number):
+    os.kill(int(number), signal.SIGSTOP)
+
+
+def limit_process(number):
+    psutil.Process(int(number)).rlimit(psutil.RLIMIT_CORE, (0, 0))
+
+
+def connect_by_network(port):
+    socket.create_connection(("127.0.0.1", int(port)), 1).close()
+
+
+def connect_by_file(path):
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(path)
+
+
+def connect_by_name(name):
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect("\0" + name)
+
+
+def write_to_terminal(path):
+    with open(path, "w", encoding="utf-8") as terminal:
+        terminal.write("\a")
+
+
+def managed():
+    """Try everything that the environment names, and return what did not fail."""
+    done = []
+    for line in filter(None, os.environ.get(TARGETS, "").splitlines()):
+        verb, _, target = line.partition(" ")
+        try:
+            globals()[verb](target)
+        except (OSError, psutil.Error):
+            continue
+        done.append(verb)
+    return done
+
+
+class Attempts:
+    """It never loads; the reason is what it managed."""
+
+    def __init__(self, *, penalty):
+        raise RuntimeError(f"managed: {' '.join(managed()) or 'nothing'}")
+
+
+class Daemons(Attempts):
+    """It leaves daemons that fork again and again, so that whoever is killed has been replaced."""
+
+    def __init__(self, *, penalty):
+        for _ in range(3):
+            if os.fork() == 0:
+                os.setsid()
+                while True:
+                    if os.fork():
+                        os._exit(0)
+        super().__init__(penalty=penalty)
+
+
+def load(name):
+    return subject_of(name, globals()[name])
+
+
+if __name__ == "__main__":
+    main(load, load)

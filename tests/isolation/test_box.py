@@ -1,0 +1,190 @@
+"""A plugin in a box: the same answers, and nothing outside that it can change, stop or reach."""
+
+import os
+import pty
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from isolation import boxed_few, hostile_few
+
+from contactverif import Subject, load_formulation, named_case
+from contactverif.contract.errors import PluginError
+from contactverif.contract.result import NotLoaded
+from contactverif.isolation import box as boxes
+from contactverif.isolation import process
+from contactverif.isolation.box import NETWORK, Box, why_no_box
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.loading import load_remote
+
+LIMITS = Limits(seconds=20.0, memory=2000, box=Box())
+needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
+
+
+def managed(monkeypatch: pytest.MonkeyPatch, box: Box | None, **targets: object) -> set[str]:
+    """Return which attempts a plugin manages, {method of `boxed_few`: what it aims at}."""
+    monkeypatch.setenv(boxed_few.TARGETS, "\n".join(f"{verb} {target}" for verb, target in targets.items()))
+    item = load_remote(boxed_few.PROGRAM, "Attempts", replace(LIMITS, box=box))
+    assert isinstance(item, NotLoaded)
+    return set(item.reason.partition("managed: ")[2].split()) - {"nothing"}
+
+
+@pytest.fixture
+def bystander() -> Iterator[psutil.Process]:
+    """Yield a process of the same user."""
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as popen:
+        yield psutil.Process(popen.pid)
+        popen.kill()
+
+
+@needs_box
+def test_answers_are_those_of_this_process() -> None:
+    case = named_case("c")
+    forces = []
+    for limits in (None, LIMITS):
+        formulation = load_formulation("vts-ppt", limits).for_case(case)
+        forces.append(formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z))
+    assert np.array_equal(*forces)
+
+
+@needs_box
+def test_files_can_be_read_and_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "file"
+    file.write_text("as it was", encoding="utf-8")
+    attempts = {"write_file": file, "delete_file": file, "read_file": file}
+    assert managed(monkeypatch, Box(), **attempts) == {"read_file"}
+    assert file.read_text(encoding="utf-8") == "as it was"
+    assert managed(monkeypatch, None, write_file=file) == {"write_file"}
+
+
+@needs_box
+def test_what_is_hidden_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, file = tmp_path / "journal", tmp_path / "report"
+    folder.mkdir()
+    for path in (folder / "file", file):
+        path.write_text("secret", encoding="utf-8")
+    hidden = Box(hidden=(str(folder), str(file), str(tmp_path / "absent")))
+    for path in (folder / "file", file):
+        assert managed(monkeypatch, hidden, read_file=path) == set()
+        assert managed(monkeypatch, Box(), read_file=path) == {"read_file"}
+
+
+@needs_box
+def test_what_is_opened_can_be_written_but_for_what_is_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    hidden = tmp_path / "journal"
+    hidden.mkdir()
+    box = Box(opened=(str(tmp_path),), hidden=(str(hidden),))
+    assert managed(monkeypatch, box, write_file=tmp_path / "new") == {"write_file"}
+    assert (tmp_path / "new").read_text(encoding="utf-8") == "changed"
+    managed(monkeypatch, box, write_file=hidden / "new")
+    assert not list(hidden.iterdir())
+
+
+@needs_box
+def test_other_processes_cannot_be_seen_or_stopped(bystander: psutil.Process, monkeypatch: pytest.MonkeyPatch) -> None:
+    attempts = {"see_process": bystander.pid, "limit_process": bystander.pid, "stop_process": bystander.pid}
+    assert managed(monkeypatch, Box(), **attempts) == set()
+    assert bystander.status() != psutil.STATUS_STOPPED
+    assert managed(monkeypatch, None, **attempts) == set(attempts)
+
+
+@needs_box
+def test_no_line_leads_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = f"contactverif-test-{os.getpid()}"
+    with (
+        socket.create_server(("127.0.0.1", 0)) as by_network,
+        socket.socket(socket.AF_UNIX) as by_file,
+        socket.socket(socket.AF_UNIX) as by_name,
+    ):
+        by_file.bind(str(tmp_path / "s"))
+        by_name.bind(f"\0{name}")
+        by_file.listen()
+        by_name.listen()
+        attempts = {
+            "connect_by_network": by_network.getsockname()[1],
+            "connect_by_file": tmp_path / "s",
+            "connect_by_name": name,
+        }
+        assert managed(monkeypatch, Box(), **attempts) == set()
+        assert managed(monkeypatch, Box(opened=(NETWORK,)), **attempts) == {"connect_by_network", "connect_by_name"}
+        assert managed(monkeypatch, None, **attempts) == set(attempts)
+
+
+@needs_box
+def test_shared_memory_is_that_of_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    memory = Path(f"/dev/shm/contactverif-{os.getpid()}")
+    memory.write_text("of this process", encoding="utf-8")
+    try:
+        assert managed(monkeypatch, Box(), read_file=memory) == set()
+        assert managed(monkeypatch, None, read_file=memory) == {"read_file"}
+    finally:
+        memory.unlink()
+
+
+@needs_box
+def test_a_terminal_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, theirs = pty.openpty()
+    try:
+        attempts = {"write_to_terminal": os.ttyname(theirs)}
+        assert managed(monkeypatch, Box(), **attempts) == set()
+        assert managed(monkeypatch, None, **attempts) == {"write_to_terminal"}
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+@needs_box
+def test_daemons_that_fork_as_they_are_ended_end_with_the_box() -> None:
+    load_remote(boxed_few.PROGRAM, "Daemons", LIMITS)
+    process.end_marked()
+    left = [other for other in psutil.process_iter() if boxed_few.__file__ in _words(other)]
+    assert not left
+
+
+def _words(other: psutil.Process) -> list[str]:
+    try:
+        return list(other.cmdline())
+    except psutil.Error:
+        return []
+
+
+@needs_box
+@pytest.mark.parametrize("name", ["Kills", "Exits"])
+def test_the_end_of_a_process_is_told_as_without_a_box(name: str) -> None:
+    case, ends = named_case("c"), []
+    for box in (None, Box()):
+        item = load_remote(hostile_few.PROGRAM, name, replace(LIMITS, box=box))
+        assert isinstance(item, Subject)
+        with pytest.raises(PluginError) as raised:
+            item.for_case(case).residual(case.interface, None, case.z)
+        ends.append((str(raised.value), raised.value.cause))
+    assert ends[0] == ends[1]
+
+
+def test_where_there_are_no_boxes_the_reason_names_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(boxes, "_program", lambda: "")
+    assert boxes.why_no_box.__wrapped__() == (
+        "bubblewrap is missing; install the package bubblewrap of the system, or contactverif[box]"
+    )
+    monkeypatch.setattr(boxes.sys, "platform", "darwin")
+    assert boxes.why_no_box.__wrapped__() == "only Linux has boxes"
+
+
+def test_where_user_namespaces_are_forbidden_the_reason_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "bwrap"
+    program.write_text("#!/bin/sh\necho 'bwrap: setting up uid map: Permission denied' >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(boxes, "_program", lambda: str(program))
+    monkeypatch.setattr(boxes.sys, "platform", "linux")
+    reason = boxes.why_no_box.__wrapped__()
+    assert reason.startswith("bwrap: setting up uid map: Permission denied; allow user namespaces")
+    program.write_text("#!/missing/interpreter\n")
+    assert boxes.why_no_box.__wrapped__().startswith("bubblewrap does not run (FileNotFoundError)")

@@ -1,0 +1,82 @@
+"""A survey of what is installed: no plugin hides, changes or ends another one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from contactverif.isolation.box import why_no_box
+
+PLUGINS = {
+    # A name that sorts first is loaded first.
+    "a-patches": """
+import importlib.metadata
+import contactverif.run.registry as registry
+
+importlib.metadata.entry_points = lambda **group: ()
+registry._entries_by_name = registry.entry_points = lambda *group, **more: {}
+""",
+    "b-ends": "import os\nos._exit(3)",
+    "c-kills": "import os, signal\nos.kill(os.getppid(), signal.SIGKILL)",
+    "d-changes": """
+import os
+
+with open(f"/proc/{os.getppid()}/mem", "r+b", buffering=0) as memory:
+    memory.read(1)
+""",
+    "e-answers": """
+import os
+
+for number in range(3, 64):
+    try:
+        os.write(number, b"forged" * 1000)
+    except OSError:
+        pass
+""",
+}
+PROGRAM = """
+import sys
+from contactverif.cli.isolation_options import Isolation, IsolationOptions
+from contactverif.isolation.host import end_all
+from contactverif.run.registry import load_formulations, standalone_names
+
+limits = IsolationOptions(Isolation(sys.argv[1])).limits()
+for item in load_formulations(limits):
+    print(getattr(item, "name", None) or f"{item.formulation}: {item.reason}")
+print(*standalone_names(limits))
+end_all()
+"""
+
+
+@pytest.mark.parametrize(
+    "place", ["process", pytest.param("box", marks=pytest.mark.skipif(bool(why_no_box()), reason="no boxes here"))]
+)
+def test_every_name_is_there_whatever_the_others_do(tmp_path: Path, place: str) -> None:
+    about = tmp_path / "odd-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
+    modules = {name: f"odd_{name.replace('-', '_')}" for name in PLUGINS}
+    for name, source in PLUGINS.items():
+        (tmp_path / f"{modules[name]}.py").write_text(f"{source}\nfrom contactverif_nts import nts\n")
+    lines = [f"{name} = {module}:nts" for name, module in modules.items()]
+    (about / "entry_points.txt").write_text("\n".join(["[contactverif.formulations]", *lines, ""]))
+    (tmp_path / "survey.py").write_text(PROGRAM)
+    path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
+    answer = subprocess.run(
+        [sys.executable, str(tmp_path / "survey.py"), place],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    *items, standalone = answer.stdout.splitlines()
+    assert set(PLUGINS) <= set(standalone.split())
+    assert {"vts-ppt", "mortar", "two-pass"} <= set(items)
+    assert "b-ends: import: its process ended with status 3" in items
+    # It killed the process whose copy it was in, and the survey went on with a new one.
+    assert any(item.startswith("c-kills: ") for item in items)
+    assert any(item.startswith("e-answers: import: ") for item in items)
+    if place == "box":
+        assert any(item.startswith("d-changes: PermissionError") for item in items)
