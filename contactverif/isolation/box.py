@@ -17,7 +17,8 @@ from functools import cache
 from hashlib import blake2b
 from pathlib import Path
 
-NETWORK = "network"  # What a user opens by this name is the network, and not a file.
+from contactverif.isolation.landlock import NETWORK, WRITABLE, landlock_version
+
 PROCESSES = "CONTACTVERIF_PROCESSES"  # The environment variable with the most processes and threads in a box.
 _MOST_PROCESSES = 512
 _SECONDS_TO_TRY = 10.0
@@ -27,11 +28,17 @@ _ALLOW = "allow user namespaces, see 'What is not contained' in the documentatio
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """The openings of a box."""
+    """The openings of a box, or of a process that has rules of Landlock instead (`by_rules`)."""
 
     opened: tuple[str, ...] = ()  # Paths that may be written, devices, or `NETWORK`.
     hidden: tuple[str, ...] = ()  # Paths that are not there.
     store: str = ""  # The folder for compiled kernels; empty: they go with the process.
+    by_rules: bool = False
+
+    @property
+    def kind(self) -> str:
+        """The words for it in a report."""
+        return f"process (Landlock {landlock_version()})" if self.by_rules else f"box ({bubblewrap_version()})"
 
 
 def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ...]:
@@ -48,10 +55,13 @@ def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ..
     return _program(), *arguments, "--", *command
 
 
-def environment(box: Box) -> dict[str, str]:
-    """Return the variables that a process in the box finds."""
-    folder = temporary_folder()
-    return {"TMPDIR": folder, "NUMBA_CACHE_DIR": box.store or f"{folder}/kernels", PROCESSES: str(_MOST_PROCESSES)}
+def environment(box: Box, folder: str) -> dict[str, str]:
+    """Return the variables that a process in the box finds, whose folder for temporary files is this one."""
+    store = box.store or f"{folder}/kernels"
+    places = {"TMPDIR": folder, "NUMBA_CACHE_DIR": store}
+    if box.by_rules:
+        return places | {WRITABLE: os.pathsep.join((folder, store, *box.opened))}
+    return places | {PROCESSES: str(_MOST_PROCESSES)}
 
 
 def kernel_folder(name: str) -> str:

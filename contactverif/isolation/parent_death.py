@@ -1,4 +1,4 @@
-"""What a process asks of the system about itself: to end when its parent ends, and to be seen by no other process."""
+"""The wishes of a process that the system grants: to end when its parent ends, and to be read by no other process."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from typing import IO
 import psutil
 
 from contactverif.contract.errors import PluginError
-from contactverif.isolation.box import enclose
+from contactverif.isolation.box import enclose, temporary_folder
 from contactverif.isolation.box import environment as box_environment
 from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
 from contactverif.isolation.child import Child, name_of_signal
@@ -80,11 +80,12 @@ class PluginProcess:
         numbers = {MARK: _run, MEMORY: str(limits.memory), PROGRESS: str(self._progress.fileno())}
         largest = min(limits.memory, _LARGEST_ANSWER) * MEGABYTE
         settings, files = _SETTINGS | (_OTHER_SETTINGS if second else {}), [self._progress.fileno()]
-        if limits.box is None:
-            numbers["TMPDIR"] = _folder()
-        else:
+        encloses = limits.box is not None and not limits.box.by_rules
+        folder = temporary_folder() if encloses else _folder()
+        numbers |= {"TMPDIR": folder} if limits.box is None else box_environment(limits.box, folder)
+        if limits.box is not None and encloses:
             command = enclose(tuple(command), limits.box, limits.memory)
-            settings |= box_environment(limits.box)
+        self._encloses = encloses
         try:
             with JUDGE.on_one_core():
                 self._child = Child.start(
@@ -158,14 +159,14 @@ class PluginProcess:
     def _worker_pid(self) -> int:
         """The number of the process that answers. In a box it is the first child of the first one there."""
         process = psutil.Process(self._child.pid)
-        for _ in range(0 if self._limits.box is None else 2):
+        for _ in range(2 if self._encloses else 0):
             process = min(process.children(), key=psutil.Process.create_time, default=process)
         return int(process.pid)
 
     def _end_with(self, words: str, kind: str) -> PluginError:
         """End the process, and return the error; without a kind, the one that the end of the process tells."""
         status = None if kind else self._child.wait()
-        if self._limits.box is not None and status is not None and status > _SIGNALED:
+        if self._encloses and status is not None and status > _SIGNALED:
             status = _SIGNALED - status
         self.end()
         if not kind and status is None:

@@ -23,7 +23,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, Prefetching, Subject
 from contactverif.contract.traits import Traits
-from contactverif.isolation.box import Box, bubblewrap_version
+from contactverif.isolation.box import Box
 from contactverif.isolation.host import Host, answer_of, host_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
@@ -66,7 +66,7 @@ def places(subjects: Iterable[Subject]) -> dict[str, str]:
     for subject in subjects:
         box = subject.box if isinstance(subject, RemoteSubject) else None
         inside = "process" if isinstance(subject, RemoteSubject) else "inline"
-        kinds.add(inside if box is None else f"box ({bubblewrap_version()})")
+        kinds.add(inside if box is None else box.kind)
         opened |= set(box.opened) if box is not None else set()
     return {"isolation": "; ".join(sorted(kinds)), "opened": "; ".join(sorted(opened))}
 

@@ -25,7 +25,7 @@ _LARGEST = 1 << 20  # Bytes of a reply. Traits are some hundred.
 def survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
     """Return the reply of a function that a copy of this process calls, or how the copy ended.
 
-    Whoever waits for this process has a deadline; here is none.
+    Nothing ends the wait but the judge, which ends this process if the reply is late.
     """
     hide_memory(hidden=True)
     import_module("contactverif.geometry.chain_search")  # What most plugins import is imported once.
@@ -34,8 +34,10 @@ def survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
         (reply,) = decode_replies(copy.channel.receive())
     except ClosedError:
         status = copy.wait() or 0
-        how = f"ended with status {status}" if status >= 0 else f"was ended by {name_of_signal(-status)}"
-        return Failure(question, "plugin", "exit", (f"import: its process {how}",))
+        words = f"its process ended with status {status}"
+        if status < 0:
+            words = f"{name_of_signal(-status)} ended its process"
+        return Failure(question, "plugin", "exit", (f"import: {words}",))
     except (TooLargeError, MessageError, ValueError) as error:
         return Failure(question, "plugin", "channel", (f"import: {error}",))
     else:

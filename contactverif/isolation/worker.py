@@ -29,6 +29,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject, copy_entr
 from contactverif.isolation.box import PROCESSES
 from contactverif.isolation.channel import Channel, ClosedError
 from contactverif.isolation.child import FORKS, limit_memory, limit_processes, socket_of_parent
+from contactverif.isolation.landlock import WRITABLE, keep_to
 from contactverif.isolation.messages import (
     Answer,
     Ask,
@@ -65,6 +66,8 @@ def main(load: Loader, survey: Loader) -> None:
     limit_memory(int(os.environ[MEMORY]))
     if PROCESSES in os.environ:
         limit_processes(int(os.environ[PROCESSES]))
+    if WRITABLE in os.environ:
+        keep_to(os.environ[WRITABLE].split(os.pathsep))
     channel, desk = Channel(socket_of_parent()), Desk(load, survey)
     progress = mmap.mmap(int(os.environ[PROGRESS]), 1)
     while True:

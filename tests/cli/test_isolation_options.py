@@ -8,7 +8,7 @@ import pytest
 from contactverif.cli.isolation_options import Isolation, IsolationOptions, place_line
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation import box as boxes
-from contactverif.isolation import process
+from contactverif.isolation import landlock, process
 
 FORBIDDEN = "bwrap: setting up uid map: Permission denied; allow user namespaces"
 
@@ -21,6 +21,7 @@ def with_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def without_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(boxes, "why_no_box", lambda box=None: FORBIDDEN)
+    monkeypatch.setattr(landlock, "landlock_version", lambda: 0)
 
 
 @pytest.mark.usefixtures("with_boxes")
@@ -42,15 +43,27 @@ def test_plugins_are_in_a_box_unless_the_user_says_otherwise(monkeypatch: pytest
 def test_without_boxes_plugins_are_in_a_process_and_the_last_line_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("PYTEST_CURRENT_TEST")
     assert IsolationOptions().settle().isolation is Isolation.PROCESS
-    assert place_line("process") == f"The plugins ran without a box: {FORBIDDEN}."
+    assert place_line("process") == f"The plugins ran in a process without a box: {FORBIDDEN}."
     with pytest.raises(MisuseError, match=r"--isolation: found box, but bwrap: .* denied; .*; needed .*, or process"):
         IsolationOptions(Isolation.BOX).settle()
+    with pytest.raises(MisuseError, match=r"--isolation: found landlock, which this system has not; needed Linux with"):
+        IsolationOptions(Isolation.LANDLOCK).settle()
+
+
+@pytest.mark.usefixtures("without_boxes")
+def test_where_there_are_rules_of_landlock_they_stand_in_for_a_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PYTEST_CURRENT_TEST")
+    monkeypatch.setattr(landlock, "landlock_version", lambda: 7)
+    assert IsolationOptions().settle().isolation is Isolation.LANDLOCK
+    assert IsolationOptions(Isolation.PROCESS).settle().isolation is Isolation.PROCESS
+    words = place_line("process (Landlock 7)")
+    assert words == f"The plugins ran in a process (Landlock 7) without a box: {FORBIDDEN}."
 
 
 @pytest.mark.usefixtures("with_boxes")
 def test_the_last_line_says_what_the_box_was() -> None:
     assert place_line("box (bubblewrap 0.8.0)") == "The plugins ran in a box (bubblewrap 0.8.0)."
-    assert place_line("process") == "The plugins ran without a box: as --isolation says."
+    assert place_line("process") == "The plugins ran in a process without a box: as --isolation says."
 
 
 @pytest.mark.usefixtures("with_boxes")

@@ -65,24 +65,24 @@ def write_to_terminal(path):
         terminal.write("\a")
 
 
-def managed():
+def try_everything():
     """Try everything that the environment names, and return what did not fail."""
-    done = []
+    successes = []
     for line in filter(None, os.environ.get(TARGETS, "").splitlines()):
         verb, _, target = line.partition(" ")
         try:
             globals()[verb](target)
         except (OSError, psutil.Error):
             continue
-        done.append(verb)
-    return done
+        successes.append(verb)
+    return successes
 
 
 class Attempts:
     """It never loads; the reason is what it managed."""
 
     def __init__(self, *, penalty):
-        raise RuntimeError(f"managed: {' '.join(managed()) or 'nothing'}")
+        raise RuntimeError(f"managed: {' '.join(try_everything()) or 'nothing'}")
 
 
 class Daemons(Attempts):

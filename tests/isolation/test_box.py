@@ -19,7 +19,8 @@ from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import box as boxes
 from contactverif.isolation import process
-from contactverif.isolation.box import NETWORK, Box, why_no_box
+from contactverif.isolation.box import Box, why_no_box
+from contactverif.isolation.landlock import NETWORK, landlock_version
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
 
@@ -27,7 +28,7 @@ LIMITS = Limits(seconds=20.0, memory=2000, box=Box())
 needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
 
 
-def managed(monkeypatch: pytest.MonkeyPatch, box: Box | None, **targets: object) -> set[str]:
+def try_targets(monkeypatch: pytest.MonkeyPatch, box: Box | None, **targets: object) -> set[str]:
     """Return which attempts a plugin manages, {method of `boxed_few`: what it aims at}."""
     monkeypatch.setenv(boxed_few.TARGETS, "\n".join(f"{verb} {target}" for verb, target in targets.items()))
     item = load_remote(boxed_few.PROGRAM, "Attempts", replace(LIMITS, box=box))
@@ -58,9 +59,9 @@ def test_files_can_be_read_and_not_written(tmp_path: Path, monkeypatch: pytest.M
     file = tmp_path / "file"
     file.write_text("as it was", encoding="utf-8")
     attempts = {"write_file": file, "delete_file": file, "read_file": file}
-    assert managed(monkeypatch, Box(), **attempts) == {"read_file"}
+    assert try_targets(monkeypatch, Box(), **attempts) == {"read_file"}
     assert file.read_text(encoding="utf-8") == "as it was"
-    assert managed(monkeypatch, None, write_file=file) == {"write_file"}
+    assert try_targets(monkeypatch, None, write_file=file) == {"write_file"}
 
 
 @needs_box
@@ -71,8 +72,8 @@ def test_what_is_hidden_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyP
         path.write_text("secret", encoding="utf-8")
     hidden = Box(hidden=(str(folder), str(file), str(tmp_path / "absent")))
     for path in (folder / "file", file):
-        assert managed(monkeypatch, hidden, read_file=path) == set()
-        assert managed(monkeypatch, Box(), read_file=path) == {"read_file"}
+        assert try_targets(monkeypatch, hidden, read_file=path) == set()
+        assert try_targets(monkeypatch, Box(), read_file=path) == {"read_file"}
 
 
 @needs_box
@@ -80,18 +81,18 @@ def test_what_is_opened_can_be_written_but_for_what_is_hidden(tmp_path: Path, mo
     hidden = tmp_path / "journal"
     hidden.mkdir()
     box = Box(opened=(str(tmp_path),), hidden=(str(hidden),))
-    assert managed(monkeypatch, box, write_file=tmp_path / "new") == {"write_file"}
+    assert try_targets(monkeypatch, box, write_file=tmp_path / "new") == {"write_file"}
     assert (tmp_path / "new").read_text(encoding="utf-8") == "changed"
-    managed(monkeypatch, box, write_file=hidden / "new")
+    try_targets(monkeypatch, box, write_file=hidden / "new")
     assert not list(hidden.iterdir())
 
 
 @needs_box
 def test_other_processes_cannot_be_seen_or_stopped(bystander: psutil.Process, monkeypatch: pytest.MonkeyPatch) -> None:
     attempts = {"see_process": bystander.pid, "limit_process": bystander.pid, "stop_process": bystander.pid}
-    assert managed(monkeypatch, Box(), **attempts) == set()
+    assert try_targets(monkeypatch, Box(), **attempts) == set()
     assert bystander.status() != psutil.STATUS_STOPPED
-    assert managed(monkeypatch, None, **attempts) == set(attempts)
+    assert try_targets(monkeypatch, None, **attempts) == set(attempts)
 
 
 @needs_box
@@ -111,9 +112,9 @@ def test_no_line_leads_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
             "connect_by_file": tmp_path / "s",
             "connect_by_name": name,
         }
-        assert managed(monkeypatch, Box(), **attempts) == set()
-        assert managed(monkeypatch, Box(opened=(NETWORK,)), **attempts) == {"connect_by_network", "connect_by_name"}
-        assert managed(monkeypatch, None, **attempts) == set(attempts)
+        assert try_targets(monkeypatch, Box(), **attempts) == set()
+        assert try_targets(monkeypatch, Box(opened=(NETWORK,)), **attempts) == {"connect_by_network", "connect_by_name"}
+        assert try_targets(monkeypatch, None, **attempts) == set(attempts)
 
 
 @needs_box
@@ -121,8 +122,8 @@ def test_shared_memory_is_that_of_the_box(monkeypatch: pytest.MonkeyPatch) -> No
     memory = Path(f"/dev/shm/contactverif-{os.getpid()}")
     memory.write_text("of this process", encoding="utf-8")
     try:
-        assert managed(monkeypatch, Box(), read_file=memory) == set()
-        assert managed(monkeypatch, None, read_file=memory) == {"read_file"}
+        assert try_targets(monkeypatch, Box(), read_file=memory) == set()
+        assert try_targets(monkeypatch, None, read_file=memory) == {"read_file"}
     finally:
         memory.unlink()
 
@@ -132,8 +133,8 @@ def test_a_terminal_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     ours, theirs = pty.openpty()
     try:
         attempts = {"write_to_terminal": os.ttyname(theirs)}
-        assert managed(monkeypatch, Box(), **attempts) == set()
-        assert managed(monkeypatch, None, **attempts) == {"write_to_terminal"}
+        assert try_targets(monkeypatch, Box(), **attempts) == set()
+        assert try_targets(monkeypatch, None, **attempts) == {"write_to_terminal"}
     finally:
         os.close(ours)
         os.close(theirs)
@@ -188,3 +189,28 @@ def test_where_user_namespaces_are_forbidden_the_reason_says_so(
     assert reason.startswith("bwrap: setting up uid map: Permission denied; allow user namespaces")
     program.write_text("#!/missing/interpreter\n")
     assert boxes.why_no_box.__wrapped__().startswith("bubblewrap does not run (FileNotFoundError)")
+
+
+@pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
+def test_rules_of_landlock_keep_files_network_and_processes(
+    tmp_path: Path, bystander: psutil.Process, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, folder = tmp_path / "file", tmp_path / "open"
+    file.write_text("as it was", encoding="utf-8")
+    folder.mkdir()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        attempts = {"write_file": file, "delete_file": file, "read_file": file, "connect_by_network": port}
+        assert try_targets(monkeypatch, Box(by_rules=True), **attempts) <= {"read_file", "connect_by_network"}
+    assert file.read_text(encoding="utf-8") == "as it was"
+    box = Box(by_rules=True, opened=(str(folder),))
+    assert try_targets(monkeypatch, box, write_file=folder / "new") == {"write_file"}
+    if landlock_version() >= 6:
+        assert try_targets(monkeypatch, box, stop_process=bystander.pid) == set()
+
+
+@pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
+def test_compiled_code_works_under_rules_of_landlock() -> None:
+    case = named_case("c")
+    formulation = load_formulation("vts-ppt", replace(LIMITS, box=Box(by_rules=True))).for_case(case)
+    assert formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z).any()
