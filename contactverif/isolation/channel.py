@@ -54,16 +54,19 @@ class Channel:
             except OSError:
                 raise ClosedError from None
 
-    def receive(self, seconds: float = inf) -> bytes:
-        """Return the next frame, or raise one of the errors above. What has come too late is kept for the next call."""
+    def receive(self, seconds: float = inf, largest: int | None = None) -> bytes:
+        """Return the next frame, or raise one of the errors above. What has come too late is kept for the next call.
+
+        `largest` is a limit of bytes for this frame, where it is less than that of all.
+        """
         deadline = perf_counter() + seconds
         data = self._rest or self._read(_PIECE, deadline)
         end = _LENGTH.size + _LENGTH.unpack_from(data)[0] if len(data) >= _LENGTH.size else 1 << 63
         if end > len(data):
             head = self._gather(data, _LENGTH.size, deadline)
             length = int(_LENGTH.unpack_from(head)[0])
-            if length > self._largest:
-                raise TooLargeError(f"{length} bytes")
+            if length > (most := min(self._largest, largest or self._largest)):
+                raise TooLargeError(f"{length} bytes; needed at most {most}")
             end = _LENGTH.size + length
             data = self._gather(head, end, deadline)
         self._rest = data[end:]

@@ -7,8 +7,9 @@ question.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Mapping
+from collections import Counter, OrderedDict
+from collections.abc import Mapping, Sequence
+from math import inf
 from time import monotonic
 from typing import Any
 
@@ -21,6 +22,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import (
+    MOST_QUESTIONS,
     Answer,
     Ask,
     Failure,
@@ -39,12 +41,13 @@ from contactverif.isolation.packed import PackedArray
 from contactverif.isolation.process import PluginProcess, Question, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
-_MOST_HANGS = 5  # After so many calls without an answer neither.
+_MOST_HANGS = 2  # After so many calls without an answer neither, in all of its processes.
+_AT_IMPORT = 100  # The number of such calls that an import without an answer counts for.
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
-_SHELF = 256  # The number of interfaces and pairings that a process keeps for further questions.
+_SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.
 _FORGET = 64  # The number of what can be forgotten before the process is told.
-_QUEUE = 16  # The number of questions that wait.
 _TOGETHER = 1 << 16  # Bytes. So much fits into a socket, so the judge never waits to send while the process does, too.
+_QUICK = 1 / (2 * MOST_QUESTIONS)  # The share of its limit of time that a call took before it is asked with others.
 
 
 class Host:
@@ -52,48 +55,60 @@ class Host:
 
     def __init__(self, command: tuple[str, ...], name: str, limits: Limits, *, second: bool) -> None:
         self._command, self._name, self._limits, self._second = command, name, limits, second
+        self._key = command, name, limits
         self._process: PluginProcess | None = None
         self._shelf: OrderedDict[int, tuple[Any, int]] = OrderedDict()
-        self._queue: list[Request] = []
-        self._questions: list[Question] = []
+        # One list, so that an interrupt leaves no request whose question is missing.
+        self._queue: list[tuple[Request, Question | None]] = []
         self._forgotten: list[int] = []
         self._number = 0
         self._last_words = b""
+        self._known_verbs: set[str] = set()  # The methods that this process was asked.
+        self._first_seconds: dict[str, float] = {}  # The time that the first call of each method took in any process.
+        self._is_quick = False  # All questions of the last message were answered quickly.
         self.opaque: bool | None = None  # Pairings have a handle, which stays there; None until the first one is known.
-        self.n_ended = self.n_hangs = 0  # Ends before it was told to, and those of them because no answer came.
+        self.n_ended = 0  # Ends before it was told to.
         self.n_started = 0
         self.last_question = 0.0  # By the clock of `time.monotonic`.
 
     def load(self) -> Reply:
         """Start the process anew, load the formulation, and return what that gave."""
         self.end()
-        if self.n_ended >= _MOST_ENDS or self.n_hangs >= _MOST_HANGS:
-            words = f"no answer came {self.n_hangs} times" if self.n_hangs >= _MOST_HANGS else ""
-            raise PluginError(words or f"its process ended {self.n_ended} times", "not asked")
+        if reason := self._why_not_asked():
+            raise PluginError(reason, "not asked")
         _make_room(self._name)
         self._process = PluginProcess(self._command, self._limits, second=self._second)
         self.n_started += 1
-        for store in (self._shelf, self._queue, self._questions, self._forgotten):
+        for store in (self._shelf, self._queue, self._forgotten, self._known_verbs):
             store.clear()
         question = self._put("import", Load(self._next_number(), self._name))
         self.flush()
         return raise_failure(question.result, loading=True)
 
+    def _why_not_asked(self) -> str:
+        """Return why the formulation is not asked any more; an empty string if it is."""
+        n_hangs = _hangs[self._key]
+        if n_hangs >= _AT_IMPORT:
+            return "no answer came while it was imported"
+        if n_hangs >= _MOST_HANGS:
+            return f"no answer came {n_hangs} times"
+        return f"its process ended {self.n_ended} times" if self.n_ended >= _MOST_ENDS else ""
+
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
         if self._process is None and not isinstance(self.load(), Loaded):
             raise PluginError("import: it loaded before, and does not any more", "channel")
-        self._queue.append(Make(self._next_number(), penalty))
+        self._queue.append((Make(self._next_number(), penalty), None))
         return self._number, self.n_started
 
     def _next_number(self) -> int:
         self._number += 1
         return self._number
 
-    def _put(self, verb: str, request: Load | Ask) -> Question:
-        self._queue.append(request)
-        self._questions.append(Question(request.question, verb))
-        return self._questions[-1]
+    def _put(self, verb: str, request: Load | Ask, size: int = 0) -> Question:
+        question = Question(request.question, verb, size)
+        self._queue.append((request, question))
+        return question
 
     @property
     def has_process(self) -> bool:
@@ -114,25 +129,22 @@ class Host:
         verb: str,
         formulation: int,
         interface: Interface,
-        pairing: Pairing | None,
+        pairing: Pairing | int | None,
         z: Array | None,
         *,
         timed: bool = False,
     ) -> Question:
-        """Put a question into the queue and return it. `timed`: its call is timed, a short one when it is repeated."""
-        if len(self._questions) >= _QUEUE:
+        """Put a question into the queue and return it. `timed`: its call is timed, a short one when it is repeated.
+
+        The pairing may be the number under which the process keeps one of its answers.
+        """
+        if sum(question is not None for _, question in self._queue) >= MOST_QUESTIONS:
             self.flush()
         of_interface = self._share(interface)
-        of_pairing = None if pairing is None else self._share(pairing)
+        of_pairing = self._share(pairing) if isinstance(pairing, Pairing) else pairing
         packed = None if z is None else PackedArray.pack(z)
-        return self._put(verb, Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed))
-
-    def keep(self, item: Interface | Pairing, number: int) -> None:
-        """Note that the process keeps something under a number."""
-        self._shelf[id(item)] = item, number
-        if len(self._shelf) > _SHELF:
-            _, (_, oldest) = self._shelf.popitem(last=False)
-            self._forgotten.append(oldest)
+        ask = Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed)
+        return self._put(verb, ask, 0 if z is None else z.size)
 
     def _share(self, item: Interface | Pairing) -> int:
         """Return the number of something there, after a request to keep it if it is not there."""
@@ -141,34 +153,66 @@ class Host:
             return self._shelf[id(item)][1]
         if isinstance(item, Pairing):
             arrays = {name: PackedArray.pack(array) for name, array in item.items()}  # This may ask, so it comes first.
-            self._queue.append(SharePairing(self._next_number(), arrays))
+            self._queue.append((SharePairing(self._next_number(), arrays), None))
         else:
             meshes = item.nodes, item.slave.segments, item.master.segments
-            self._queue.append(ShareInterface(self._next_number(), *map(PackedArray.pack, meshes)))
-        self.keep(item, self._number)
+            self._queue.append((ShareInterface(self._next_number(), *map(PackedArray.pack, meshes)), None))
+        self._shelf[id(item)] = item, self._number
+        if len(self._shelf) > _SHELF:
+            _, (_, oldest) = self._shelf.popitem(last=False)
+            self._forgotten.append(oldest)
         return self._number
 
     def flush(self) -> None:
         """Send what waits in the queue, and give each question its answer."""
         self.last_question = monotonic()
-        requests, questions = self._queue, self._questions
-        self._queue, self._questions = [], []
+        waiting, self._queue = self._queue, []
+        questions = [question for _, question in waiting if question is not None]
         if len(self._forgotten) > _FORGET:
-            requests.append(Forget(self._forgotten))  # At the end, for a question that waits may need it.
+            waiting.append((Forget(self._forgotten), None))  # At the end, for a question that waits may need it.
             self._forgotten = []
         if self._process is None:
-            for question in questions:
-                question.answer = PluginError(f"{questions[0].verb}: its process has ended", "channel")
+            verb = questions[0].verb if questions else ""
+            _answer_all(questions, PluginError(f"{verb}: its process has ended", "channel"))
             return
         try:
-            _exchange(self._process, requests, questions)
+            self._exchange(self._process, waiting, questions)
         except PluginError as error:
-            for question in questions:
-                question.answer = error if question.answer is None else question.answer
+            _answer_all(questions, error)
             self.n_ended += 1
-            self.n_hangs += error.cause == "hang"
+            if error.cause == "hang":
+                _hangs[self._key] += _AT_IMPORT if questions and questions[0].verb == "import" else 1
             self.read_last_words()
             self._process = None
+        except BaseException:  # The process is ended, see `PluginProcess.ask`, and nobody is to blame.
+            _answer_all(questions, PluginError("the question was interrupted", "not asked"))
+            self._process = None
+            raise
+
+    def _exchange(
+        self, process: PluginProcess, waiting: list[tuple[Request, Question | None]], questions: list[Question]
+    ) -> None:
+        """Send requests and receive the answers: all together if they are small and quick, else one after another."""
+        frame = encode([request for request, _ in waiting])
+        known = all(question.verb in self._known_verbs for question in questions)
+        if len(frame) <= _TOGETHER and (len(questions) <= 1 or (known and self._is_quick)):
+            self._ask(process, frame, questions)
+            return
+        for request, question in waiting:
+            self._ask(process, encode([request]), [question] if question is not None else [])
+
+    def _ask(self, process: PluginProcess, frame: bytes, questions: Sequence[Question]) -> None:
+        """Ask the process; a first call may take longer, by as much as the same one took in an earlier process."""
+        limit, start = self._limits.seconds, monotonic()
+        verb = questions[0].verb if questions else ""
+        if verb not in self._known_verbs:
+            limit = min(limit + self._first_seconds.get(verb, inf), self._limits.start_seconds)
+        process.ask(frame, questions, limit)
+        seconds = monotonic() - start
+        if questions:
+            self._is_quick = seconds <= _QUICK * self._limits.seconds
+            self._known_verbs.add(verb)
+            self._first_seconds.setdefault(verb, seconds)
 
     def read_last_words(self) -> bytes:
         """Return the end of what the process has printed, or the one before it."""
@@ -184,22 +228,16 @@ class Host:
             self._process = None
 
 
-def _exchange(process: PluginProcess, requests: list[Request], questions: list[Question]) -> None:
-    """Send requests and receive the answers: all together if they are small, else each answer before the next."""
-    frame = encode(requests)
-    if len(frame) <= _TOGETHER:
-        process.ask(frame, questions)
-        return
-    unanswered = iter(questions)
-    for request in requests:
-        process.ask(encode([request]), [next(unanswered)] if isinstance(request, Ask | Load) else [])
+def _answer_all(questions: Sequence[Question], error: PluginError) -> None:
+    """Let an error be the answer of the questions that have none."""
+    for question in questions:
+        question.answer = question.answer or error
 
 
 def answer_of(question: Question) -> Answer:
     """Return the answer to a question, or raise the ContractError that came instead of it."""
     answer = question.answer if isinstance(question.answer, Answer) else raise_failure(question.result)
-    if not isinstance(answer, Answer):
-        raise PluginError(f"{question.verb}: a {type(answer).__name__} where an answer was needed", "channel")
+    assert isinstance(answer, Answer)  # No other reply to it is decoded.
     return answer
 
 
@@ -222,6 +260,8 @@ def raise_failure(reply: Reply | PluginError, *, loading: bool = False) -> Reply
 
 _HOSTS: dict[tuple[tuple[str, ...], str, Limits, bool], Host] = {}
 _foreign_words: dict[str, bytes] = {}
+# How often no answer came from each formulation, in all of its processes that this process of the judge knows of.
+_hangs: Counter[tuple[tuple[str, ...], str, Limits]] = Counter()
 
 
 def host_of(command: tuple[str, ...], name: str, limits: Limits, *, second: bool = False) -> Host:
@@ -256,6 +296,16 @@ def note_last_words(words: Mapping[str, bytes]) -> None:
     _foreign_words.update(words)
 
 
+def hangs() -> Counter[tuple[tuple[str, ...], str, Limits]]:
+    """Return how often no answer came from each formulation, for other processes of the judge."""
+    return _hangs
+
+
+def note_hangs(known: Counter[tuple[tuple[str, ...], str, Limits]]) -> None:
+    """Take over what another process of the judge knows of formulations that do not answer."""
+    _hangs.update(known - _hangs)  # The larger one of both numbers.
+
+
 def end_all() -> dict[str, bytes]:
     """End the processes of all plugins, and return the last words that those of each name printed."""
     for host in _HOSTS.values():
@@ -266,4 +316,5 @@ def end_all() -> dict[str, bytes]:
     printed = last_words() | _foreign_words
     _HOSTS.clear()
     _foreign_words.clear()
+    _hangs.clear()
     return printed

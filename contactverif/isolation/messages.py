@@ -1,17 +1,24 @@
 """The messages between the judge and a plugin's process; `docs/reference/protocol.md` describes them.
 
 Rule: a message holds numbers, words and bytes, never an object. A plugin may write to the judge what it likes, so what
-comes from its process is decoded by these schemas and by `PackedArray.unpack` alone.
+comes from its process is decoded by these schemas and by `PackedArray.unpack` alone. What it sends takes no more
+memory here than a few times its bytes: lists and mappings, whose entries take more, have a longest length.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
+from contactverif.contract.foreign_text import one_line
 from contactverif.isolation.packed import PackedArray
+
+MOST_QUESTIONS = 16  # The number of questions in a message.
+_MOST_NAMES = 256  # The number of arrays in an answer, and of methods.
+_MOST_WORDS = 3  # A misuse has so many; other failures have one.
+_LONGEST_REASON = 200  # Characters of what msgspec says of a message.
 
 
 class MessageError(Exception):
@@ -71,7 +78,7 @@ class Answer(msgspec.Struct, array_like=True, tag="answer"):
     """The arrays of an answer by name, and the time of the call there: by the wall clock and of the processor."""
 
     question: int
-    arrays: dict[str, PackedArray]
+    arrays: Annotated[dict[str, PackedArray], msgspec.Meta(max_length=_MOST_NAMES)]
     seconds: float
     processor_seconds: float
     count: int = 0  # The number of multipliers.
@@ -84,15 +91,15 @@ class Failure(msgspec.Struct, array_like=True, tag="failure"):
     question: int
     kind: Literal["plugin", "contract", "not finite", "misuse"]
     cause: str
-    words: tuple[str, ...]
+    words: Annotated[tuple[str, ...], msgspec.Meta(max_length=_MOST_WORDS)]
 
 
 class Loaded(msgspec.Struct, array_like=True, tag="loaded"):
     """A formulation that was loaded: its traits, and the optional methods that it has."""
 
     question: int
-    traits: dict[str, Any]
-    provides: list[str]
+    traits: dict[str, Any]  # Anything at all, so a message of this kind must be short.
+    provides: Annotated[list[str], msgspec.Meta(max_length=_MOST_NAMES)]
 
 
 class Unloaded(msgspec.Struct, array_like=True, tag="unloaded"):
@@ -114,7 +121,12 @@ Reply = Answer | Failure | Loaded | Unloaded | Wraps
 
 _encoder = msgspec.msgpack.Encoder()
 _request_decoder: msgspec.msgpack.Decoder[list[Request]] = msgspec.msgpack.Decoder(list[Request])
-_reply_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(list[Reply])
+_answer_decoder: msgspec.msgpack.Decoder[list[Answer | Failure]] = msgspec.msgpack.Decoder(
+    Annotated[list[Answer | Failure], msgspec.Meta(max_length=MOST_QUESTIONS)]
+)
+_load_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(
+    Annotated[list[Loaded | Unloaded | Wraps | Failure], msgspec.Meta(max_length=1)]
+)
 
 
 def encode(messages: Sequence[Request] | Sequence[Reply]) -> bytes:
@@ -127,9 +139,13 @@ def decode_requests(data: bytes) -> list[Request]:
     return _request_decoder.decode(data)
 
 
-def decode_replies(data: bytes) -> list[Reply]:
-    """Return the messages that a plugin's process sent, or raise a MessageError if they are none."""
+def decode_replies(data: bytes, *, loading: bool = False) -> Sequence[Reply]:
+    """Return the messages that a plugin's process sent, or raise a MessageError if they are none.
+
+    Only while it loads may it say what it is, and then it says nothing else.
+    """
+    decoder = _load_decoder if loading else _answer_decoder
     try:
-        return _reply_decoder.decode(data)
+        return decoder.decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise MessageError(f"a message that cannot be read ({type(error).__name__})") from error
+        raise MessageError(f"a message that cannot be read: {one_line(str(error), _LONGEST_REASON)}") from error

@@ -23,6 +23,7 @@ from typing import IO
 import psutil
 
 from contactverif.contract.errors import PluginError
+from contactverif.isolation.active_clock import ActiveClock
 from contactverif.isolation.box import enclose, temporary_folder
 from contactverif.isolation.box import environment as box_environment
 from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
@@ -38,7 +39,12 @@ MEMORY = "CONTACTVERIF_MEMORY"  # The megabytes that the process may take.
 _run = uuid.uuid4().hex
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36
-_LARGEST_ANSWER = 512  # Megabytes. The judge keeps some answers at a time, in its own memory.
+# An answer is joined, decoded, copied and converted, so it costs the judge a few times its bytes. A tangent in entries
+# has 24 bytes for each, and some hundred points of a segment add some dozen. A dense one has 8 for each two unknowns.
+_ANSWER, _ANSWER_A_NUMBER = 1 << 20, 1 << 17  # Bytes of any answer, and as many more for each number of the state.
+_LARGEST_ANSWER = 128  # Megabytes of all answers to one message.
+_LOOKS = 16  # The number of looks at a process that does not answer, within its time.
+_LONGEST_STEP = 1.0  # Seconds.
 _SECONDS_TO_DIE = 5.0
 _SECONDS_TO_READ = 1.0
 _LAST_WORDS = 2000  # Bytes.
@@ -51,12 +57,16 @@ _OTHER_SETTINGS = {"PYTHONHASHSEED": "4711"}
 
 
 class Question:
-    """A question with its number and its method, and the answer once it is there."""
+    """A question with its number and its method, and the answer once it is there.
 
-    __slots__ = ("answer", "number", "verb")
+    `size` is the number of numbers that it is about: the answer may have more bytes where they are more.
+    """
 
-    def __init__(self, number: int, verb: str) -> None:
+    __slots__ = ("answer", "largest", "number", "verb")
+
+    def __init__(self, number: int, verb: str, size: int = 0) -> None:
         self.number, self.verb = number, verb
+        self.largest = _ANSWER + size * _ANSWER_A_NUMBER
         self.answer: Reply | PluginError | None = None
 
     @property
@@ -96,56 +106,64 @@ class PluginProcess:
             raise PluginError(f"import: {command[0]} does not start: {error.strerror}", "exit", ended=True) from error
         finally:
             self.output.start()
-        self._known_verbs: set[str] = set()
         self._core = -1
 
-    def ask(self, frame: bytes, questions: Sequence[Question]) -> None:
+    def ask(self, frame: bytes, questions: Sequence[Question], seconds: float | None = None) -> None:
         """Send encoded requests, and give each question its reply, of a known kind with nothing else checked.
 
-        The first call of each method may take longer. If the process ends, hangs or says what cannot be read, it is
-        ended, and a PluginError is raised.
+        All replies have to come within some seconds, by default those of a start. If the process ends, hangs or says
+        what cannot be read, it is ended, and a PluginError is raised. If anything else comes between, such as Ctrl-C,
+        it is ended, too, or its next reply would be that to an earlier question.
         """
         if len(questions) > 1:
             os.pwrite(self._progress.fileno(), b"\0", 0)
         self._follow()
         try:
-            self._child.channel.send(frame, seconds=self._limits.start_seconds)
-            replies = decode_replies(self._receive(questions)) if questions else []
-            if [reply.question for reply in replies] != [question.number for question in questions]:
-                raise MessageError("answers to other questions")
-        except TooLateError:
-            raise self._end_with(f"{self._last_verb(questions)}: its process does not listen", "hang") from None
+            replies = self._exchange(frame, questions, seconds or self._limits.start_seconds)
+        except TooLateError as error:
+            raise self._end_with(f"{self._last_verb(questions)}: {error}", "hang") from None
         except ClosedError:
             raise self._end_with(self._last_verb(questions), "") from None
         except TooLargeError as error:
             raise self._end_with(f"{self._last_verb(questions)}: an answer of {error}", "memory") from None
         except MessageError as error:
             raise self._end_with(f"{self._last_verb(questions)}: {error}", "channel") from None
+        except BaseException:
+            self.end()
+            raise
         for question, reply in zip(questions, replies, strict=True):
             question.answer = reply
-            self._known_verbs.add(question.verb)
+
+    def _exchange(self, frame: bytes, questions: Sequence[Question], seconds: float) -> Sequence[Reply]:
+        """Send requests, and return the replies."""
+        try:
+            self._child.channel.send(frame, self._limits.start_seconds)
+        except TooLateError:
+            raise TooLateError("its process does not listen") from None
+        if not questions:
+            return []
+        data = self._receive(seconds, sum(question.largest for question in questions))
+        replies = decode_replies(data, loading=questions[0].verb == "import")
+        if [reply.question for reply in replies] != [question.number for question in questions]:
+            raise MessageError("answers to other questions")
+        return replies
+
+    def _receive(self, seconds: float, largest: int) -> bytes:
+        """Return the next frame, for which the process may use some seconds, however little of it comes at a time."""
+        step, clock = min(seconds / _LOOKS, _LONGEST_STEP), None
+        while clock is None or clock.seconds < seconds:
+            try:
+                return self._child.channel.receive(step, largest)
+            except TooLateError:
+                clock = clock or ActiveClock(self._child.pid)
+                clock.look()
+        raise TooLateError(f"no answer within {seconds:g} s")
 
     def _last_verb(self, questions: Sequence[Question]) -> str:
         """Return the method that the process is working on, as it says."""
-        return questions[self._count_answers(questions)].verb if questions else "make"
-
-    def _count_answers(self, questions: Sequence[Question]) -> int:
-        """Return the number of questions that the process has done with, as it says; less than there are."""
         # A file that is read cannot do harm. One that is mapped into memory can: the plugin may cut it.
-        return min((os.pread(self._progress.fileno(), 1, 0) or b"\0")[0], len(questions) - 1)
-
-    def _receive(self, questions: Sequence[Question]) -> bytes:
-        """Return the next frame, each of the methods having its own time."""
-        number = 0
-        while True:
-            verb = questions[number].verb
-            seconds = self._limits.seconds if verb in self._known_verbs else self._limits.start_seconds
-            try:
-                return self._child.channel.receive(seconds)
-            except TooLateError:
-                before, number = number, self._count_answers(questions)
-            if number <= before:
-                raise self._end_with(f"{verb}: no answer within {seconds:g} s", "hang")
+        number = (os.pread(self._progress.fileno(), 1, 0) or b"\0")[0]
+        return questions[min(number, len(questions) - 1)].verb if questions else "make"
 
     def _follow(self) -> None:
         """Put the process on the core of the judge."""

@@ -115,7 +115,8 @@ class RemoteFormulation(Prefetching):
         if not host.is_alive(self._started):
             self._number, self._started = host.make(self._penalty)
             weakref.finalize(self, host.forget, self._number, self._started)
-        self._last = host.ask(verb, self._number, interface, pairing, z, timed=self.timed)
+        kept = pairing.number_in(host) if isinstance(pairing, RemotePairing) else None
+        self._last = host.ask(verb, self._number, interface, pairing if kept is None else kept, z, timed=self.timed)
         return self._last
 
     def _answer(
@@ -126,6 +127,8 @@ class RemoteFormulation(Prefetching):
             self._host.flush()
         if isinstance(pairing, RemotePairing):
             pairing.check()
+        if not self.timed:
+            self._last = None  # It would keep the answer.
         return answer_of(question)
 
     @contextmanager
@@ -168,9 +171,7 @@ class RemoteFormulation(Prefetching):
     def pair(self, interface: Interface, z: FloatArray) -> Pairing:
         """Return the pairing at one state z (n_unknowns,). It is asked for together with the next question."""
         question = self._ask("pair", interface, None, z)
-        pairing = RemotePairing(self._host, question, interface)
-        self._host.keep(pairing, question.number)
-        return pairing
+        return RemotePairing(self._host, question, interface)
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns)."""
@@ -197,13 +198,23 @@ class RemoteFormulation(Prefetching):
 
 
 class RemotePairing(Pairing):
-    """A pairing that the process of a plugin keeps. It comes here, and is checked, when it is looked into."""
+    """A pairing that the process of a plugin keeps. It comes here, and is checked, when it is looked into.
 
-    __slots__ = ("_content", "_host", "_interface", "_question")
+    The process keeps it as long as this object is there, and nobody here keeps more of it than this object.
+    """
+
+    __slots__ = ("_content", "_host", "_interface", "_question", "_started")
 
     def __init__(self, host: Host, question: Question, interface: Interface) -> None:
-        self._host, self._question, self._interface = host, question, interface
+        self._host, self._question, self._interface, self._started = host, question, interface, host.n_started
         self._content: dict[str, Array] | None = None
+
+    def __del__(self) -> None:
+        self._host.forget(self._question.number, self._started)
+
+    def number_in(self, host: Host) -> int | None:
+        """Return the number under which the process of a host keeps it now; None if it does not."""
+        return self._question.number if host is self._host and host.is_alive(self._started) else None
 
     @property
     def _arrays(self) -> dict[str, Array]:  # type: ignore[override]
@@ -211,10 +222,12 @@ class RemotePairing(Pairing):
         if self._content is None:
             if self._question.answer is None:
                 self._host.flush()
-            whole = Pairing(_unpack("pair", answer_of(self._question)))
+            answer = answer_of(self._question)
+            whole = Pairing(_unpack("pair", answer))
             whole.check_bounds(self._interface)
             self.check()
             self._content = dict(whole)
+            answer.arrays.clear()  # They are copies by now.
         return self._content
 
     @property

@@ -39,7 +39,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.result import Row
-from contactverif.isolation.host import last_words, note_last_words
+from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
 from contactverif.isolation.one_thread import ONE_THREAD, one_thread_for_children
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.run.registry import installed_properties, load_property
@@ -125,7 +125,7 @@ class Scheduler:
         if self._executor is None:
             return None
         try:
-            encoded = encode((job.function, job.arguments))
+            encoded = encode((job.function, job.arguments, hangs()))
         except Exception:  # Pickle raises errors of many kinds.
             return None
         try:
@@ -141,18 +141,20 @@ class Scheduler:
             raise _worker_error() from error
         if answer == _NOT_HERE:
             return job.function(*job.arguments, **self._counter(job))
-        result, words = decode(answer)
+        result, words, known_hangs = decode(answer)
         note_last_words(words)
+        note_hangs(known_hangs)
         return result
 
 
 def _do(encoded: bytes) -> bytes:
-    """Do a job in a worker, and return its result with what plugins have printed there."""
+    """Do a job in a worker, and return its result with what plugins have printed there, and how often they hung."""
     try:
-        function, arguments = decode(encoded)
+        function, arguments, known_hangs = decode(encoded)
     except Exception:  # A module, or a class in a notebook, that is not here.
         return _NOT_HERE
-    return encode((function(*arguments), last_words()))
+    note_hangs(known_hangs)
+    return encode((function(*arguments), last_words(), hangs()))
 
 
 def _worker_error() -> WorkerError:

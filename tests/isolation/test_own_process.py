@@ -134,7 +134,7 @@ def test_a_plugin_pairs_with_a_handle_always_or_never() -> None:
 def test_whatever_it_does_is_an_error_that_says_it(name: str, cause: str, words: str) -> None:
     subject = load_remote(hostile_few.PROGRAM, name, QUICK)
     if name in ("Hangs", "HangsInPair", "Cuts", "TooLong"):  # The import takes longer than such a limit.
-        subject.host._process._limits = Limits(seconds=0.1)
+        subject.host._limits = Limits(seconds=0.1)
     with pytest.raises(PluginError, match=words) as caught:
         ask(subject)
     assert caught.value.cause == cause

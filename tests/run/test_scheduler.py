@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
@@ -16,6 +17,8 @@ import pytest
 from contactverif import Case, Interface, Outcome, Row, Run, Subject, load_formulation, load_properties, named_case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.traits import Traits
+from contactverif.isolation import host
+from contactverif.isolation.limits import Limits
 from contactverif.run import scheduler
 from contactverif.run.run import run
 from contactverif.run.scheduler import CaseChunk, WorkerError, decode, default_jobs, encode, usable_cores, worker_pool
@@ -152,9 +155,20 @@ def test_an_interrupt_in_the_parent_ends_workers_that_hear_none_themselves(pool:
         assert worker.exitcode != 0
 
 
+def test_how_often_a_plugin_hung_in_one_process_is_known_in_the_others() -> None:
+    known, key = host.hangs(), (("program",), "sleeper", Limits())
+    job = encode((abs, (-1,), Counter({key: 1})))
+    for _ in range(2):  # A number that comes back is not counted again.
+        _, _, there = decode(scheduler._do(job))
+        host.note_hangs(there)
+        assert known[key] == 1
+    host.end_all()
+    assert not known
+
+
 def test_what_a_plugin_prints_in_a_worker_comes_to_the_parent(pool: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scheduler, "last_words", lambda: {"loud": b"words"})
-    result, words = decode(scheduler._do(encode((abs, (-1,)))))
+    result, words, _ = decode(scheduler._do(encode((abs, (-1,), Counter()))))
     assert (result, words) == (1, {"loud": b"words"})
     results: list[int] = []
     jobs = (scheduler.Job(abs, (number,), lambda answer: results.append(answer) or ()) for number in (-2, -3))
