@@ -27,6 +27,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
+from contactverif.mechanics.newton import DIVERGENCE_FACTOR
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.problems.blocks import two_blocks
@@ -208,7 +209,13 @@ def make_scene(name: str, **options: Any) -> Scene:
         is_default = value is None and defaults[option] is None
         if not is_default and (needed := _describe_need(name, option, value)):
             raise MisuseError(f"{option} of scene {name}", repr(value), needed)
-    return _maker(name)(**options)
+    scene = _maker(name)(**options)
+    with np.errstate(all="ignore"):  # Whatever overflows is refused.
+        is_near = np.abs(scene.start).max(initial=0.0) <= DIVERGENCE_FACTOR * np.abs(scene.interface.nodes).max()
+    if not is_near:  # Newton's method would end before its first step.
+        values = ", ".join(f"{option}={value}" for option, value in options.items())
+        raise MisuseError(f"options of scene {name}", values, "more stiffness or less pressure: it starts too far away")
+    return scene
 
 
 def options_of(name: str) -> Mapping[str, Any]:

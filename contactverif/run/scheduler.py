@@ -201,7 +201,11 @@ def worker_pool(jobs: int) -> Iterator[Executor | None]:
         yield None
         return
     before = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_begin_worker)
+    try:
+        pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_begin_worker)
+    except (OSError, ImportError) as error:  # Python needs semaphores for it, and they are in shared memory.
+        reason = f"{jobs}, but processes cannot share memory here: {getattr(error, 'strerror', None) or error}"
+        raise MisuseError("--jobs", reason, "--jobs 1, or a /dev/shm that can be written") from error
     try:
         yield pool
     except BaseException:

@@ -275,6 +275,9 @@ WRONG = {
 }
 
 
+FAR = "more stiffness or less pressure: it starts too far away"
+
+
 @pytest.mark.parametrize(("text", "message"), WRONG.items(), ids=lambda text: text[:24])
 def test_what_is_no_scene(text: str, message: str) -> None:
     with pytest.raises(MisuseError) as error:
@@ -294,6 +297,10 @@ def test_what_is_no_scene(text: str, message: str) -> None:
         ("c", {"force": 1.0}, f"option of scene c: found 'force'; needed one of {', '.join(sorted(options_of('c')))}"),
         ("example-2", {"force": None}, "force of scene example-2: found None; needed a number"),
         ("c", {"lowered": float("nan")}, "lowered of scene c: found nan; needed a finite number"),
+        *(
+            ("c", {option: value}, f"options of scene c: found {option}={value}; needed {FAR}")
+            for option, value in (("penalty", 1e-300), ("pressure", 1e300), ("young", 1e-300), ("penalty", 1e-12))
+        ),
     ],
 )
 def test_what_is_no_scene_in_python(name: str, options: dict[str, Any], message: str) -> None:

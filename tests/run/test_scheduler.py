@@ -1,6 +1,8 @@
 """The work of a run in several processes: the same results, and a clear end whatever happens to a worker."""
 
+import errno
 import multiprocessing
+import multiprocessing.synchronize
 import os
 import signal
 import sys
@@ -153,6 +155,16 @@ def test_an_interrupt_in_the_parent_ends_workers_that_hear_none_themselves(pool:
     for worker in started:
         worker.join()
         assert worker.exitcode != 0
+
+
+def test_processes_that_cannot_share_memory_have_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(multiprocessing.synchronize.SemLock, "__init__", refuse)
+    words = "--jobs: found 2, but .*Read-only file system; needed --jobs 1, or a /dev/shm that can be written"
+    with pytest.raises(MisuseError, match=words), worker_pool(2):
+        pass
 
 
 def test_how_often_a_plugin_hung_in_one_process_is_known_in_the_others() -> None:
