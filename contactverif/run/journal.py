@@ -230,6 +230,7 @@ def hold_journal(folder: Path, argument: str) -> Iterator[None]:
     try:
         file = (folder / _HEADER).open("rb")
     except OSError:
+        _check_there(folder, argument)
         raise MisuseError(argument, f"{folder.name}, which is no journal of a run", "another name") from None
     with file:
         try:
@@ -239,7 +240,15 @@ def hold_journal(folder: Path, argument: str) -> Iterator[None]:
             raise MisuseError(argument, f"{folder.name}, of a run that is going on", needed) from None
         except OSError:
             pass
+        _check_there(folder, argument)
         yield
+
+
+def _check_there(folder: Path, argument: str) -> None:
+    """Check that no other process has completed the run, and removed the journal, since it was read."""
+    if not folder.exists():
+        found = f"no journal {folder.name} any more, since another process has completed the run"
+        raise MisuseError(argument, found, "that of a run that was stopped")
 
 
 def read_header(folder: Path, kind: type[_Record], argument: str) -> _Record:

@@ -1,5 +1,6 @@
 """The journal of a run: what is read again is what was noted, and nothing that is damaged is believed."""
 
+import fcntl
 import random
 from collections.abc import Sequence
 from dataclasses import replace
@@ -230,6 +231,21 @@ def test_two_runs_do_not_share_a_journal(tmp_path: Path) -> None:
     begin_journal(folder, PLAN, [])
     with hold_journal(folder, "--out"), pytest.raises(MisuseError, match="of a run that is going on"):
         begin_journal(folder, PLAN, [])
+
+
+@pytest.mark.parametrize("moment", ["opens", "locks"])
+def test_a_journal_that_another_process_completes_meanwhile_is_gone(
+    moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "r.nc.journal"
+    begin_journal(folder, PLAN, [])
+    if moment == "opens":
+        remove_journal(folder)
+    else:
+        monkeypatch.setattr(fcntl, "flock", lambda *_: remove_journal(folder))
+    words = r"--resume: found no journal r\.nc\.journal any more, since another process has completed the run"
+    with pytest.raises(MisuseError, match=words), hold_journal(folder, "--resume"):
+        pass
 
 
 def test_a_folder_of_another_kind_is_left_alone(tmp_path: Path) -> None:
