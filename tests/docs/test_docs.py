@@ -113,7 +113,7 @@ def test_the_first_command_is_made_of_what_is_there() -> None:
     command = blocks("sh", README.read_text(encoding="utf-8"))[0]
     make, install, verify = (shlex.split(part) for part in command.split("&&"))
     assert make == ["python3", "-m", "venv", ".venv"]
-    assert install == [".venv/bin/pip", "install", "."]
+    assert install == [".venv/bin/pip", "install", ".[box]"]
     assert verify[:2] == [".venv/bin/contactverif", "verify"]
     assert verify[2] in formulation_names()
 
