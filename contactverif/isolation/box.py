@@ -129,7 +129,10 @@ def temporary_folder() -> str:
 def _sockets() -> list[str]:
     """Return the sockets of programs that would do for a plugin what the box forbids, and the folder with most."""
     folders = [path for path in ("/run",) if os.path.isdir(path) and not _holds_code(path)]
-    lines = Path("/proc/net/unix").read_text(errors="replace").splitlines()
+    try:
+        lines = Path("/proc/net/unix").read_text(errors="replace").splitlines()
+    except OSError:  # A system without procfs has no boxes, and the trial says so.
+        return folders
     names = {line.split(maxsplit=7)[-1] for line in lines}
     return folders + sorted(name for name in names if Path(name).is_socket() and not name.startswith((*folders, "@")))
 

@@ -111,6 +111,11 @@ class Host:
         return question
 
     @property
+    def libraries(self) -> list[str]:
+        """Return name and digest of the compiled code that its process has loaded beyond that of the judge."""
+        return [] if self._process is None else self._process.libraries
+
+    @property
     def has_process(self) -> bool:
         """Return whether there is a process now."""
         return self._process is not None

@@ -9,7 +9,6 @@ from __future__ import annotations
 import atexit
 import ctypes
 import os
-import shutil
 import sys
 import tempfile
 import threading
@@ -29,9 +28,11 @@ from contactverif.isolation.box import environment as box_environment
 from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
 from contactverif.isolation.child import Child, name_of_signal
 from contactverif.isolation.limits import MEGABYTE, Limits
+from contactverif.isolation.mapped_code import list_libraries
 from contactverif.isolation.messages import MessageError, Reply, decode_replies
 from contactverif.isolation.one_core import JUDGE
 from contactverif.isolation.one_thread import ONE_THREAD
+from contactverif.isolation.plugin_folder import plugin_folder, remove_plugin_folder
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
 PROGRESS = "CONTACTVERIF_PROGRESS"  # The number of an open file of one byte, see `docs/reference/protocol.md`.
@@ -91,7 +92,7 @@ class PluginProcess:
         largest = min(limits.memory, _LARGEST_ANSWER) * MEGABYTE
         settings, files = _SETTINGS | (_OTHER_SETTINGS if second else {}), [self._progress.fileno()]
         encloses = limits.box is not None and not limits.box.by_rules
-        folder = temporary_folder() if encloses else _folder()
+        folder = temporary_folder() if encloses else plugin_folder()
         numbers |= {"TMPDIR": folder} if limits.box is None else box_environment(limits.box, folder)
         if limits.box is not None and encloses:
             command = enclose(tuple(command), limits.box, limits.memory)
@@ -173,6 +174,11 @@ class PluginProcess:
                 os.sched_setaffinity(self._worker_pid, {JUDGE.core})
             self._core = JUDGE.core
 
+    @property
+    def libraries(self) -> list[str]:
+        """Return name and digest of the compiled code that the process has loaded beyond that of the judge."""
+        return list_libraries(self._worker_pid)
+
     @cached_property
     def _worker_pid(self) -> int:
         """The number of the process that answers. In a box it is the first child of the first one there."""
@@ -238,12 +244,6 @@ def _file_of_one_byte() -> IO[bytes]:
 
 
 @cache
-def _folder() -> str:
-    """Return the folder for temporary files of the plugins of this process of the judge."""
-    return tempfile.mkdtemp(prefix=f"contactverif-{os.getpid()}-")
-
-
-@cache
 def _end_at_exit() -> None:
     """Let this process end its plugins' processes when it ends. One of a pool does not call what `atexit` has."""
     atexit.register(end_marked)
@@ -268,6 +268,4 @@ def end_marked() -> None:
             if os.getsid(process.pid) != os.getsid(0):
                 process.kill()
                 process.wait(_SECONDS_TO_DIE)
-    if _folder.cache_info().currsize:
-        shutil.rmtree(_folder(), ignore_errors=True)
-        _folder.cache_clear()
+    remove_plugin_folder()

@@ -61,14 +61,16 @@ def count_ends(subject: Subject) -> int:
 
 
 def places(subjects: Iterable[Subject]) -> dict[str, str]:
-    """Return {attribute of the report: value} that say where formulations lived, and what was open to them."""
-    kinds, opened = set[str](), set[str]()
+    """Return {attribute of the report: value}: where formulations lived, what was open to them, and their libraries."""
+    facts: dict[str, set[str]] = {"isolation": set(), "opened": set(), "libraries": set()}
     for subject in subjects:
         box = subject.box if isinstance(subject, RemoteSubject) else None
+        if isinstance(subject, RemoteSubject):
+            facts["libraries"] |= set(subject.host.libraries)
         inside = "process" if isinstance(subject, RemoteSubject) else "inline"
-        kinds.add(inside if box is None else box.kind)
-        opened |= set(box.opened) if box is not None else set()
-    return {"isolation": "; ".join(sorted(kinds)), "opened": "; ".join(sorted(opened))}
+        facts["isolation"].add(inside if box is None else box.kind)
+        facts["opened"] |= set(box.opened) if box is not None else set()
+    return {name: "; ".join(sorted(values)) for name, values in facts.items()}
 
 
 @dataclass(frozen=True)

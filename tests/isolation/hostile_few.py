@@ -9,6 +9,7 @@ import contextlib
 import os
 import signal
 import time
+from importlib import import_module
 
 import numpy as np
 from scipy import sparse
@@ -222,6 +223,14 @@ class MatrixWithNothing(Matrix):
     def change(self, matrix):
         matrix.data[0] = np.nan
         return matrix
+
+
+class LoadsLibrary(Springs):
+    """It loads compiled code that nobody else needs."""
+
+    def __init__(self, *, penalty):
+        import_module("_curses")
+        super().__init__(penalty=penalty)
 
 
 class TakesAll(Springs):

@@ -16,7 +16,7 @@ from contactverif.contract.result import NotLoaded
 from contactverif.isolation import host, process
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
-from contactverif.isolation.remote_formulation import RemoteSubject, count_ends
+from contactverif.isolation.remote_formulation import RemoteSubject, count_ends, places
 from contactverif.run.scheduler import worker_pool
 
 CASE = named_case("c")
@@ -281,3 +281,15 @@ def _is_marked(item: psutil.Process) -> bool:
 def test_limits_are_positive() -> None:
     with pytest.raises(MisuseError, match="time limit: found 0"):
         Limits(seconds=0)
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/maps"), reason="this system does not show what is mapped")
+def test_the_report_names_the_compiled_code_of_the_process_and_not_that_of_the_judge() -> None:
+    subject = load_remote((*hostile_few.PROGRAM,), "LoadsLibrary", QUICK)
+    assert isinstance(subject, RemoteSubject)
+    facts = places([subject, Subject("near", hostile_few.Springs)])
+    assert facts["isolation"] == "inline; process"
+    assert facts["opened"] == ""
+    names = [entry.split()[0] for entry in facts["libraries"].split("; ")]
+    assert any(name.startswith("_curses") for name in names)
+    assert not any("_multiarray_umath" in name for name in names)

@@ -30,7 +30,9 @@ SUMMARY, COUNTEREXAMPLES, TIMING, CASE = "summary", "counterexamples", "timing",
 NAMED_CASES = "named_cases"  # The group of the named cases that some formulation fails; only some reports have it.
 RESERVED = frozenset({SUMMARY, COUNTEREXAMPLES, TIMING, NAMED_CASES})
 # Root attributes in which two equal runs may differ.
-OFF_THE_RECORD = frozenset({"created", "command", "platform", "blas", "cpu_features", "isolation", "opened"})
+OFF_THE_RECORD = frozenset(
+    {"created", "command", "platform", "blas", "cpu_features", "isolation", "opened", "libraries"}
+)
 PARTS = ("pair", "tangent", "contact_points")
 
 LENGTH, PENALTY, RATIO, SECONDS, UNKNOWN = "m", "N m-2", "1", "s", "unknown"

@@ -1,0 +1,43 @@
+"""The folder for temporary files of plugins: a process that was killed leaves none for long."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from contactverif.isolation.plugin_folder import plugin_folder, remove_plugin_folder
+
+HOLDER = """
+from contactverif.isolation.plugin_folder import plugin_folder
+
+print(plugin_folder(), flush=True)
+input()
+"""
+
+
+@pytest.fixture
+def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    remove_plugin_folder()
+    yield tmp_path
+    remove_plugin_folder()
+
+
+def test_the_folder_of_a_killed_process_goes_and_that_of_a_living_one_stays(empty: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as holder:
+        assert holder.stdout is not None
+        other = Path(holder.stdout.readline().strip())
+        (other / "file").touch()
+        mine = Path(plugin_folder())
+        assert {*empty.iterdir()} == {other, mine}
+        holder.kill()
+    remove_plugin_folder()
+    assert {*empty.iterdir()} == {other}
+    mine = Path(plugin_folder())
+    assert {*empty.iterdir()} == {mine}
