@@ -17,13 +17,13 @@ from functools import cache
 from hashlib import blake2b
 from pathlib import Path
 
+from contactverif.isolation.control_group import MOST_PROCESSES
 from contactverif.isolation.landlock import NETWORK, WRITABLE, landlock_version
 
 PROCESSES = "CONTACTVERIF_PROCESSES"  # The environment variable with the most processes and threads in a box.
-_MOST_PROCESSES = 512
 _SECONDS_TO_TRY = 10.0
 _INSTALL = "install the package bubblewrap of the system, or contactverif[box]"
-_ALLOW = "allow user namespaces, see 'What is not contained' in the documentation"
+_ALLOW = "allow user namespaces, see 'What a plugin can do' in the documentation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def environment(box: Box, folder: str) -> dict[str, str]:
     places = {"TMPDIR": folder, "NUMBA_CACHE_DIR": store}
     if box.by_rules:
         return places | {WRITABLE: os.pathsep.join((folder, store, *box.opened))}
-    return places | {PROCESSES: str(_MOST_PROCESSES)}
+    return places | {PROCESSES: str(MOST_PROCESSES)}
 
 
 def kernel_folder(name: str) -> str:

@@ -27,6 +27,7 @@ from contactverif.isolation.box import enclose, temporary_folder
 from contactverif.isolation.box import environment as box_environment
 from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
 from contactverif.isolation.child import Child, name_of_signal
+from contactverif.isolation.control_group import ControlGroup
 from contactverif.isolation.limits import MEGABYTE, Limits
 from contactverif.isolation.mapped_code import list_libraries
 from contactverif.isolation.messages import MessageError, Reply, decode_replies
@@ -94,8 +95,10 @@ class PluginProcess:
         encloses = limits.box is not None and not limits.box.by_rules
         folder = temporary_folder() if encloses else plugin_folder()
         numbers |= {"TMPDIR": folder} if limits.box is None else box_environment(limits.box, folder)
+        self._group = None
         if limits.box is not None and encloses:
-            command = enclose(tuple(command), limits.box, limits.memory)
+            self._group = ControlGroup(limits.memory)
+            command = self._group.join(enclose(tuple(command), limits.box, limits.memory))
         self._encloses = encloses
         try:
             with JUDGE.on_one_core():
@@ -206,6 +209,8 @@ class PluginProcess:
         self._child.end()
         self.output.wait()
         self._progress.close()
+        if self._group is not None:
+            self._group.remove()
 
 
 class Output:

@@ -42,6 +42,25 @@ def stop_process(number):
     os.kill(int(number), signal.SIGSTOP)
 
 
+def fork_often(count):
+    """Start many processes at a time, each of which waits."""
+    for _ in range(int(count)):
+        if os.fork() == 0:
+            signal.pause()
+
+
+def fill_memory(megabytes):
+    """Take memory in four processes together, each less than a process may take."""
+    for _ in range(4):
+        if os.fork() == 0:
+            block = bytearray(int(megabytes) * 2**18)
+            block[::4096] = b"x" * len(block[::4096])
+            os._exit(0)
+    statuses = [os.wait()[1] for _ in range(4)]
+    if any(statuses):
+        raise MemoryError
+
+
 def limit_process(number):
     psutil.Process(int(number)).rlimit(psutil.RLIMIT_CORE, (0, 0))
 
@@ -72,7 +91,7 @@ def try_everything():
         verb, _, target = line.partition(" ")
         try:
             globals()[verb](target)
-        except (OSError, psutil.Error):
+        except (OSError, MemoryError, psutil.Error):
             continue
         successes.append(verb)
     return successes

@@ -18,8 +18,10 @@ from contactverif import Subject, load_formulation, named_case
 from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import box as boxes
-from contactverif.isolation import process
+from contactverif.isolation import control_group, process
 from contactverif.isolation.box import Box, why_no_box
+from contactverif.isolation.control_group import MOST_PROCESSES, ControlGroup, may_group
+from contactverif.isolation.host import end_all
 from contactverif.isolation.landlock import NETWORK, landlock_version
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
@@ -28,10 +30,12 @@ LIMITS = Limits(seconds=20.0, memory=2000, box=Box())
 needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
 
 
-def try_targets(monkeypatch: pytest.MonkeyPatch, box: Box | None, **targets: object) -> set[str]:
+def try_targets(
+    monkeypatch: pytest.MonkeyPatch, box: Box | None, limits: Limits = LIMITS, **targets: object
+) -> set[str]:
     """Return which attempts a plugin manages, {method of `boxed_few`: what it aims at}."""
     monkeypatch.setenv(boxed_few.TARGETS, "\n".join(f"{verb} {target}" for verb, target in targets.items()))
-    item = load_remote(boxed_few.PROGRAM, "Attempts", replace(LIMITS, box=box))
+    item = load_remote(boxed_few.PROGRAM, "Attempts", replace(limits, box=box))
     assert isinstance(item, NotLoaded)
     return set(item.reason.partition("managed: ")[2].split()) - {"nothing"}
 
@@ -138,6 +142,22 @@ def test_a_terminal_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     finally:
         os.close(ours)
         os.close(theirs)
+
+
+@needs_box
+@pytest.mark.skipif(not may_group(), reason="this user may make no control group")
+def test_all_processes_of_a_box_share_the_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    groups = list[ControlGroup]()
+    make = ControlGroup.__init__
+    monkeypatch.setattr(ControlGroup, "__init__", lambda self, *limit: (groups.append(self), make(self, *limit))[1])
+    assert try_targets(monkeypatch, Box(), fork_often=2 * MOST_PROCESSES) == set()
+    assert try_targets(monkeypatch, Box(), fork_often=MOST_PROCESSES // 4) == {"fork_often"}
+    monkeypatch.setattr(control_group, "_BASE", 256 << 20)
+    small = replace(LIMITS, memory=1000)
+    assert try_targets(monkeypatch, Box(), small, fill_memory=3600) == set()
+    assert try_targets(monkeypatch, Box(), small, fill_memory=400) == {"fill_memory"}
+    end_all()
+    assert not [folder for group in groups for folder in group.folders]
 
 
 @needs_box
