@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.run_endings import show_what_plugins_printed
+from contactverif.cli.run_endings import say_what_was_doubted, show_what_plugins_printed
 from contactverif.cli.shared_options import PropertyGlobs, SamplingOptions, formulation_argument
 from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
 
 if TYPE_CHECKING:
     from contactverif.run.campaign import Shard
-    from contactverif.run.run_journal import Plan
+    from contactverif.run.run_journal import Journal, Plan
 
 CAMPAIGN = "campaign"
 _SEED = 0  # The seed if there is none: all shards must have the same.
@@ -63,12 +63,13 @@ def campaign(
         typer.echo(f"shard {piece.text} is done already")
         return
     with hold_journal(folder, "--out"):
-        count = _judge(piece, replace(job, hidden=(out.absolute(),)), folder, plan)
-    typer.echo(f"shard {piece.text} is done: {count} outcomes")
+        journal = _judge(piece, replace(job, hidden=(out.absolute(),)), folder, plan)
+    say_what_was_doubted(journal)
+    typer.echo(f"shard {piece.text} is done: {journal.known.n_outcomes} outcomes")
 
 
-def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
-    """Load what the job names, and judge the shard; return the number of its outcomes."""
+def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> Journal:
+    """Load what the job names, and judge the shard; return its journal."""
     from contactverif.cli.progress import Bar
     from contactverif.contract.foreign_text import name_line, one_line
     from contactverif.contract.property import Property
@@ -90,4 +91,5 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
         journal = Journal(plan, folder, [folder])
         judge_share(subjects, questions, job.sampling, bar.show_progress, journal, share=shard.share)
     show_what_plugins_printed()
+    say_what_was_doubted(journal)
     return mark_done(folder, plan)

@@ -15,6 +15,7 @@ from contactverif.cli.run_endings import (
     end_run,
     say_how_to_go_on,
     say_where_plugins_ran,
+    say_how_many_are_unproven,
     show_what_plugins_printed,
     watch_for_stops,
 )
@@ -60,6 +61,7 @@ def compare_formulations(job: VerifyJob) -> int:
         end = end_run(job, journal, gap, _writers(study, plugins), promises_kept=study.comparison.promises_kept)
     show(SideBySide(study))
     _show_meshes(study, plugins, job.pictures, on_a_page=PAGE in end.files.paths)
+    say_how_many_are_unproven(study.run)
     show_what_plugins_printed()
     end.files.announce()
     show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))

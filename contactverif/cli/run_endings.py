@@ -15,6 +15,7 @@ from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
     from contactverif.cli.verify_job import VerifyJob
+    from contactverif.contract.result import Run
     from contactverif.run.run_journal import Journal
 
 STOPPED = 130  # The exit status after Ctrl-C.
@@ -126,6 +127,19 @@ def show_what_plugins_printed() -> None:
     for name, printed in end_all().items():
         lines = printed.decode(errors="replace").splitlines()[-_LINES_OF_A_PLUGIN:]
         show_as_it_is(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
+
+
+def say_how_many_are_unproven(result: Run) -> None:
+    """Print how many outcomes of a run came from a journal without a proof."""
+    if doubt := result.provenance.get("unproven_outcomes"):
+        typer.echo(f"outcomes from a journal that proves nothing: {doubt}")
+
+
+def say_what_was_doubted(journal: Journal) -> None:
+    """Name the records of a journal that were not believed."""
+    for remark in journal.remarks:
+        _warn(remark)
+    journal.remarks.clear()
 
 
 def _warn(words: str) -> None:

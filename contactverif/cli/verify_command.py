@@ -19,6 +19,7 @@ from contactverif.cli.run_endings import (
     end_run,
     say_how_to_go_on,
     say_where_plugins_ran,
+    say_how_many_are_unproven,
     show_what_plugins_printed,
     watch_for_stops,
 )
@@ -129,6 +130,7 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
     show(RunTable(result))
     if remark := result.provenance.get("drawing"):
         show(f"{remark}.")
+    say_how_many_are_unproven(result)
     _show_counterexamples(result, plugins, end.files, folder)
     show_what_plugins_printed()
     end.files.announce()

@@ -17,6 +17,7 @@ import typer
 
 from contactverif.cli.isolation_options import Isolation, IsolationOptions
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.run_endings import say_what_was_doubted
 from contactverif.cli.shared_options import PlaceOptions, SamplingOptions, WorkerOptions
 from contactverif.contract.errors import MisuseError
 
@@ -145,6 +146,7 @@ class VerifyJob:
         """Return the plan for the header of a journal."""
         import msgspec
 
+        from contactverif.run.provenance import machine
         from contactverif.run.run_journal import Plan
 
         assert self.profile.seed is not None
@@ -158,6 +160,7 @@ class VerifyJob:
             profile=self.profile.name,
             examples=self.profile.examples,
             seed=self.profile.seed,
+            machine=machine(),
         )
 
     @contextmanager
@@ -187,12 +190,15 @@ class VerifyJob:
             typer.echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", err=True)
         with hold_journal(folder, "--resume" if self.resumes else "--out"):
             keep_earlier(folder, self.files.paths.values())
+            journal = Journal(plan, folder, self.sources)
             try:
-                yield Journal(plan, folder, self.sources)
+                yield journal
             except MisuseError:
                 if not self.resumes:
                     withdraw_journal(folder, self.files.paths.values())
                 raise
+            finally:
+                say_what_was_doubted(journal)
 
 
 def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:

@@ -306,6 +306,25 @@ def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
     return Verdict.PASS, ""
 
 
+def judge_stored(info: PropertyInfo, outcome: Outcome) -> Outcome:
+    """Return an outcome with the verdict that follows from its numbers; one without numbers is returned as it is.
+
+    Raises
+    ------
+    ValueError
+        If the numbers are none of this property.
+    """
+    measurement = outcome.measurement
+    if measurement is None:
+        return outcome
+    if any(number.quantity not in info.quantities for number in measurement.numbers):
+        raise ValueError(f"numbers that {info.id} does not declare")
+    verdict, reason = judge(info, measurement)
+    if (verdict, reason, False) == (outcome.verdict, outcome.reason, outcome.breach):
+        return outcome
+    return replace(outcome, verdict=verdict, reason=reason, breach=False)
+
+
 def _failure(number: CheckedNumber) -> str:
     quantity = number.quantity
     return f"{quantity.name} {number.value:.3g}, {quantity.sense} {number.tolerance:.3g}"

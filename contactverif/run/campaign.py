@@ -18,6 +18,7 @@ from contactverif.run.run_journal import Journal, Plan, check_versions, read_pla
 _MARK = "done"
 _SHARD = "shard"  # The option in a plan that differs from shard to shard.
 _MOST_NAMES = 3  # The most missing shards that a message names.
+_OF_ONE_JOURNAL = ("options", "folder", "machine", "nonce")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -75,14 +76,14 @@ def open_shard(folder: Path, plan: Plan) -> bool:
     if difference := _difference(earlier, plan, shard_too=True):
         raise MisuseError("--out", f"{folder.name} of another plan ({difference})", "the same plan, or another folder")
     mark = _read_mark(folder)
-    return mark is not None and mark.n_outcomes == _count_outcomes(folder, plan)
+    return mark is not None and mark.n_outcomes == _read(folder, plan).known.n_outcomes
 
 
-def mark_done(folder: Path, plan: Plan) -> int:
-    """Mark a shard as done, and return the number of outcomes in its journal."""
-    mark = EndMark(_count_outcomes(folder, plan))
-    write_record(folder / _MARK, mark)
-    return mark.n_outcomes
+def mark_done(folder: Path, plan: Plan) -> Journal:
+    """Mark a shard as done, and return its journal."""
+    journal = _read(folder, plan)
+    write_record(folder / _MARK, EndMark(journal.known.n_outcomes))
+    return journal
 
 
 def read_shards(folder: Path, argument: str) -> tuple[Plan, tuple[Path, ...]]:
@@ -124,8 +125,9 @@ def _check_whole(shard: Shard, journal: Path, plan: Plan, argument: str) -> None
     mark = _read_mark(journal)
     if mark is None:
         raise MisuseError(argument, f"{shard.folder}, which is not finished", needed)
-    n_readable = _count_outcomes(journal, plan)
-    if n_readable != mark.n_outcomes:
+    known = _read(journal, plan).known
+    n_readable = known.n_outcomes
+    if n_readable + known.n_misfits < mark.n_outcomes:  # What does not fit is judged again.
         flaw = f"{shard.folder}, damaged: {n_readable} of {mark.n_outcomes} outcomes can be read"
         raise MisuseError(argument, flaw, needed)
 
@@ -138,16 +140,16 @@ def _read_mark(folder: Path) -> EndMark | None:
         return None
 
 
-def _count_outcomes(folder: Path, plan: Plan) -> int:
-    """Return the number of outcomes in a journal that can be read."""
+def _read(folder: Path, plan: Plan) -> Journal:
+    """Return a journal with what can be read of it."""
     journal = Journal(plan, None, [folder])
     journal.close()
-    return journal.known.n_outcomes
+    return journal
 
 
 def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:
-    """Return the name of the first thing in which two plans differ; the working folder is none."""
-    for name in (field for field in Plan.__struct_fields__ if field not in ("folder", "options")):
+    """Return the name of the first thing in which two plans differ; the working folder and the machine are none."""
+    for name in (field for field in Plan.__struct_fields__ if field not in _OF_ONE_JOURNAL):
         if getattr(a, name) != getattr(b, name):
             return name
     for name in sorted({*a.options, *b.options} - (set() if shard_too else {_SHARD})):

@@ -1,8 +1,10 @@
 """The journal of a run or a bench: a folder beside its output file, from which a killed process goes on.
 
 A journal has a `header`, the plan, and a file of records for each process that writes, so that no lock is needed. A
-record is eight bytes (its length and its CRC-32) and a message of MessagePack, decoded by a schema: a journal may come
-from a stranger. At every moment, even if the process is killed, the folder has its whole header, or it is not there.
+record is eight bytes (a length and a CRC-32, for damage), a tag, and a message of MessagePack, decoded by a schema: a
+journal may come from a stranger. The tag is a digest of the message and its place under the key of the journal, so that
+a record that is changed, moved or copied does not fit. At every moment, even if the process is killed, the folder has
+its whole header, or it is not there.
 """
 
 from __future__ import annotations
@@ -14,21 +16,63 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from hashlib import blake2b
 from pathlib import Path
 from secrets import token_hex
-from typing import IO, TypeVar
+from typing import IO, NamedTuple, TypeVar
 
 import msgspec
 
 from contactverif.contract.errors import MisuseError
+from contactverif.run.keys import make_key, read_key, remove_key
 
 SUFFIX = ".journal"
 RECORDS = ".outcomes"
 _HEADER = "header"
 _EARLIER = "earlier"
+_TAG = 16
 _FRAME = struct.Struct("<II")
 _LARGEST = 2**26  # The largest record, in bytes.
+_NONCE = 16  # Bytes.
 _Record = TypeVar("_Record", bound=msgspec.Struct)
+
+
+class JournalKey(NamedTuple):
+    """The identity of a journal, a digest of its header, and its key, which is empty if it is not here."""
+
+    identity: str = ""
+    key: bytes = b""
+
+    @classmethod
+    def read(cls, folder: Path) -> JournalKey:
+        """Return the key of a journal; without a header it has none."""
+        try:
+            identity = blake2b((folder / _HEADER).read_bytes(), digest_size=32).hexdigest()
+        except OSError:
+            return cls()
+        return cls(identity, read_key(identity))
+
+    def tags(self, path: Path) -> RecordTags | None:
+        """Return what makes the tags of a file of records; None without a key."""
+        return RecordTags(self, path.name) if self.key else None
+
+
+class RecordTags:
+    """The maker of the tags of one file of records."""
+
+    def __init__(self, key: JournalKey, name: str) -> None:
+        self._start = blake2b(f"{key.identity}/{name}/".encode(), key=key.key, digest_size=_TAG)
+
+    def tag(self, place: int, message: bytes) -> bytes:
+        """Return the tag of the message of a record at a place of the file, in bytes."""
+        digest = self._start.copy()
+        digest.update(place.to_bytes(8, "little"))
+        digest.update(message)
+        return digest.digest()
+
+    def fit(self, place: int, body: bytes) -> bool:
+        """Return whether the tag in front of a message is that of its place."""
+        return body[:_TAG] == self.tag(place, body[_TAG:])
 
 
 class RecordFile:
@@ -37,12 +81,14 @@ class RecordFile:
     `trouble` says what went wrong; it is empty if nothing did.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, key: JournalKey) -> None:
         self.trouble = ""
         self._end = 0
         self._file: IO[bytes] | None = None
+        path = folder / f"{os.getpid()}-{token_hex(4)}{RECORDS}"
+        self._tags = key.tags(path)
         try:
-            self._file = (folder / f"{os.getpid()}-{token_hex(4)}{RECORDS}").open("xb", buffering=0)
+            self._file = path.open("xb", buffering=0)
         except OSError as error:
             self._stop(error)
 
@@ -53,7 +99,8 @@ class RecordFile:
         """
         if self._file is None or len(message) > _LARGEST:
             return None
-        place, data = self._end, _frame(message)
+        place = self._end
+        data = _frame((self._tags.tag(place, message) if self._tags else bytes(_TAG)) + message)
         try:
             written = self._file.write(data)
             if written < len(data):  # The next attempt says what is wrong.
@@ -93,30 +140,44 @@ def record_files(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"*{RECORDS}"))
 
 
-def read_messages(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yield (place in bytes, message) of each whole record, up to the first that is damaged."""
+class StoredMessage(NamedTuple):
+    """The message of a whole record."""
+
+    place: int  # In bytes.
+    message: bytes
+    fits: bool  # Its tag fits the key, the file and the place.
+
+
+def read_messages(path: Path, key: JournalKey) -> Iterator[StoredMessage]:
+    """Yield the message of each whole record, up to the first that is damaged."""
+    tags = key.tags(path)
     with open(path, "rb") as file:
         place = 0
-        while (message := read_message(file, place)) is not None:
-            yield place, message
-            place = file.tell()
+        while (body := _read_body(file)) is not None:
+            message = body[_TAG:]
+            yield StoredMessage(place, message, tags is not None and tags.fit(place, body))
+            place += _FRAME.size + len(body)
 
 
 def read_message(file: IO[bytes], place: int) -> bytes | None:
     """Return the message of the record at a place; None if it is not whole, or there is none."""
-    if place < 0:
-        return None
     file.seek(place)
+    body = _read_body(file)
+    return None if body is None else body[_TAG:]
+
+
+def _read_body(file: IO[bytes]) -> bytes | None:
+    """Return the tag and the message of the next record; None if it is not whole, or there is none."""
     head = file.read(_FRAME.size)
     if len(head) < _FRAME.size:
         return None
     length, checksum = _FRAME.unpack(head)
-    message = file.read(length) if length <= _LARGEST else b""
-    return message if len(message) == length and zlib.crc32(message) == checksum else None
+    body = file.read(length) if length <= _LARGEST else b""
+    return body if len(body) == length and zlib.crc32(body) == checksum else None
 
 
 def write_record(path: Path, record: msgspec.Struct) -> None:
-    """Write a file with one record, whole and on the disk."""
+    """Write a file with one record, which has no tag, whole and on the disk."""
     part = path.with_name(f".{path.name}.part")
     with open(part, "wb") as file:
         file.write(_frame(msgspec.msgpack.encode(record)))
@@ -128,7 +189,7 @@ def write_record(path: Path, record: msgspec.Struct) -> None:
 def read_record(path: Path, kind: type[_Record]) -> _Record | None:
     """Return the one record of a file; None if it is damaged. Without such a file there is an `OSError`."""
     with open(path, "rb") as file:
-        message = read_message(file, 0)
+        message = _read_body(file)
         if message is None or file.read(1):
             return None
     return decode(message, msgspec.msgpack.Decoder(kind))
@@ -142,8 +203,8 @@ def decode(message: bytes, decoder: msgspec.msgpack.Decoder[_Record]) -> _Record
         return None
 
 
-def _frame(message: bytes) -> bytes:
-    return _FRAME.pack(len(message), zlib.crc32(message)) + message
+def _frame(body: bytes) -> bytes:
+    return _FRAME.pack(len(body), zlib.crc32(body)) + body
 
 
 def journal_folder(output: Path, argument: str = "--out") -> Path:
@@ -158,22 +219,24 @@ def journal_folder(output: Path, argument: str = "--out") -> Path:
 
 
 def begin_journal(folder: Path, plan: msgspec.Struct, outputs: Iterable[Path], argument: str = "--out") -> str:
-    """Make a new journal, and move the output files of an earlier run into it.
+    """Make a new journal with a key, and move the output files of an earlier run into it.
 
-    A journal that is there is set aside; the name of its folder is returned, which is empty if there was none. It must
-    belong to no run that is going on.
+    The plan has a field `nonce`, which is set here, so that no two journals have the same identity. A journal that is
+    there is set aside; the name of its folder is returned, which is empty if there was none. It must belong to no run
+    that is going on.
     """
     aside = _aside(folder)
     had_one = folder.exists() or folder.is_symlink()
     try:
         if had_one:
             with hold_journal(folder, argument):
-                shutil.rmtree(aside, ignore_errors=True)
+                _discard(aside)
                 os.replace(folder, aside)
         part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir()
-        write_record(part / _HEADER, plan)
+        write_record(part / _HEADER, msgspec.structs.replace(plan, nonce=token_hex(_NONCE)))
+        make_key(JournalKey.read(part).identity)
         os.replace(part, folder)
         for path in aside.glob(f"{_EARLIER}.*"):
             os.replace(path, folder / path.name)
@@ -201,7 +264,7 @@ def withdraw_journal(folder: Path, outputs: Iterable[Path]) -> None:
         earlier = folder / f"{_EARLIER}{target.suffix}"
         if earlier.exists() and not target.exists():
             os.replace(earlier, target)
-    shutil.rmtree(folder, ignore_errors=True)
+    _discard(folder)
     if _aside(folder).exists():
         os.replace(_aside(folder), folder)
 
@@ -209,7 +272,13 @@ def withdraw_journal(folder: Path, outputs: Iterable[Path]) -> None:
 def remove_journal(folder: Path) -> None:
     """Remove a journal whose output is complete, with what it kept of earlier runs."""
     for path in (folder, _aside(folder)):
-        shutil.rmtree(path, ignore_errors=True)
+        _discard(path)
+
+
+def _discard(folder: Path) -> None:
+    """Remove a journal and its key."""
+    remove_key(JournalKey.read(folder).identity)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _aside(folder: Path) -> Path:

@@ -10,8 +10,9 @@ import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from hashlib import sha256
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 
 import numpy as np
@@ -30,14 +31,12 @@ def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, s
     """Return {attribute of the report: value}: versions, commit, machine, time, command and the size of a run."""
     return {
         **collect_versions(),
-        "blas": _blas(),
-        "cpu_features": _cpu_features(),
+        **machine(),
         "commit": _commit(),
         "profile": profile,
         "examples": str(examples),
         "seed": str(seed),
         "command": shlex.join(sys.argv),
-        "platform": platform.platform(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
@@ -46,6 +45,13 @@ def collect_versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries whose results a run depends on."""
     versions = {f"{package.replace('-', '_')}_version": _version(package) for package in PACKAGES}
     return versions | {"python_version": platform.python_version()}
+
+
+@cache
+def machine() -> dict[str, str]:
+    """Return what the last bits of a number depend on beside the versions; equal where the machine is the same."""
+    import_module("scipy.linalg")  # It brings a BLAS of its own.
+    return {"blas": _blas(), "cpu_features": _cpu_features(), "platform": platform.platform()}
 
 
 def _version(package: str) -> str:

@@ -35,6 +35,7 @@ from contactverif.run.provenance import collect_provenance
 from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, judge_cases, open_row, shrink_case
 from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
+from contactverif.run.second_look import look_at_journal
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
@@ -124,8 +125,7 @@ def run(
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
     with closing(journal):
         try:
-            scheduler.work(jobs.first_calls())  # Jobs that follow carry the first answers to other processes.
-            scheduler.work(jobs)
+            jobs.work(scheduler)
         except KeyboardInterrupt:
             raise RunStopped(jobs.result(not_loaded, resolved.name)) from None
     return jobs.result(not_loaded, resolved.name)
@@ -144,8 +144,7 @@ def judge_share(
     scheduler = Scheduler(None, progress)
     jobs = RunJobs(subjects, questions, sampling, journal, scheduler.report, {}, share)
     with closing(journal):
-        scheduler.work(jobs.first_calls())
-        scheduler.work(jobs)
+        jobs.work(scheduler)
     jobs.check_written()
 
 
@@ -180,6 +179,12 @@ class RunJobs:
             self._groups.setdefault(sampling.group(question), []).append(question)
         self._opposite_signs: set[str] = set()
 
+    def work(self, scheduler: Scheduler) -> None:
+        """Do all jobs; before anything is believed of a journal without a proof, a share of it is judged again."""
+        scheduler.work(self.first_calls())  # Jobs that follow carry the first answers to other processes.
+        look_at_journal(self._journal, self._subjects, self._questions, self._sampling, scheduler)
+        scheduler.work(self)
+
     def first_calls(self) -> Iterator[Job]:
         """Yield the jobs to call each formulation for the first time."""
         for subject in self._subjects:
@@ -209,6 +214,8 @@ class RunJobs:
         provenance |= places(self._subjects)
         if reason := draw.why_the_engine_draws():
             provenance["drawing"] = reason
+        if doubt := self._journal.doubt:
+            provenance["unproven_outcomes"] = doubt
         while self._groups:
             self._open_next()
         pairs = product(self._subjects, self._questions)
@@ -301,7 +308,7 @@ class RunJobs:
         """
         first, parts = block.number * BLOCK, []
         for row in group:
-            earlier = self._journal.outcomes(row.subject.name, row.question.id, first, block.count)
+            earlier = self._journal.outcomes(row.subject.name, row.question.info, first, block.count)
             if len(earlier) < block.count or (self._share is None and row.may_keep_whole(first, earlier.values())):
                 return None
             parts.append(tuple(earlier[place] for place in range(block.count)))
@@ -340,7 +347,7 @@ class RunJobs:
     def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
         """Yield the job to judge the cases of a chunk that are not judged yet."""
         name, property_id = row.subject.name, row.question.id
-        earlier = self._journal.outcomes(name, property_id, chunk.first, chunk.count)
+        earlier = self._journal.outcomes(name, row.question.info, chunk.first, chunk.count)
         if len(earlier) == chunk.count:
             outcomes = tuple(earlier[place] for place in range(chunk.count))
             yield from self._add(row, chunk.first, JudgedCases(outcomes))

@@ -2,6 +2,7 @@
 
 import fcntl
 import random
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,15 @@ from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formu
 from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.run import run as run_module
 from contactverif.run.draw import Sampling
-from contactverif.run.journal import begin_journal, hold_journal, journal_folder, read_messages, remove_journal
+from contactverif.run.journal import (
+    JournalKey,
+    begin_journal,
+    hold_journal,
+    journal_folder,
+    read_messages,
+    remove_journal,
+)
+from contactverif.run.provenance import machine
 from contactverif.run.rows import find_gap
 from contactverif.run.run import RunStopped, run
 from contactverif.run.run_journal import (
@@ -32,7 +41,16 @@ from contactverif.run.scheduler import Progress
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
 EXAMPLES = 30
-PLAN = Plan(formulations=NAMES, properties=PROPERTY_IDS, examples=EXAMPLES, seed=3, versions={"numpy_version": "2"})
+BOX = {"isolation": {"isolation": "box"}}  # The options of a run in which no plugin can read the key.
+PLAN = Plan(
+    formulations=NAMES,
+    properties=PROPERTY_IDS,
+    examples=EXAMPLES,
+    seed=3,
+    versions={"numpy_version": "2"},
+    machine=machine(),
+    options=BOX,
+)
 
 
 def judge(journal: Journal | None) -> Run:
@@ -40,10 +58,22 @@ def judge(journal: Journal | None) -> Run:
     return run(subjects, load_properties(PROPERTY_IDS), examples=EXAMPLES, seed=3, journal=journal)
 
 
+def new_journal(folder: Path, plan: Plan = PLAN) -> Path:
+    """Return the folder of a new journal."""
+    begin_journal(folder / "r.journal", plan, [])
+    return folder / "r.journal"
+
+
+def new_file(folder: Path) -> OutcomeFile:
+    """Return a file of records of a new journal."""
+    journal = new_journal(folder)
+    return OutcomeFile(journal, JournalKey.read(journal))
+
+
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
     """Return a run, and the folder of its journal."""
-    folder = tmp_path_factory.mktemp("journal")
+    folder = new_journal(tmp_path_factory.mktemp("journal"))
     return judge(Journal(PLAN, folder)), folder
 
 
@@ -69,13 +99,13 @@ def outcome(number: float) -> Outcome:
 
 
 def test_what_is_read_is_what_was_noted(tmp_path: Path) -> None:
-    writer = OutcomeFile(tmp_path)
+    writer = new_file(tmp_path)
     for number in range(5):
         writer.add_outcome(1, number - 1, outcome(number / 3))
     block = BlockRecord("7/cases", 2, 500, False, True)
     writer.add_block(block)
     writer.file.close()
-    known = KnownOutcomes([tmp_path], 2, 1000)
+    known = KnownOutcomes([tmp_path / "r.journal"], 2, 1000)
     assert [repr(known.outcome(1, number - 1)) for number in range(5)] == [repr(outcome(n / 3)) for n in range(5)]
     assert known.outcome(0, 0) is None
     assert known.outcome(1, 4) is None
@@ -85,7 +115,7 @@ def test_what_is_read_is_what_was_noted(tmp_path: Path) -> None:
 
 
 def test_a_number_of_numpy_among_the_words_is_taken_for_what_it_is(tmp_path: Path) -> None:
-    writer = OutcomeFile(tmp_path)
+    writer = new_file(tmp_path)
     whole = outcome(1.0)
     assert whole.measurement is not None
     assert whole.measurement.finding is not None
@@ -94,16 +124,16 @@ def test_a_number_of_numpy_among_the_words_is_taken_for_what_it_is(tmp_path: Pat
     )
     writer.add_outcome(0, 0, replace(whole, measurement=measured, breach=np.True_))
     writer.file.close()
-    known = KnownOutcomes([tmp_path], 1, 100)
+    known = KnownOutcomes([tmp_path / "r.journal"], 1, 100)
     assert repr(known.outcome(0, 0)) == repr(whole)
     known.close()
 
 
 def test_half_a_character_in_the_words_of_a_plugin_is_spelled_out(tmp_path: Path) -> None:
-    writer = OutcomeFile(tmp_path)
+    writer = new_file(tmp_path)
     writer.add_outcome(0, 0, replace(outcome(1.0), reason="\ud800"))
     writer.file.close()
-    known = KnownOutcomes([tmp_path], 1, 100)
+    known = KnownOutcomes([tmp_path / "r.journal"], 1, 100)
     stored = known.outcome(0, 0)
     known.close()
     assert stored is not None
@@ -111,13 +141,13 @@ def test_half_a_character_in_the_words_of_a_plugin_is_spelled_out(tmp_path: Path
 
 
 def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
-    writer = OutcomeFile(tmp_path)
+    writer = new_file(tmp_path)
     for number in range(20):
         writer.add_outcome(0, number, outcome(float(number)))
     writer.file.close()
-    (path,) = tmp_path.glob("*.outcomes")
+    (path,) = tmp_path.glob("r.journal/*.outcomes")
     data = path.read_bytes()
-    places = [place for place, _ in read_messages(path)]
+    places = [place for place, _, _ in read_messages(path, JournalKey())]
     chance = random.Random(1)
     for _ in range(200):
         byte = chance.randrange(len(data))
@@ -126,8 +156,8 @@ def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
             damaged[byte] ^= 1 << chance.randrange(8)
         path.write_bytes(damaged)
         whole = sum(end <= byte for end in [*places[1:], len(data)])
-        assert [place for place, _ in read_messages(path)] == places[:whole]
-        known = KnownOutcomes([tmp_path], 1, 100)
+        assert [place for place, _, _ in read_messages(path, JournalKey())] == places[:whole]
+        known = KnownOutcomes([tmp_path / "r.journal"], 1, 100)
         stored = [known.outcome(0, number) for number in range(20)]
         known.close()
         assert all(repr(item) == repr(outcome(float(number))) for number, item in enumerate(stored) if item is not None)
@@ -135,11 +165,11 @@ def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
 
 
 def test_a_record_that_lies_is_not_believed(tmp_path: Path) -> None:
-    writer = OutcomeFile(tmp_path)
+    writer = new_file(tmp_path)
     for row, number in ((0, 0), (5, 0), (-1, 0), (0, 10**9), (0, -7)):
         writer.add_outcome(row, number, outcome(1.0))
     writer.file.close()
-    known = KnownOutcomes([tmp_path], 2, 100)
+    known = KnownOutcomes([tmp_path / "r.journal"], 2, 100)
     known.close()
     assert known.n_outcomes == 1
 
@@ -152,10 +182,12 @@ def test_a_run_that_goes_on_judges_no_case_twice_and_gives_the_same(
     result, folder = unbroken
     (path,) = folder.glob("*.outcomes")
     data = path.read_bytes()
-    (tmp_path / path.name).write_bytes(data[: int(share * len(data))])
-    again = judge(Journal(PLAN, tmp_path, [tmp_path]))
+    journal = tmp_path / "r.journal"
+    shutil.copytree(folder, journal)
+    (journal / path.name).write_bytes(data[: int(share * len(data))])
+    again = judge(Journal(PLAN, journal, [journal]))
     assert facts(again) == facts(result)
-    complete = KnownOutcomes([tmp_path], 6, 100)
+    complete = KnownOutcomes([tmp_path / "r.journal"], 6, 100)
     complete.close()
     assert (complete.n_outcomes, complete.n_twice) == (n_cases(result), 0)
     if share == 1.0:
@@ -171,7 +203,8 @@ def test_a_block_that_is_judged_is_not_drawn(
     monkeypatch.setattr("contactverif.run.rows.WHOLE", 10)
     plan = msgspec.structs.replace(PLAN, formulations=("vts-ppt",), properties=("patch.flat.resultant",))
     subjects, questions = [load_formulation("vts-ppt")], load_properties(["patch.flat.resultant"])
-    first = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, tmp_path))
+    folder = new_journal(tmp_path, plan)
+    first = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, folder))
     numbers: list[int] = []
     draw = run_module.draw_chunks
 
@@ -180,7 +213,7 @@ def test_a_block_that_is_judged_is_not_drawn(
         return draw(sampling, question, number)  # type: ignore[arg-type]
 
     monkeypatch.setattr("contactverif.run.run.draw_chunks", draw_chunks)
-    second = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, None, [tmp_path]))
+    second = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, None, [folder]))
     assert numbers == [0]
     assert facts(first) == facts(second)
 
@@ -210,7 +243,7 @@ def test_a_new_journal_keeps_the_earlier_file_apart_and_the_stopped_run_aside(tm
     folder = journal_folder(report)
     assert begin_journal(folder, PLAN, [report]) == ""
     assert not report.exists()
-    assert read_plan(folder, "--resume") == PLAN
+    assert msgspec.structs.replace(read_plan(folder, "--resume"), nonce="") == PLAN
     later = msgspec.structs.replace(PLAN, seed=4)
     assert begin_journal(folder, later, [report]) == "r.nc.journal.earlier"
     assert (folder / "earlier.nc").read_text() == "yesterday"

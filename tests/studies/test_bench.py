@@ -32,10 +32,11 @@ from contactverif.isolation.process import Question
 from contactverif.mechanics.accuracy import solve_for_accuracy, solve_in_tries
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance
 from contactverif.run import registry
-from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
+from contactverif.run.journal import JournalKey, RecordFile, journal_folder, read_messages, record_files
+from contactverif.run.keys import remove_key
 from contactverif.run.registry import load_formulation, load_problems
 from contactverif.studies.bench import bench_plan
-from contactverif.studies.bench.bench_journal import Header, Journal
+from contactverif.studies.bench.bench_journal import FinishedCell, Header, Journal
 from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose
 from contactverif.studies.bench.bench_study import run_bench
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
@@ -179,9 +180,21 @@ def test_a_torn_record_is_left_out_and_another_plan_is_refused(tmp_path: Path) -
 def test_a_record_that_is_none_is_not_believed(tmp_path: Path, message: bytes) -> None:
     output = tmp_path / "a.nc"
     note(output, (0, RECORD), (1, replace(RECORD, runs={"b": RunRecord()})))
-    with closing(RecordFile(tmp_path / "a.nc.journal")) as file:
+    folder = tmp_path / "a.nc.journal"
+    with closing(RecordFile(folder, JournalKey.read(folder))) as file:
         file.append(message)
     assert finished_cells(output) == {0: RECORD}
+
+
+def test_a_cell_without_the_key_is_run_again_and_a_journal_without_its_key_is_refused(tmp_path: Path) -> None:
+    output, folder = tmp_path / "a.nc", tmp_path / "a.nc.journal"
+    note(output, (0, RECORD))
+    with closing(RecordFile(folder, JournalKey())) as file:
+        file.append(msgspec.msgpack.encode(FinishedCell(1, RECORD), enc_hook=float))
+    assert finished_cells(output) == {0: RECORD}
+    remove_key(JournalKey.read(folder).identity)
+    with pytest.raises(MisuseError, match=r"a journal that proves nothing; needed its key, which .* has"):
+        Journal(output, HEADER)
 
 
 @pytest.mark.parametrize("header", [b"", b"{", b"\xff" * 100])
@@ -275,7 +288,7 @@ def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_secon
     process.send_signal(signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     assert not killed.exists()
-    [(_, first)] = [*read_messages(record_files(journal)[0])][:1]
+    first, *_ = (record.message for record in read_messages(record_files(journal)[0], JournalKey()))
     for target in (killed, unbroken):
         subprocess.run([*arguments, str(target)], env=environment, check=True, stdout=subprocess.DEVNULL)
     assert not journal.exists()

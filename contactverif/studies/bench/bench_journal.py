@@ -1,6 +1,7 @@
 """The journal of a bench: every finished cell, on the disk before the next one begins, so that a killed bench goes on.
 
-A journal of another plan is refused, and never overwritten. A cell whose record is damaged is run again.
+A journal of another plan is refused, and never overwritten. A cell whose record is damaged, or does not fit the key of
+the journal, is run again. Without the key the journal is refused: no second run tells whether seconds are right.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import msgspec
 
 from contactverif.contract.errors import MisuseError
 from contactverif.run import journal
+from contactverif.run.keys import state_folder
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord
 
@@ -22,6 +24,7 @@ class Header(msgspec.Struct, frozen=True):
     bench: BenchPlan
     formulations: tuple[str, ...]
     versions: dict[str, str]
+    nonce: str = ""  # It tells two benches with the same header apart.
 
     @classmethod
     def from_plan(cls, plan: BenchPlan, names: Sequence[str], provenance: Mapping[str, str]) -> Header:
@@ -49,15 +52,23 @@ class Journal:
         self.finished: dict[int, CellRecord] = {}
         if not folder.exists():
             journal.begin_journal(folder, header, ())
-        elif journal.read_header(folder, Header, "--out") != header:
+        elif msgspec.structs.replace(journal.read_header(folder, Header, "--out"), nonce="") != header:
             needed = "the same command and version, or another name, or no such folder"
             raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
+        key = journal.JournalKey.read(folder)
         for path in journal.record_files(folder):
-            for _, message in journal.read_messages(path):
-                cell = journal.decode(message, _DECODER)
-                if cell is not None and cell.record.runs.keys() == {*header.formulations}:
-                    self.finished[cell.number] = cell.record
-        self._file = journal.RecordFile(folder)
+            self._read(path, key, {*header.formulations})
+        self._file = journal.RecordFile(folder, key)
+
+    def _read(self, path: Path, key: journal.JournalKey, names: set[str]) -> None:
+        """Read the records of a file."""
+        for _, message, fits in journal.read_messages(path, key):
+            if not key.key:
+                needed = f"its key, which {state_folder()} of its user and machine has, or no such folder"
+                raise MisuseError("--out", f"{path.parent}, a journal that proves nothing", needed)
+            cell = journal.decode(message, _DECODER) if fits else None
+            if cell is not None and cell.record.runs.keys() == names:
+                self.finished[cell.number] = cell.record
 
     def add(self, number: int, record: CellRecord) -> None:
         """Append the record of a cell that is finished."""

@@ -31,7 +31,7 @@ NAMED_CASES = "named_cases"  # The group of the named cases that some formulatio
 RESERVED = frozenset({SUMMARY, COUNTEREXAMPLES, TIMING, NAMED_CASES})
 # Root attributes in which two equal runs may differ.
 OFF_THE_RECORD = frozenset(
-    {"created", "command", "platform", "blas", "cpu_features", "isolation", "opened", "libraries"}
+    {"created", "command", "platform", "blas", "cpu_features", "unproven_outcomes", "isolation", "opened", "libraries"}
 )
 PARTS = ("pair", "tangent", "contact_points")
 

@@ -1,0 +1,253 @@
+"""The second look at stored outcomes: a random share of each row is judged again and compared with what is stored.
+
+It tells how far a journal without a proof, or the report of a stranger, can be believed. The share is drawn anew each
+time, not from the seed of the run: nobody can know it beforehand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby, product
+from math import ceil, isfinite
+from random import SystemRandom
+from typing import NamedTuple, TypeVar
+
+from contactverif.contract.case import Case
+from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.subject import Subject
+from contactverif.run import draw, judge
+from contactverif.run.draw import PlannedCases, Sampling
+from contactverif.run.rows import OpenRow, open_row
+from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
+from contactverif.run.scheduler import Job, Scheduler
+
+SHARE = 0.01  # The share of the cases of a row that is judged again, at least one case.
+# On another machine two values agree that differ by at most their tolerance, or by this share of the larger one.
+ROUNDOFF = 1e-6
+_CHUNK = 25  # The number of cases that are judged in one job.
+_NO_CASE = "the run has no such case"
+_Fact = TypeVar("_Fact", float, str)
+
+
+def choose_share(numbers: Sequence[int], share: float = SHARE) -> list[int]:
+    """Return a random share of numbers, at least one of them."""
+    return sorted(SystemRandom().sample(numbers, min(len(numbers), max(1, ceil(share * len(numbers))))))
+
+
+class Difference(NamedTuple):
+    """A stored outcome that is not what is judged today."""
+
+    formulation: str
+    property_id: str
+    number: int
+    words: str
+
+    @property
+    def case(self) -> str:
+        """The case in words."""
+        return "the witness" if self.number == WITNESS else f"case {self.number}"
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The stored outcomes of a row that are judged again, by the number of the case; `WITNESS` is the witness."""
+
+    subject: Subject
+    question: Property
+    outcomes: Mapping[int, Outcome]
+    cases: Mapping[int, Case]  # Those that need not be drawn: a finite list, and the witness.
+    is_random: bool
+
+    @classmethod
+    def of_row(cls, row: OpenRow, outcomes: Mapping[int, Outcome]) -> Sample:
+        """Return the sample of a row."""
+        named = dict(enumerate(row.listed or ())) | ({} if row.witness is None else {WITNESS: row.witness})
+        cases = {number: named[number] for number in outcomes if number in named}
+        return cls(row.subject, row.question, outcomes, cases, row.listed is None)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The names of formulation and property."""
+        return self.subject.name, self.question.id
+
+    @property
+    def missing(self) -> set[int]:
+        """The numbers of the cases that are to be drawn."""
+        return self.outcomes.keys() - self.cases.keys()
+
+
+class SecondLook:
+    """The jobs that judge samples again. `differences` and `n_judged` are complete when all are done.
+
+    Numbers are compared bit for bit on the same machine (`exact`), else up to roundoff.
+    """
+
+    def __init__(self, samples: Sequence[Sample], sampling: Sampling, journal: Journal, *, exact: bool) -> None:
+        self.n_judged = 0
+        self._samples, self._sampling, self._journal, self._exact = samples, sampling, journal, exact
+        self._words: dict[tuple[str, str, int], str] = {}  # By formulation, property and case.
+
+    @property
+    def differences(self) -> list[Difference]:
+        """The outcomes that differ; an outcome of a case that the run does not have is one of them."""
+        keys = [(*sample.key, number) for sample in self._samples for number in sorted(sample.outcomes)]
+        return [Difference(*key, words) for key in keys if (words := self._words.get(key, _NO_CASE))]
+
+    def __iter__(self) -> Iterator[Job]:
+        groups: dict[tuple[str, bool], list[Sample]] = {}
+        for sample in self._samples:
+            yield from self._judge(sample, sample.cases)
+            if sample.is_random and max(sample.missing, default=-1) >= 0:
+                groups.setdefault(self._sampling.group(sample.question), []).append(sample)
+        for group in groups.values():  # The first block comes first: where the engine draws, it has all cases.
+            yield self._draw(group, 0)
+
+    def _draw(self, group: Sequence[Sample], number: int) -> Job:
+        return Job(draw_again, (self._sampling, group[0].question, number), partial(self._add_drawn, group, number))
+
+    def _add_drawn(self, group: Sequence[Sample], number: int, block: PlannedCases) -> Iterator[Job]:
+        """Yield the jobs to judge cases of a block, and to draw all other blocks behind the first."""
+        first, count = number * draw.BLOCK, len(block.cases)
+        name = self._sampling.block_name(group[0].question)
+        self._journal.add_block(BlockRecord(name, number, count, block.exhausted, block.last))
+        for sample in group:
+            yield from self._judge(
+                sample, {n: block.cases[n - first] for n in sample.missing if 0 <= n - first < count}
+            )
+        if number == 0 and not block.last:
+            others = {n // draw.BLOCK for sample in group for n in sample.missing if n >= count}
+            yield from (self._draw(group, other) for other in sorted(others))
+
+    def _judge(self, sample: Sample, cases: Mapping[int, Case]) -> Iterator[Job]:
+        numbers = sorted(cases)
+        for first in range(0, len(numbers), _CHUNK):
+            part = numbers[first : first + _CHUNK]
+            pairs = [(cases[number], sample.outcomes[number]) for number in part]
+            arguments = sample.question, sample.subject, pairs, self._exact
+            yield Job(judge_again, arguments, partial(self._add_judged, sample, part))
+
+    def _add_judged(self, sample: Sample, numbers: Sequence[int], words: Sequence[str]) -> Iterable[Job]:
+        self.n_judged += len(numbers)
+        self._words |= {(*sample.key, number): text for number, text in zip(numbers, words, strict=True)}
+        return ()
+
+
+def look_at_journal(
+    journal: Journal,
+    subjects: Sequence[Subject],
+    questions: Sequence[Property],
+    sampling: Sampling,
+    scheduler: Scheduler,
+) -> None:
+    """Judge a share of the outcomes without proof of a journal again; where one differs, none of its row counts."""
+    samples, counts = [], {}
+    for subject, question in product(subjects, questions):
+        if numbers := journal.unproven(subject.name, question.id):
+            row = open_row(subject, question, sampling.source(question), "", sampling)
+            if isinstance(row, OpenRow):
+                sample = Sample.of_row(row, _choose_stored(journal, row, numbers))
+                samples.append(sample)
+                counts[subject.name, question.id] = len(numbers), len(sample.outcomes)
+    look = SecondLook(samples, sampling, journal, exact=journal.known.same_machine)
+    scheduler.work(look)
+    journal.n_unproven = sum(count for count, _ in counts.values())
+    journal.n_judged_again = sum(count for _, count in counts.values())
+    for (formulation, property_id), differences in groupby(sorted(look.differences), key=lambda entry: entry[:2]):
+        first, *others = differences
+        count, n_again = counts[formulation, property_id]
+        journal.n_judged_again += count - n_again
+        remark = (
+            f"{formulation} {property_id}: {1 + len(others)} of {n_again} stored outcomes that were judged again differ"
+        )
+        words = f"{first.case}: {first.words}; all {count} are judged again"
+        journal.distrust(formulation, property_id, f"{remark}, {words}")
+
+
+def _choose_stored(journal: Journal, row: OpenRow, numbers: Sequence[int]) -> dict[int, Outcome]:
+    """Return a random share of the outcomes of a row."""
+    info, outcomes = row.question.info, dict[int, Outcome]()
+    for number in choose_share(numbers):
+        for outcome in journal.outcomes(row.subject.name, info, number, 1).values():
+            outcomes[number] = outcome
+    return outcomes
+
+
+def draw_again(sampling: Sampling, question: Property, number: int) -> PlannedCases:
+    """Draw a block of the cases of a property."""
+    source = sampling.source(question)
+    assert source is not None
+    return draw.draw_block(source, seed=sampling.key(question), examples=sampling.examples, number=number)
+
+
+def judge_again(
+    question: Property, subject: Subject, pairs: Sequence[tuple[Case, Outcome]], exact: bool
+) -> tuple[str, ...]:
+    """Judge cases again, and return in what each stored outcome differs; an empty string if it does not."""
+    return tuple(find_difference(stored, judge.judge_case(question, case, subject), exact) for case, stored in pairs)
+
+
+def find_difference(stored: Outcome, today: Outcome, exact: bool) -> str:
+    """Return in what a stored outcome differs from one of today, in words; an empty string if in nothing.
+
+    Without `exact` only verdicts, values, tolerances and the sizes of the case are compared, up to roundoff.
+    """
+    if stored.verdict is not today.verdict:
+        return f"the verdict is {stored.verdict}, and again {today.verdict}"
+    bounds = {} if exact else _bounds_of(today)
+    for name, a, b in _pair(_numbers_of(stored), _numbers_of(today)):
+        if repr(a) != repr(b) and (exact or not _agree(a, b, bounds.get(name, 0.0))):
+            return f"{name} is {a!r}, and again {b!r}"
+    for name, text, again in _pair(_words_of(stored), _words_of(today)) if exact else ():
+        if text != again:
+            return f"{name} is {text!r}, and again {again!r}"
+    return ""
+
+
+def _pair(stored: Mapping[str, _Fact], today: Mapping[str, _Fact]) -> Iterator[tuple[str, _Fact | None, _Fact | None]]:
+    """Yield (name, stored, today); None where there is none."""
+    return ((name, stored.get(name), today.get(name)) for name in {**stored, **today})
+
+
+def _agree(a: float | None, b: float | None, bound: float) -> bool:
+    """Return whether two numbers agree up to roundoff."""
+    if a is None or b is None or not (isfinite(a) and isfinite(b)):
+        return False
+    return abs(a - b) <= max(bound, ROUNDOFF * max(abs(a), abs(b)))
+
+
+def _bounds_of(outcome: Outcome) -> dict[str, float]:
+    """Return {name: tolerance} of the values that are at most so large; it bounds the roundoff of the value."""
+    numbers = outcome.measurement.numbers if outcome.measurement is not None else ()
+    bounded = (number for number in numbers if number.quantity.sense == "at most" and isfinite(number.tolerance))
+    return {number.quantity.name: number.tolerance for number in bounded}
+
+
+def _numbers_of(outcome: Outcome) -> dict[str, float]:
+    """Return the judged numbers of an outcome, and the sizes of its case."""
+    summary = outcome.summary
+    entries = {
+        "number of slave segments": float(summary.n_slave_segments),
+        "number of master segments": float(summary.n_master_segments),
+        "penalty": summary.penalty,
+        "largest coordinate": summary.largest_coordinate,
+        "shortest segment": summary.shortest_segment,
+    }
+    entries |= {f"parameter {name}": float(value) for name, value in summary.parameters.items()}
+    for number in outcome.measurement.numbers if outcome.measurement is not None else ():
+        name = number.quantity.name
+        entries |= {name: float(number.value), f"tolerance of {name}": float(number.tolerance)}
+    return entries
+
+
+def _words_of(outcome: Outcome) -> dict[str, str]:
+    """Return the words of an outcome, and the numbers that are not judged. Those of a crash may have an address."""
+    entries = {"the case": f"{outcome.summary.name} {outcome.summary.kind}", "breach": str(outcome.breach)}
+    measured = outcome.measurement
+    if measured is None:
+        return entries | ({} if outcome.verdict is Verdict.CRASHED else {"the reason": outcome.reason})
+    entries |= {"the reason": outcome.reason, "undecided": measured.undecided, "broken": measured.broken}
+    entries |= {"contact": str(not measured.idle), "the place": repr(measured.finding)}
+    entries |= {f"detail {name}": repr(float(value)) for name, value in measured.details.items()}
+    return entries | {f"series {name}": repr(list(map(float, values))) for name, values in measured.series.items()}
