@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from contactverif.cli.audit_command import audit
 from contactverif.cli.bench_command import bench
 from contactverif.cli.campaign_command import campaign
 from contactverif.cli.compare_command import compare
@@ -49,6 +50,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compare": compare,
     "report": report,
     "replay": replay,
+    "audit": audit,
     "draw": draw,
     "stability": stability,
     "bench": bench,

@@ -25,6 +25,7 @@ from contactverif.run.registry import FORMULATIONS, PROPERTIES
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
 _DIGITS = 16
+CODE = "code of "  # What stands before a package in the name of the digest of its code.
 
 
 def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
@@ -109,7 +110,7 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     modules |= {entry.module for entry in metadata.entry_points(group=FORMULATIONS) if entry.name in plugins}
     modules |= {entry.module for entry in metadata.entry_points(group=PROPERTIES) if entry.name in properties}
     packages = sorted({module.partition(".")[0] for module in modules})
-    return {f"code of {package}": _digest(_files_of(package)) for package in packages}
+    return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}
 
 
 def _plugin_name(text: str) -> str:

@@ -190,10 +190,7 @@ class OpenRow:
             witness=witness,
             seconds=sum(outcome.seconds for outcome in self.outcomes),
         )
-        verdict, reason = verdict_over_all(row)
-        if verdict is Verdict.NOT_JUDGED and self.question.bodies and self._may_stay_undecided(row, on_scene=on_scene):
-            verdict = Verdict.UNDECIDED
-            reason = row.outcomes[0].reason or reason if on_scene else reason
+        verdict, reason = verdict_of_row(row, self, on_scene=on_scene)
         self.row = replace(row, verdict=verdict, reason=reason)
 
     def stop(self, examples: int) -> None:
@@ -211,7 +208,7 @@ class OpenRow:
             seconds=sum(outcome.seconds for outcome in outcomes),
         )
 
-    def _may_stay_undecided(self, row: Row, *, on_scene: bool) -> bool:
+    def may_stay_undecided(self, row: Row, *, on_scene: bool) -> bool:
         """Return whether it is not promised that the scenes of a row can be decided.
 
         It is so for the one scene that a user names, and for a list of scenes about which the formulation states
@@ -235,6 +232,14 @@ class OpenRow:
         bad = ((number, badness(self.row.info, outcome)) for number, outcome in enumerate(self.outcomes))
         first = next(number for number, (its_kind, its_worst) in bad if its_kind == kind and (kind, its_worst) >= least)
         return Shrinking(first, kind, least)
+
+
+def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdict, str]:
+    """Return verdict and reason of a row of which all cases are judged; `on_scene` as in `OpenRow.judge`."""
+    verdict, reason = verdict_over_all(row)
+    if verdict is Verdict.NOT_JUDGED and opened.question.bodies and opened.may_stay_undecided(row, on_scene=on_scene):
+        return Verdict.UNDECIDED, row.outcomes[0].reason or reason if on_scene else reason
+    return verdict, reason
 
 
 def open_row(
@@ -365,13 +370,13 @@ def find_gap(
     """
     names = {subject.name: subject for subject in subjects if isinstance(subject, Subject)}
     properties = {question.id: question for question in questions if isinstance(question, Property)}
-    if gap := _gap_of_rows(result, names, properties):
+    if gap := gap_of_rows(result, names, properties):
         return gap
     gaps = (_gap_of(row, names[row.formulation], properties[row.property_id], sampling) for row in result.rows)
     return next((gap for gap in gaps if gap), "")
 
 
-def _gap_of_rows(result: Run, names: Iterable[str], property_ids: Iterable[str]) -> str:
+def gap_of_rows(result: Run, names: Iterable[str], property_ids: Iterable[str]) -> str:
     """Return which row is missing, or there without a plan."""
     planned = Counter(product(names, property_ids))
     rows = Counter((row.formulation, row.property_id) for row in result.rows)

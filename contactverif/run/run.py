@@ -177,7 +177,7 @@ class RunJobs:
         self._groups: dict[tuple[str, bool], list[Property]] = {}
         for question in sorted(questions, key=attrgetter("bodies")):
             self._groups.setdefault(sampling.group(question), []).append(question)
-        self._opposite_signs: set[str] = set()
+        self.opposite_signs: set[str] = set()
 
     def work(self, scheduler: Scheduler) -> None:
         """Do all jobs; before anything is believed of a journal without a proof, a share of it is judged again."""
@@ -199,7 +199,7 @@ class RunJobs:
     ) -> Iterable[Job]:
         opposite, first = answers
         subject.first_answers = subject.first_answers or first  # In a second run the process is warm.
-        self._opposite_signs |= {before.formulation} if opposite else set()
+        self.opposite_signs |= {before.formulation} if opposite else set()
         self._report(replace(before, count=1))
         return ()
 
@@ -214,8 +214,7 @@ class RunJobs:
         provenance |= places(self._subjects)
         if reason := draw.why_the_engine_draws():
             provenance["drawing"] = reason
-        if doubt := self._journal.doubt:
-            provenance["unproven_outcomes"] = doubt
+        provenance |= self._journal.provenance()
         while self._groups:
             self._open_next()
         pairs = product(self._subjects, self._questions)
@@ -225,7 +224,7 @@ class RunJobs:
             provided={
                 subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects
             },
-            opposite_signs=tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs),
+            opposite_signs=tuple(subject.name for subject in self._subjects if subject.name in self.opposite_signs),
             provenance=provenance,
         )
 

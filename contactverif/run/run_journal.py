@@ -36,9 +36,10 @@ from contactverif.run.journal import (
     read_messages,
     record_files,
 )
-from contactverif.run.provenance import machine
+from contactverif.run.provenance import CODE, machine
 
 FORMAT = 3
+UNPROVEN = "unproven_outcomes"  # The attribute of a report that says how many outcomes had no proof.
 WITNESS = -1  # The number of the outcome of a row's witness.
 _MOST_FORMS = 10_000  # The most forms that a process remembers.
 _MOST_WRITERS = 4  # The most journals that a process has open for writing.
@@ -66,6 +67,16 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     machine: dict[str, str] = {}  # What the last bits of a number depend on, beside the versions.
     nonce: str = ""  # It tells two runs with the same plan apart.
     format: int = FORMAT
+
+    @property
+    def place(self) -> str:
+        """The options that say where the run asked; empty if it was on random interfaces and scenes."""
+        return place_words(self.options.get("place") or {})
+
+
+def place_words(options: Mapping[str, Any]) -> str:
+    """Return options {name: value} as they are typed, without those that are not there."""
+    return " ".join(f"--{name}" if value is True else f"--{name} {value}" for name, value in options.items() if value)
 
 
 def is_provable(options: Mapping[str, Any]) -> bool:
@@ -411,7 +422,7 @@ class Journal:
     """
 
     def __init__(self, plan: Plan | None = None, folder: Path | None = None, sources: Sequence[Path] = ()) -> None:
-        plan = plan or Plan()
+        self.plan = plan = plan or Plan()
         self.folder = folder
         self.trouble = ""
         self.n_unproven = 0  # The number of outcomes without a proof that the run met.
@@ -460,6 +471,12 @@ class Journal:
         """Believe none of the outcomes of a row that are not proven, so that they are judged again."""
         self._distrusted.add(self._rows[formulation, property_id])
         self.remarks.append(remark)
+
+    def provenance(self) -> dict[str, str]:
+        """Return what a report should say of where its outcomes come from: code, place, and how many had no proof."""
+        digests = {name: digest for name, digest in self.plan.versions.items() if name.startswith(CODE)}
+        facts = {name.replace(" ", "_"): digest for name, digest in digests.items()}
+        return facts | {name: words for name, words in (("place", self.plan.place), (UNPROVEN, self.doubt)) if words}
 
     @property
     def doubt(self) -> str:

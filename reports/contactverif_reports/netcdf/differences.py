@@ -12,17 +12,21 @@ from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.read import Groups, open_report
 
 
-def same_data(path_a: str | os.PathLike[str], path_b: str | os.PathLike[str]) -> list[str]:
+def same_data(
+    path_a: str | os.PathLike[str], path_b: str | os.PathLike[str], *, names: tuple[str, str] | None = None
+) -> list[str]:
     """Return the differences of two reports, a line each; none for two runs with the same seed.
 
-    The group `timing` and the root attributes `created`, `command` and `platform` are left out.
+    The group `timing` and the root attributes `created`, `command` and `platform` are left out. `names` stand in the
+    lines in place of the paths.
     """
+    name_a, name_b = names or (os.fspath(path_a), os.fspath(path_b))
     with open_report(path_a, decode=False) as groups:
         a = dict(_entries(groups))
     with open_report(path_b, decode=False) as groups:
         b = dict(_entries(groups))
-    differences = [f"{name}: only in {os.fspath(path_a)}" for name in a if name not in b]
-    differences += [f"{name}: only in {os.fspath(path_b)}" for name in b if name not in a]
+    differences = [f"{name}: only in {name_a}" for name in a if name not in b]
+    differences += [f"{name}: only in {name_b}" for name in b if name not in a]
     for name in a:
         if name in b and (difference := _difference(a[name], b[name])):
             differences.append(f"{name}: {difference}")

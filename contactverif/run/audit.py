@@ -1,0 +1,217 @@
+"""The audit of a stored run: each verdict follows again from its numbers, and a share of the cases is judged again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from time import perf_counter
+from typing import overload
+
+from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
+from contactverif.contract.result import Row, Run
+from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.run import draw
+from contactverif.run.draw import Sampling
+from contactverif.run.provenance import code_digests, collect_versions, machine
+from contactverif.run.rows import OpenRow, gap_of_rows, open_row, verdict_of_row
+from contactverif.run.run import RunJobs
+from contactverif.run.run_journal import WITNESS, Journal
+from contactverif.run.scheduler import Progress, Scheduler
+from contactverif.run.second_look import Sample, SecondLook, choose_share, draw_again, judge_again
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Audit:
+    """The result of an audit.
+
+    Attributes
+    ----------
+    derived : Run
+        The run as it follows from the stored numbers and from what the formulations state today.
+    changes : tuple[str, ...]
+        The versions, digests of code and parts of the machine that are others than those of the run.
+    differences : tuple[str, ...]
+        What disagrees with the stored run, a line each.
+    n_outcomes, n_judged, n_examples : int
+        The numbers of stored outcomes, of those that were judged again, and of counterexamples, which all were.
+    seconds : float
+        The time of the audit.
+    """
+
+    derived: Run
+    changes: tuple[str, ...]
+    differences: tuple[str, ...]
+    n_outcomes: int
+    n_judged: int
+    n_examples: int
+    seconds: float
+
+    def chance(self, n_forged: int) -> float:
+        """Return the probability that the audit met one of so many outcomes, wherever they are among all."""
+        missed, n_rest = 1.0, self.n_outcomes - self.n_judged
+        for number in range(n_forged):
+            missed *= max(n_rest - number, 0) / (self.n_outcomes - number)
+        return 1.0 - missed
+
+
+def audit(
+    run: Run, subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling, share: float
+) -> Audit:
+    """Derive all verdicts of a stored run again, and judge a share of each row and all counterexamples again.
+
+    Parameters
+    ----------
+    run : Run
+        The run, as a report has it.
+    subjects, questions : Sequence[Subject] or Sequence[Property]
+        The formulations and the properties of its rows.
+    sampling : Sampling
+        The size and the seed of the run, and the place where it asked.
+    share : float
+        The share of the cases of each row that is judged again.
+
+    Returns
+    -------
+    Audit
+        What differs, and how much was judged again.
+    """
+    start = perf_counter()
+    changes = find_changes(run)
+    rows = _open_rows(run, subjects, questions, sampling)
+    derived = [_derive(row, opened, sampling) for row, opened in zip(run.rows, rows, strict=True)]
+    scheduler, journal = Scheduler(), Journal()
+    jobs = RunJobs(subjects, questions, sampling, journal, _report_nothing, {})
+    scheduler.work(jobs.first_calls())
+    stored = [(row, opened) for row, opened in zip(derived, rows, strict=True) if isinstance(opened, OpenRow)]
+    look = SecondLook([_sample(row, opened, share) for row, opened in stored], sampling, journal, exact=not changes)
+    scheduler.work(look)
+    examples = counterexamples(run)
+    names = [subject.name for subject in subjects]
+    differences = [
+        gap_of_rows(run, names, [question.id for question in questions]),
+        *(_other_property(row, opened, changes) for row, opened in zip(run.rows, rows, strict=True)),
+        *(_gap(row, opened, sampling) for row, opened in stored),
+        *(f"{name} {id_}: {entry.case}: {entry.words}" for entry in look.differences for name, id_ in [entry[:2]]),
+        *(_judge_example(example, subjects, questions, exact=not changes) for example in examples.values()),
+    ]
+    provided = {subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in subjects}
+    opposite = tuple(name for name in names if name in jobs.opposite_signs)
+    return Audit(
+        derived=replace(run, rows=tuple(derived), provided=provided, opposite_signs=opposite),
+        changes=changes,
+        differences=tuple(filter(None, differences)),
+        n_outcomes=sum(len(row.outcomes) + (row.witness is not None) for row in run.rows),
+        n_judged=look.n_judged,
+        n_examples=len(examples),
+        seconds=perf_counter() - start,
+    )
+
+
+def find_changes(run: Run) -> tuple[str, ...]:
+    """Return what is other today than in a run, of what the last bits of a number depend on."""
+    digests = code_digests(run.formulations, list(run.properties))
+    today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
+    stored = {name: run.provenance.get(name, "unknown") for name in today}
+    changed = [name for name in today if stored[name] != today[name]]
+    return tuple(f"{name.replace('_', ' ')}: {stored[name]} in the report, {today[name]} here" for name in changed)
+
+
+class DerivedOutcomes(Sequence[Outcome]):
+    """The outcomes of a row with the verdicts that follow from their numbers, each made when somebody asks for it."""
+
+    def __init__(self, info: PropertyInfo, outcomes: Sequence[Outcome]) -> None:
+        self._info, self._outcomes = info, outcomes
+
+    def __len__(self) -> int:
+        return len(self._outcomes)
+
+    @overload
+    def __getitem__(self, number: int) -> Outcome: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
+    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
+        if isinstance(number, slice):
+            return tuple(judge_stored(self._info, outcome) for outcome in self._outcomes[number])
+        return judge_stored(self._info, self._outcomes[number])
+
+
+def _open_rows(
+    run: Run, subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling
+) -> list[OpenRow | Row]:
+    """Return the rows as a run of today would begin them."""
+    subject_of = {subject.name: subject for subject in subjects}
+    question_of = {question.id: question for question in questions}
+    source_of = {question.id: sampling.source(question) for question in questions}
+    return [
+        open_row(
+            subject_of[row.formulation], question_of[row.property_id], source_of[row.property_id], row.known, sampling
+        )
+        for row in run.rows
+    ]
+
+
+def _derive(row: Row, opened: OpenRow | Row, sampling: Sampling) -> Row:
+    """Return a stored row with all that follows from its numbers, and with what the formulation states today."""
+    if isinstance(opened, Row):
+        return replace(opened, info=row.info, seconds=row.seconds)
+    witness, shrunk, first = (
+        None if outcome is None else judge_stored(row.info, outcome) for outcome in (row.witness, row.shrunk, row.first)
+    )
+    outcomes = DerivedOutcomes(row.info, row.outcomes)
+    derived = replace(row, promise=opened.row.promise, outcomes=outcomes, planned=len(outcomes))
+    derived = replace(derived, witness=witness, shrunk=shrunk, first=first)
+    verdict, reason = verdict_of_row(derived, opened, on_scene=sampling.scene is not None)
+    return replace(derived, verdict=verdict, reason=reason)
+
+
+def _sample(row: Row, opened: OpenRow, share: float) -> Sample:
+    """Return the random share of a row that is judged again, and its witness."""
+    outcomes = {number: row.outcomes[number] for number in choose_share(range(len(row.outcomes)), share)}
+    return Sample.of_row(opened, outcomes if row.witness is None else {**outcomes, WITNESS: row.witness})
+
+
+def _other_property(row: Row, opened: OpenRow | Row, changes: Sequence[str]) -> str:
+    """Return in what a stored property is not that of today; words may change with the version."""
+    info = (opened if isinstance(opened, Row) else opened.row).info
+    judged = ("id", "needs", "least_contact", "usual_undecided", "quantities")
+    names = judged if changes else tuple(part.name for part in fields(PropertyInfo))
+    for name in names:
+        stored, today = getattr(row.info, name), getattr(info, name)
+        if name == "quantities" and changes:
+            stored, today = ([(each.name, each.unit, each.sense) for each in every] for every in (stored, today))
+        if stored != today:
+            return f"{row.formulation} {row.property_id}: {name} of the property are others than those of today"
+    return ""
+
+
+def _gap(row: Row, opened: OpenRow, sampling: Sampling) -> str:
+    """Return what a row lacks; no more than one block of cases is drawn for it."""
+    count, name = len(row.outcomes), f"{row.formulation} {row.property_id}"
+    if opened.listed is not None:
+        planned = len(opened.listed)
+    elif count == sampling.examples:
+        planned = count
+    else:
+        question, number = opened.question, count // draw.BLOCK
+        planned = number * draw.BLOCK + len(draw_again(sampling, question, number).cases)
+    if count != planned or not count:
+        return f"{name}: outcomes of {count} cases, and the run has {'more' if planned > count else planned}"
+    lacks_witness = opened.witness is not None and row.witness is None
+    return f"{name}: no outcome of its witness" if lacks_witness else ""
+
+
+def _judge_example(
+    example: Counterexample, subjects: Sequence[Subject], questions: Sequence[Property], *, exact: bool
+) -> str:
+    """Judge a counterexample again, and return in what it differs."""
+    subject = next(subject for subject in subjects if subject.name == example.formulation)
+    question = next(question for question in questions if question.id == example.property_id)
+    if question.refusal(subject.traits) or question.needs - subject.provides:
+        return f"{example.id}: the property is not asked of the formulation"
+    (words,) = judge_again(question, subject, [(example.case, example.outcome)], exact)
+    return f"{example.id}: {words}" if words else ""
+
+
+def _report_nothing(progress: Progress) -> None:
+    """Take the progress of an audit, which shows none."""
