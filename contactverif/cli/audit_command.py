@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from contactverif.cli.shared_options import IsolationOptions, PlaceOptions, ReportPath
+from contactverif.cli.isolation_options import IsolationOptions
+from contactverif.cli.shared_options import PlaceOptions, ReportPath
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from contactverif.cli.output_files import PAGE, REPORT, PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.run_endings import (
     end_run,
+    say_how_many_are_unproven,
     say_how_to_go_on,
     say_where_plugins_ran,
-    say_how_many_are_unproven,
     show_what_plugins_printed,
     watch_for_stops,
 )

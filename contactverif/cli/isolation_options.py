@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -74,8 +75,14 @@ class IsolationOptions:
         from contactverif.isolation.box import Box
         from contactverif.isolation.limits import Limits
         from contactverif.isolation.process import adopt_orphans
+        from contactverif.run.keys import state_folder
 
         adopt_orphans()
+        with suppress(
+            OSError, RuntimeError
+        ):  # Only what is there can be hidden.
+            state_folder().mkdir(mode=0o700, parents=True, exist_ok=True)
+            hidden = (*hidden, state_folder())
         by_rules = settled.isolation is Isolation.LANDLOCK
         box = Box(tuple(settled.opened or ()), tuple(map(str, hidden)), by_rules=by_rules)
         return Limits(self.time_limit, self.memory_limit, None if settled.isolation is Isolation.PROCESS else box)
