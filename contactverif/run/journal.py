@@ -316,8 +316,8 @@ def hold_journal(folder: Path, argument: str) -> Iterator[None]:
 def _check_there(folder: Path, argument: str) -> None:
     """Check that no other process has completed the run, and removed the journal, since it was read."""
     if not folder.exists():
-        found = f"no journal {folder.name} any more, since another process has completed the run"
-        raise MisuseError(argument, found, "that of a run that was stopped")
+        reason = f"no journal {folder.name} any more, since another process has completed the run"
+        raise MisuseError(argument, reason, "that of a run that was stopped")
 
 
 def read_header(folder: Path, kind: type[_Record], argument: str) -> _Record:
