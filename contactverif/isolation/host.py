@@ -74,7 +74,7 @@ class Host:
     def load(self) -> Reply:
         """Start the process anew, load the formulation, and return what that gave."""
         self.end()
-        if reason := self._why_not_asked():
+        if reason := self._reason_to_stop():
             raise PluginError(reason, "not asked")
         _make_room(self._name)
         self._process = PluginProcess(self._command, self._limits, second=self._second)
@@ -85,13 +85,13 @@ class Host:
         self.flush()
         return raise_failure(question.result, loading=True)
 
-    def _why_not_asked(self) -> str:
+    def _reason_to_stop(self) -> str:
         """Return why the formulation is not asked any more; an empty string if it is."""
         n_hangs = _hangs[self._key]
         if n_hangs >= _AT_IMPORT:
             return "no answer came while it was imported"
         if n_hangs >= _MOST_HANGS:
-            return f"no answer came {n_hangs} times"
+            return "no answer came twice"
         return f"its process ended {self.n_ended} times" if self.n_ended >= _MOST_ENDS else ""
 
     def make(self, penalty: float) -> tuple[int, int]:

@@ -117,8 +117,8 @@ class RemoteFormulation(Prefetching):
         if not host.is_alive(self._started):
             self._number, self._started = host.make(self._penalty)
             weakref.finalize(self, host.forget, self._number, self._started)
-        kept = pairing.number_in(host) if isinstance(pairing, RemotePairing) else None
-        self._last = host.ask(verb, self._number, interface, pairing if kept is None else kept, z, timed=self.timed)
+        number = pairing.number_in(host) if isinstance(pairing, RemotePairing) else None
+        self._last = host.ask(verb, self._number, interface, pairing if number is None else number, z, timed=self.timed)
         return self._last
 
     def _answer(

@@ -1,4 +1,4 @@
-"""What a plugin sends takes little memory of the judge, whatever it is and however much of it comes."""
+"""The memory that the judge takes for what a plugin sends is little, whatever comes and however much of it."""
 
 import struct
 import tracemalloc
@@ -70,14 +70,14 @@ def test_a_message_with_very_much_in_it_is_refused_by_its_head(data: bytes, load
         decode_replies(data, loading=loading)
 
 
-def loaded(name: str) -> Subject:
+def load(name: str) -> Subject:
     subject = load_remote(bombs.PROGRAM, name, QUICK)
     assert isinstance(subject, Subject), subject
     return subject
 
 
 def test_an_answer_has_no_more_bytes_than_its_question_may_need() -> None:
-    formulation = loaded("LongAnswer").for_case(CASE)
+    formulation = load("LongAnswer").for_case(CASE)
     pairing = formulation.pair(CASE.interface, CASE.z)
     most = (1 << 20) + (1 << 17) * CASE.z.size
     with pytest.raises(PluginError, match=f"residual: an answer of 104857600 bytes; needed at most {most}") as caught:
@@ -93,7 +93,7 @@ def test_traits_have_no_more_than_a_megabyte() -> None:
 
 @pytest.mark.parametrize("look", [dict, bool], ids=["looked into", "used"])
 def test_pairings_that_nobody_holds_are_not_kept(look: Callable[[object], object]) -> None:
-    formulation = loaded("LargePairings").for_case(CASE)
+    formulation = load("LargePairings").for_case(CASE)
     with most_memory(20 * MEGABYTE):
         for number in range(40):
             z = CASE.z + 1e-6 * number

@@ -1,4 +1,4 @@
-"""How long the judge waits for an answer, how often, and what is left of a question that it stopped to wait for."""
+"""The wait for an answer: how long it is, how often the judge waits, and what is left of an interrupted question."""
 
 import os
 import signal
@@ -122,30 +122,30 @@ def test_an_answer_that_comes_byte_by_byte_is_late() -> None:
 
 
 def let_it_hang(monkeypatch: pytest.MonkeyPatch, when: Callable[[str], bool]) -> list[str]:
-    """Let each question of some methods be one without an answer; return the list of those that were asked."""
-    asked: list[str] = []
+    """Let each question of some methods be one without an answer; return the list of those."""
+    verbs: list[str] = []
     real = process.PluginProcess.ask
 
     def fake(self: process.PluginProcess, frame: bytes, questions: Sequence[process.Question], *seconds: Any) -> None:
         if questions and when(questions[0].verb):
-            asked.append(questions[0].verb)
+            verbs.append(questions[0].verb)
             self.end()
             raise PluginError(f"{questions[0].verb}: no answer within 60 s", "hang", ended=True)
         real(self, frame, questions, *seconds)
 
     monkeypatch.setattr(process.PluginProcess, "ask", fake)
-    return asked
+    return verbs
 
 
 def test_two_calls_without_an_answer_are_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
     subject = load(hostile_few.PROGRAM, "Springs")
-    asked = let_it_hang(monkeypatch, lambda verb: verb == "residual")
+    verbs = let_it_hang(monkeypatch, lambda verb: verb == "residual")
     rows = verify([subject], load_properties(["balance.force", "purity"]), examples=10, seed=1).rows
-    assert asked == ["residual", "residual"]
+    assert verbs == ["residual", "residual"]
     assert rows[0].verdict is Verdict.CRASHED
     assert rows[0].reason == "hang: residual: no answer within 60 s"
     assert rows[1].verdict is Verdict.NOT_JUDGED
-    assert "not asked: no answer came 2 times" in rows[1].reason
+    assert "not asked: no answer came twice" in rows[1].reason
 
 
 def test_both_processes_of_a_formulation_count_together(monkeypatch: pytest.MonkeyPatch) -> None:
