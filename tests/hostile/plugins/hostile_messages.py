@@ -3,12 +3,16 @@
 Rule for the next editor: the messages here are those of `contactverif.isolation.messages`, and change with them.
 """
 
+import os
+import struct
 import sys
+import time
+from contextlib import suppress
 from typing import Any
 
 import msgspec
 import numpy as np
-from hostile_kit import EITHER, HostileNts, before, instead, write_to_sockets
+from hostile_kit import CAUGHT, EITHER, LONG, MOST_FILES, HostileNts, before, instead, send_all, write_to_sockets
 
 import contactverif_nts
 
@@ -62,6 +66,62 @@ say_deep_message = before("residual", ends=EITHER)(
 say_a_little = before("residual", ends=EITHER)(
     lambda: write_to_sockets(b"\x93", 100_000), "Send the beginning of a message, and the rest of it never."
 )
+
+
+def _many(kind: int, data: bytes, count: int) -> bytes:
+    """Return a list (0xdd) or a mapping (0xdf) of so many entries, whose bytes are known."""
+    return bytes([kind]) + struct.pack(">I", count) + data
+
+
+def _send(kind: str, *parts: Any) -> None:
+    """Send a reply instead of the real one; bytes among its parts are encoded already."""
+    content = [
+        part if isinstance(part, bytes) else msgspec.msgpack.encode(part) for part in (kind, _question(), *parts)
+    ]
+    send_all(b"".join([bytes([0x91, 0x90 + len(content)]), *content]))
+    time.sleep(LONG)
+
+
+_BYTES = 100_000_000
+send_long_shape = before("residual", ends=CAUGHT)(
+    lambda: _send(ANSWER, b"\x81\xa1a\x93\xa3<f8" + _many(0xDD, b"\1" * _BYTES, _BYTES) + b"\xc4\0", 0.0, 0.0),
+    "Answer an array whose shape has a hundred million axes.",
+)
+send_many_names = before("residual", ends=CAUGHT)(
+    lambda: _send(
+        ANSWER,
+        _many(0xDF, b"".join(b"\xa8%8d\x93\xa3<f8\x91\0\xc4\0" % n for n in range(3_000_000)), 3_000_000),
+        0.0,
+        0.0,
+    ),
+    "Answer three million arrays, each with a name of its own.",
+)
+send_many_words = before("residual", ends=CAUGHT)(
+    lambda: _send(FAILURE, "plugin", "exception", _many(0xDD, b"\xa0" * _BYTES, _BYTES)),
+    "Tell the harness of an error in a hundred million words.",
+)
+send_wide_traits = before("traits", ends=CAUGHT)(
+    lambda: _send(LOADED, b"\x81\xa1a" + _many(0xDD, b"\x90" * _BYTES, _BYTES), []),
+    "State promises that are a list of a hundred million lists.",
+)
+send_many_small_lists = before("traits", ends=CAUGHT)(
+    lambda: _send(LOADED, b"\x81\xa1a" + _many(0xDD, b"\x90" * 1_000_000, 1_000_000), []),
+    "State promises that are a list of a million lists, as many as there may be.",
+)
+
+
+@before("residual", ends=CAUGHT)
+def dribble() -> None:
+    """Send an answer byte by byte, and count each of them as progress."""
+    write_to_sockets(b"\x91", 100_000)
+    for count in range(int(LONG / 0.1)):
+        time.sleep(0.1)
+        for number in range(3, MOST_FILES):
+            with suppress(OSError):
+                if "progress" in os.readlink(f"/proc/self/fd/{number}"):
+                    os.pwrite(number, bytes([count % 256]), 0)
+                elif os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
+                    os.write(number, b"\x91")
 
 
 class _ManyMultipliers(HostileNts):

@@ -31,6 +31,9 @@ huge = answers("pair", ends=EITHER)(
     lambda answer: {**answer, "huge": np.broadcast_to(np.int64(0), 10**9)},
     "Answer a pairing with an array of 1e9 entries that takes no memory.",
 )
+large = answers("pair")(
+    lambda answer: {**answer, "large": np.zeros(25_000_000, np.int64)}, "Answer pairings of 200 MB each."
+)
 long_name = answers("pair", ends=EITHER)(
     lambda answer: {**answer, "x" * 20_000_000: np.zeros(1, np.int64)}, "Answer a pairing with a name of 20 MB."
 )
