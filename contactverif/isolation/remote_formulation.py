@@ -70,7 +70,7 @@ def places(subjects: Iterable[Subject]) -> dict[str, str]:
         inside = "process" if isinstance(subject, RemoteSubject) else "inline"
         facts["isolation"].add(inside if box is None else box.kind)
         facts["opened"] |= set(box.opened) if box is not None else set()
-    return {name: "; ".join(sorted(values)) for name, values in facts.items()}
+    return {name: "; ".join(sorted(values)) for name, values in facts.items() if values}
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,8 @@ def test_every_file_that_is_named_is_written(ask: Ask, tmp_path: Path) -> None:
     answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--out", report, "--out", html, "--pictures", pictures)
     assert answer.status == 0
     write(run_properties(["vts-ppt", "vts-me"], "patch.flat.transmission", "balance.force"), tmp_path / "v.nc")
-    assert same_data(report, tmp_path / "v.nc") == []  # as verify writes it
+    # As `verify` writes it, which knows the digests of code from its journal, too.
+    assert not [words for words in same_data(report, tmp_path / "v.nc") if "code_of_" not in words]
     assert sorted(path.name for path in pictures.iterdir()) == [
         f"{name}.{id_}.png" for name in ("vts-me", "vts-ppt") for id_ in ("balance.force", "patch.flat.transmission")
     ]
