@@ -16,7 +16,7 @@ from pathlib import Path
 
 _PREFIX = "contactverif-plugins-"
 _LOCK = ".held"
-_held: list[int] = []  # The descriptor of this process's lock.
+_locks: list[int] = []  # The descriptor of the lock of this process.
 
 
 @cache
@@ -26,8 +26,8 @@ def plugin_folder() -> str:
         shutil.rmtree(path, ignore_errors=True)
     folder = tempfile.mkdtemp(prefix=_PREFIX)
     with suppress(OSError):
-        _held.append(os.open(os.path.join(folder, _LOCK), os.O_CREAT | os.O_RDWR, 0o600))
-        _lock(_held[-1])
+        _locks.append(os.open(os.path.join(folder, _LOCK), os.O_CREAT | os.O_RDWR, 0o600))
+        _lock(_locks[-1])
     return folder
 
 
@@ -36,8 +36,8 @@ def remove_plugin_folder() -> None:
     if plugin_folder.cache_info().currsize:
         shutil.rmtree(plugin_folder(), ignore_errors=True)
         plugin_folder.cache_clear()
-    while _held:
-        os.close(_held.pop())
+    while _locks:
+        os.close(_locks.pop())
 
 
 def _list_abandoned() -> Iterator[Path]:
