@@ -45,6 +45,7 @@ _MOST_HANGS = 2  # After so many calls without an answer neither, in all of its 
 _AT_IMPORT = 100  # The number of such calls that an import without an answer counts for.
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.
+_LARGE = 1 << 16  # Bytes. A pairing of the judge with more is sent anew for each question, and not kept here.
 _FORGET = 64  # The number of what can be forgotten before the process is told.
 _TOGETHER = 1 << 16  # Bytes. So much fits into a socket, so the judge never waits to send while the process does, too.
 _QUICK = 1 / (2 * MOST_QUESTIONS)  # The share of its limit of time that a call took before it is asked with others.
@@ -159,6 +160,9 @@ class Host:
         if isinstance(item, Pairing):
             arrays = {name: PackedArray.pack(array) for name, array in item.items()}  # This may ask, so it comes first.
             self._queue.append((SharePairing(self._next_number(), arrays), None))
+            if sum(len(array.data) for array in arrays.values()) > _LARGE:
+                self._forgotten.append(self._number)
+                return self._number
         else:
             meshes = item.nodes, item.slave.segments, item.master.segments
             self._queue.append((ShareInterface(self._next_number(), *map(PackedArray.pack, meshes)), None))

@@ -15,6 +15,7 @@ from contactverif.contract.result import NotLoaded
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
 from contactverif.isolation.messages import MessageError, decode_replies
+from contactverif.isolation.remote_formulation import RemoteSubject
 
 CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)
@@ -100,6 +101,18 @@ def test_pairings_that_nobody_holds_are_not_kept(look: Callable[[object], object
             pairing = formulation.pair(CASE.interface, z)
             formulation.residual(CASE.interface, pairing, z)
             look(pairing)
+
+
+def test_pairings_that_go_to_a_second_process_are_not_kept() -> None:
+    subject = load("LargePairings")
+    assert isinstance(subject, RemoteSubject)
+    first, second = (each.for_case(CASE) for each in (subject, subject.restart()))
+    with most_memory(20 * MEGABYTE):
+        for number in range(40):
+            z = CASE.z + 1e-6 * number
+            pairing = first.pair(CASE.interface, z)
+            forces = [formulation.residual(CASE.interface, pairing, z) for formulation in (first, second)]
+            assert (forces[0] == forces[1]).all()
 
 
 def test_a_pairing_that_is_held_is_the_same_however_many_others_came() -> None:
