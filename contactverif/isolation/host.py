@@ -188,15 +188,19 @@ class Host:
             self._exchange(self._process, waiting, questions)
         except PluginError as error:
             _answer_all(questions, error)
-            self.n_ended += 1
-            if error.cause == "hang":
-                _hangs[self._key] += _AT_IMPORT if questions and questions[0].verb == "import" else 1
-            self.read_last_words()
-            self._process = None
+            self._note_end(error, at_import=bool(questions) and questions[0].verb == "import")
         except BaseException:  # The process is ended, see `PluginProcess.ask`, and nobody is to blame.
             _answer_all(questions, PluginError("the question was interrupted", "not asked"))
             self._process = None
             raise
+
+    def _note_end(self, error: PluginError, *, at_import: bool) -> None:
+        """Note that the process has ended, and why."""
+        self.n_ended += 1
+        if error.cause == "hang":
+            _hangs[self._key] += _AT_IMPORT if at_import else 1
+        self.read_last_words()
+        self._process = None
 
     def _exchange(
         self, process: PluginProcess, waiting: list[tuple[Request, Question | None]], questions: list[Question]
