@@ -78,9 +78,7 @@ class IsolationOptions:
         from contactverif.run.keys import state_folder
 
         adopt_orphans()
-        with suppress(
-            OSError, RuntimeError
-        ):  # Only what is there can be hidden.
+        with suppress(OSError, RuntimeError):  # Only what is there can be hidden.
             state_folder().mkdir(mode=0o700, parents=True, exist_ok=True)
             hidden = (*hidden, state_folder())
         by_rules = settled.isolation is Isolation.LANDLOCK
