@@ -1,12 +1,16 @@
 """The copy of a process in which one name of a survey is loaded, so that no plugin sees what another one has done.
 
-Rule: the process that is copied loads no plugin. A copy knows one line, on which it says what the name is, and ends.
+Rules: the process that is copied loads no plugin. A copy knows one line, on which it says what the name is, and ends.
+If it has changed what the next one would find, its process ends, too.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -20,6 +24,8 @@ from contactverif.isolation.messages import Failure, MessageError, Reply, decode
 from contactverif.isolation.parent_death import die_with_parent, hide_memory
 
 _LARGEST = 1 << 20  # Bytes of a reply. Traits are some hundred.
+_CHANGED = 113  # The status with which the process ends.
+_FOLDERS = tempfile.gettempdir(), "/dev/shm"  # The folders that may be written in a box.
 
 
 def survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
@@ -29,9 +35,11 @@ def survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
     """
     hide_memory(hidden=True)
     import_module("contactverif.geometry.chain_search")  # What most plugins import is imported once.
+    _end_what_is_left()
+    before = _state()
     copy = Child.fork(partial(_say, describe, question), _LARGEST)
     try:
-        (reply,) = decode_replies(copy.channel.receive())
+        (reply,) = decode_replies(copy.channel.receive(), loading=True)
     except ClosedError:
         status = copy.wait() or 0
         words = f"its process ended with status {status}"
@@ -45,6 +53,8 @@ def survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
     finally:
         copy.end()
         _end_what_is_left()
+        if _has_changed(before):
+            os._exit(_CHANGED)
 
 
 def _say(describe: Callable[[], Reply], question: int, channel: Channel) -> None:
@@ -60,7 +70,43 @@ def _say(describe: Callable[[], Reply], question: int, channel: Channel) -> None
 
 
 def _end_what_is_left() -> None:
-    """End all other processes in the box. Without a box the judge ends what it finds, when the survey is over."""
+    """End all other processes in the box and delete files. Without a box the judge does so when the survey is over."""
     if PROCESSES in os.environ and os.getppid() == 1:  # Outside of a box these would be all of the user.
         with suppress(ProcessLookupError):
             os.kill(-1, signal.SIGKILL)
+        for folder in _FOLDERS:
+            with suppress(OSError, RecursionError):  # What cannot be deleted is a change.
+                _empty(folder)
+
+
+def _empty(folder: str) -> None:
+    """Delete what lies in a folder, whatever rights a plugin took from it."""
+    for place, folders, files in os.walk(folder):
+        for name in folders:
+            with suppress(OSError):
+                os.chmod(os.path.join(place, name), 0o700)
+        for name in files:
+            with suppress(OSError):
+                os.unlink(os.path.join(place, name))
+    for entry in os.scandir(folder):
+        shutil.rmtree(entry.path, ignore_errors=True)
+
+
+def _has_changed(before: tuple[object, ...]) -> bool:
+    """Return whether this process, or its box, is not as it was."""
+    try:
+        return _state() != before
+    except OSError:  # It may not open another file.
+        return True
+
+
+def _state() -> tuple[object, ...]:
+    """Return what a copy can change for those after it: the limits of this process, and the files in its box."""
+    if sys.platform == "win32":  # There are no copies, and no such limits.
+        return ()
+    import resource
+
+    limits = [resource.getrlimit(getattr(resource, name)) for name in dir(resource) if name.startswith("RLIMIT_")]
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
+    files = [os.listdir(folder) for folder in _FOLDERS] if PROCESSES in os.environ else []
+    return limits, cores, os.getpriority(os.PRIO_PROCESS, 0), files
