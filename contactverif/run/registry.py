@@ -100,12 +100,12 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
 
 
 def _with_kernels(limits: Limits, text: str) -> Limits:
-    """Return the limits with a box that keeps compiled kernels, those of all formulations of the same packages."""
+    """Return the limits with a box that keeps compiled kernels, those of all formulations of the same modules."""
     if limits.box is None:
         return limits
     names = {part.partition(":")[0] for part in text.split("/")}
-    packages = {entry.module.partition(".")[0] for entry in entry_points(group=FORMULATIONS) if entry.name in names}
-    store = kernel_folder("+".join(sorted(packages))) if packages else ""
+    modules = {entry.module for entry in entry_points(group=FORMULATIONS) if entry.name in names}
+    store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share the name of a package.
     return replace(limits, box=replace(limits.box, store=store))
 
 
