@@ -43,25 +43,32 @@ class Box:
 
 def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ...]:
     """Return the command that runs a command in a box, whose temporary files take so much memory at most."""
-    temporary, size = temporary_folder(), ("--size", str(megabytes << 20))
-    arguments = ["--unshare-all", "--unshare-user", "--cap-drop", "ALL", "--die-with-parent", "--ro-bind", "/", "/"]
+    temporary, size, always_hidden = temporary_folder(), ("--size", str(megabytes << 20)), _always_hidden()
+    arguments = ["--unshare-all", "--unshare-user", *_no_namespaces(), "--cap-drop", "ALL", "--die-with-parent"]
+    arguments += ["--ro-bind", "/", "/"]
     arguments += ["--dev", "/dev", *size, "--tmpfs", "/dev/shm", "--proc", "/proc", *size, "--tmpfs", temporary]
-    arguments += [word for path in _sockets() for word in _hide(path)]
+    arguments += [word for path in always_hidden for word in _hide(path)]
     if box.store:
         arguments += ["--bind", box.store, box.store]
     for path in box.opened:
         arguments += ["--share-net"] if path == NETWORK else ["--dev-bind", path, path]
     arguments += [word for path in box.hidden for word in _hide(path)]  # Also in what is open.
+    # As root a plugin could write the settings of the whole system in /proc, and what hides a folder takes memory.
+    closed = {"/proc", "/dev", *map(os.path.realpath, (*always_hidden, *box.hidden))}
+    closed -= set(map(os.path.realpath, box.opened))
+    arguments += [word for path in sorted(closed) if os.path.isdir(path) for word in ("--remount-ro", path)]
     return _program(), *arguments, "--", *command
 
 
 def environment(box: Box, folder: str) -> dict[str, str]:
     """Return the variables that a process in the box finds, whose folder for temporary files is this one."""
     store = box.store or f"{folder}/kernels"
+    writable = folder, store, *box.opened
     places = {"TMPDIR": folder, "NUMBA_CACHE_DIR": store}
     if box.by_rules:
-        return places | {WRITABLE: os.pathsep.join((folder, store, *box.opened))}
-    return places | {PROCESSES: str(MOST_PROCESSES)}
+        return places | {WRITABLE: os.pathsep.join(writable)}
+    # Rules of Landlock hold in a box, too: a pipe of another program can be written where a file cannot.
+    return places | {WRITABLE: os.pathsep.join((*writable, "/dev")), PROCESSES: str(MOST_PROCESSES)}
 
 
 def kernel_folder(name: str) -> str:
@@ -70,7 +77,8 @@ def kernel_folder(name: str) -> str:
     installation = blake2b(sys.prefix.encode(), digest_size=4).hexdigest()
     folder = Path(usual, "contactverif", "kernels", f"{name}-{installation}")
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)  # A box may open its folder for other users.
+        folder.mkdir(mode=0o700, exist_ok=True)
     except OSError:
         return ""
     return str(folder)
@@ -126,9 +134,17 @@ def temporary_folder() -> str:
     return next((path for path in folders if os.path.isdir(path) and not _holds_code(path)), "/dev/shm")
 
 
-def _sockets() -> list[str]:
-    """Return the sockets of programs that would do for a plugin what the box forbids, and the folder with most."""
-    folders = [path for path in ("/run",) if os.path.isdir(path) and not _holds_code(path)]
+@cache
+def _no_namespaces() -> list[str]:
+    """Return the option with which a box has none in it, if it can be had: there a plugin could undo its limits."""
+    command = [_program(), "--unshare-user", "--disable-userns", "--ro-bind", "/", "/", _program(), "--version"]
+    trial = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    return [] if trial.returncode else ["--disable-userns"]
+
+
+def _always_hidden() -> list[str]:
+    """Return the sockets of programs that would do for a plugin what the box forbids, and the folders of such."""
+    folders = [path for path in ("/run", "/sys/fs/cgroup") if os.path.isdir(path) and not _holds_code(path)]
     try:
         lines = Path("/proc/net/unix").read_text(errors="replace").splitlines()
     except OSError:  # A system without procfs has no boxes, and the trial says so.

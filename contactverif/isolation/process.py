@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import ctypes
 import os
+import signal
 import sys
 import tempfile
 import threading
@@ -120,7 +121,8 @@ class PluginProcess:
         it is ended, too, or its next reply would be that to an earlier question.
         """
         if len(questions) > 1:
-            os.pwrite(self._progress.fileno(), b"\0", 0)
+            with suppress(OSError):  # A plugin can let the file take data at its end alone, where there is no place.
+                os.pwrite(self._progress.fileno(), b"\0", 0)
         self._follow()
         try:
             replies = self._exchange(frame, questions, seconds or self._limits.start_seconds)
@@ -193,7 +195,7 @@ class PluginProcess:
     def _end_with(self, words: str, kind: str) -> PluginError:
         """End the process, and return the error; without a kind, the one that the end of the process tells."""
         status = None if kind else self._child.wait()
-        if self._encloses and status is not None and status > _SIGNALED:
+        if self._encloses and status is not None and status - _SIGNALED in signal.valid_signals():
             status = _SIGNALED - status
         self.end()
         if not kind and status is None:
@@ -206,11 +208,19 @@ class PluginProcess:
 
     def end(self) -> None:
         """End the process and all that it started, as far as they stayed in its session; see `end_marked`."""
+        if self._encloses:
+            self._end_box()
         self._child.end()
         self.output.wait()
         self._progress.close()
         if self._group is not None:
             self._group.remove()
+
+    def _end_box(self) -> None:
+        """End the first process in the box, and with it all. A plugin can make it forget to end with its parent."""
+        with suppress(psutil.Error):
+            for process in psutil.Process(self._child.pid).children():
+                process.kill()
 
 
 class Output:
@@ -237,15 +247,18 @@ class Output:
 
 
 def _file_of_one_byte() -> IO[bytes]:
-    """Return a file of one byte, without a name."""
-    if hasattr(os, "memfd_create"):
-        number = os.memfd_create("progress")
-    else:
+    """Return a file of one byte, without a name, that cannot grow where the system has such files."""
+    if not hasattr(os, "memfd_create"):
         number, path = tempfile.mkstemp()
         os.unlink(path)
-    file = os.fdopen(number, "r+b", buffering=0)
-    file.write(b"\0")
-    return file
+        os.write(number, b"\0")
+        return os.fdopen(number, "r+b", buffering=0)
+    from fcntl import F_ADD_SEALS, F_SEAL_GROW, F_SEAL_SEAL, F_SEAL_SHRINK, fcntl
+
+    number = os.memfd_create("progress", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    os.write(number, b"\0")
+    fcntl(number, F_ADD_SEALS, F_SEAL_GROW | F_SEAL_SHRINK | F_SEAL_SEAL)
+    return os.fdopen(number, "r+b", buffering=0)
 
 
 @cache

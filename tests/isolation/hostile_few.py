@@ -133,6 +133,11 @@ class Exits(Springs):
         os._exit(0)
 
 
+class ExitsWithMinusOne(Springs):
+    def residual(self, interface, pairing, z):
+        os._exit(-1)
+
+
 class KillsInPair(Springs):
     def pair(self, interface, z):
         os.abort()

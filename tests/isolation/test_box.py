@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -161,6 +162,64 @@ def test_all_processes_of_a_box_share_the_limits(monkeypatch: pytest.MonkeyPatch
 
 
 @needs_box
+def test_settings_of_the_system_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As root a plugin could name the program that gets images of crashed processes, and the system would run it."""
+    attempts = {"open_to_write": "/proc/sys/fs/lease-break-time"}
+    assert try_targets(monkeypatch, Box(), **attempts) == set()
+    assert try_targets(monkeypatch, None, **attempts) == (set(attempts) if os.geteuid() == 0 else set())
+
+
+@needs_box
+@pytest.mark.parametrize("folder", ["/run", "/dev", "/sys/fs/cgroup"])
+def test_folders_that_are_hidden_take_no_files(folder: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert try_targets(monkeypatch, Box(), make_file=f"{folder}/hostile", list_folder="/sys/fs/cgroup") == set()
+
+
+@needs_box
+@pytest.mark.skipif(not boxes._no_namespaces(), reason="this bubblewrap cannot forbid namespaces")
+def test_a_box_has_no_further_namespaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With rights of its own in another namespace, a plugin could mount control groups and lift its limits."""
+    assert try_targets(monkeypatch, Box(), make_user_namespace=0x10000000) == set()
+
+
+@needs_box
+def test_the_file_that_tells_the_progress_cannot_grow(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert try_targets(monkeypatch, Box(), lengthen_progress=1 << 20) == set()
+
+
+@needs_box
+@pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
+def test_rules_of_landlock_hold_in_a_box(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They keep pipes of other programs, and the first process of the box, which ends it with its parent."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        assert try_targets(monkeypatch, Box(), open_to_write=pipe, attach_to=1) == set()
+        assert try_targets(monkeypatch, None, open_to_write=pipe) == {"open_to_write"}
+    finally:
+        os.close(reader)
+
+
+@needs_box
+def test_a_box_that_forgets_to_end_with_its_parent_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plugin that may attach to the first process of its box can make it leave its session and outlive its parent."""
+
+    def enclose(*arguments: Any) -> tuple[str, ...]:
+        return tuple("--new-session" if word == "--die-with-parent" else word for word in boxes.enclose(*arguments))
+
+    monkeypatch.setattr(process, "enclose", enclose)
+    code = "print('begins', flush=True); import time; time.sleep(60)"
+    plugin = process.PluginProcess((sys.executable, "-c", code), LIMITS)
+    with pytest.raises(PluginError):
+        plugin.ask(b"", [process.Question(0, "import")], 3.0)
+    assert plugin.output.last == b"begins\n"
+    box = [other for other in psutil.process_iter() if code in _words(other)]
+    psutil.wait_procs(box, timeout=5.0)
+    assert not [other for other in box if other.is_running()]
+
+
+@needs_box
 def test_daemons_that_fork_as_they_are_ended_end_with_the_box() -> None:
     load_remote(boxed_few.PROGRAM, "Daemons", LIMITS)
     process.end_marked()
@@ -176,7 +235,7 @@ def _words(other: psutil.Process) -> list[str]:
 
 
 @needs_box
-@pytest.mark.parametrize("name", ["Kills", "Exits"])
+@pytest.mark.parametrize("name", ["Kills", "Exits", "ExitsWithMinusOne"])
 def test_the_end_of_a_process_is_told_as_without_a_box(name: str) -> None:
     case, ends = named_case("c"), []
     for box in (None, Box()):
