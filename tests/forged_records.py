@@ -11,7 +11,7 @@ import msgspec
 
 from contactverif.contract.property import Verdict
 from contactverif.run.journal import JournalKey, read_messages, record_files
-from contactverif.run.run_journal import BlockRecord, FormRecord, OutcomeRecord
+from contactverif.run.outcome_records import BlockRecord, FormRecord, OutcomeRecord
 
 Record = FormRecord | OutcomeRecord | BlockRecord
 _DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Record)

@@ -53,6 +53,12 @@ def audit(
     raise typer.Exit(audit_report(report, share, place, isolation))
 
 
+def check_share(share: float) -> None:
+    """Check that a share of cases is one."""
+    if not 0 < share <= 1:
+        raise MisuseError("--share", f"{share:g}", "a number above 0, and at most 1")
+
+
 def audit_report(report: Path, share: float, place: PlaceOptions, isolation: IsolationOptions) -> int:
     """Audit a report, and show what differs; return the exit status."""
     from contactverif.cli.run_endings import show_what_plugins_printed
@@ -62,8 +68,7 @@ def audit_report(report: Path, share: float, place: PlaceOptions, isolation: Iso
     from contactverif_reports.netcdf.read import read_run
     from contactverif_reports.netcdf.write import write
 
-    if not 0 < share <= 1:
-        raise MisuseError("--share", f"{share:g}", "a number above 0, and at most 1")
+    check_share(share)
     run = read_run(report, consistent=False)
     sampling = _sampling(run, place)
     subjects = [the_formulation(name, isolation.limits()) for name in run.formulations]
@@ -81,7 +86,7 @@ def audit_report(report: Path, share: float, place: PlaceOptions, isolation: Iso
 def _sampling(run: Run, place: PlaceOptions) -> Sampling:
     """Return the size and the seed of a run, and the place where it asked."""
     from contactverif.run.draw import Sampling
-    from contactverif.run.run_journal import place_words
+    from contactverif.run.run_plan import place_words
 
     stored, typed = run.provenance.get("place", ""), place_words(asdict(place))
     if stored != typed:
@@ -100,14 +105,13 @@ def _show(run: Run, audit: Audit, derivable: list[str]) -> None:
     """Show what was compared, what differs, and how likely a forgery would have been seen."""
     from contactverif.cli.console import say, show
 
-    n_rows = len(run.rows)
-    show(f"{n_rows} rows, {audit.n_outcomes} outcomes, {audit.n_examples} counterexamples")
+    show(f"{len(run.rows)} rows, {audit.n_outcomes} outcomes, {audit.n_examples} witnesses and counterexamples")
     for change in audit.changes:
         say(f"  {change}")
     compared = "up to roundoff" if audit.changes else "bit for bit"
-    n_judged = f"{audit.n_judged} of {audit.n_outcomes} outcomes and {audit.n_examples} counterexamples"
     show(f"derived again: all verdicts and counts; {len(derivable)} disagree")
-    show(f"judged again, compared {compared}: {n_judged}; {len(audit.differences)} differ")
+    n_judged = f"{audit.n_judged} of {audit.n_outcomes} outcomes and all {audit.n_examples} others"
+    show(f"judged again: {n_judged}; {len(audit.differences)} differ, {compared}")
     lines = [*derivable, *audit.differences]
     for line in lines[:_MOST_LINES]:
         say(f"  {line}")
@@ -116,5 +120,5 @@ def _show(run: Run, audit: Audit, derivable: list[str]) -> None:
     show(f"seconds: {audit.seconds:.1f}, and {sum(row.seconds for row in run.rows):.1f} in the run")
     chances = [f"{count}: {audit.chance(count):.0%}" for count in (1, 10, 100) if count <= audit.n_outcomes]
     if chances:
-        show(f"chance to see forged numbers, by how many there are: {', '.join(chances)}")
+        show(f"chance to see one forged outcome among so many: {', '.join(chances)}")
     show("Something differs." if lines else "Nothing differs.")

@@ -16,7 +16,8 @@ from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
 
 if TYPE_CHECKING:
     from contactverif.run.campaign import Shard
-    from contactverif.run.run_journal import Journal, Plan
+    from contactverif.run.run_journal import Journal
+    from contactverif.run.run_plan import Plan
 
 CAMPAIGN = "campaign"
 _SEED = 0  # The seed if there is none: all shards must have the same.

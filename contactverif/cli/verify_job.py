@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from contactverif.isolation.limits import Limits
     from contactverif.run.draw import Sampling
     from contactverif.run.profiles import Profile
-    from contactverif.run.run_journal import Journal, Plan
+    from contactverif.run.run_journal import Journal
+    from contactverif.run.run_plan import Plan
 
 VERIFY, COMPARE = "verify", "compare"
 _Loaded = TypeVar("_Loaded")
@@ -147,7 +148,7 @@ class VerifyJob:
         import msgspec
 
         from contactverif.run.provenance import machine
-        from contactverif.run.run_journal import Plan
+        from contactverif.run.run_plan import Plan
 
         assert self.profile.seed is not None
         return Plan(
@@ -229,7 +230,7 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
     Beside `--resume` only a number of processes may be typed: all other options come from the journal.
     """
     from contactverif.run.journal import journal_folder
-    from contactverif.run.run_journal import read_plan
+    from contactverif.run.run_plan import read_plan
 
     if output.is_dir():
         raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
@@ -256,7 +257,7 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
     import msgspec
 
-    from contactverif.run.run_journal import check_versions
+    from contactverif.run.run_plan import check_versions
 
     if plan.command != command:
         raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import repeat
 from time import perf_counter
 from typing import overload
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import Row, Run
-from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.contract.subject import Subject
 from contactverif.run import draw
 from contactverif.run.draw import Sampling
+from contactverif.run.outcome_records import WITNESS
 from contactverif.run.provenance import code_digests, collect_versions, machine
 from contactverif.run.rows import OpenRow, gap_of_rows, open_row, verdict_of_row
 from contactverif.run.run import RunJobs
-from contactverif.run.run_journal import WITNESS, Journal
+from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Progress, Scheduler
 from contactverif.run.second_look import Sample, SecondLook, choose_share, draw_again, judge_again
 
@@ -34,7 +36,8 @@ class Audit:
     differences : tuple[str, ...]
         What disagrees with the stored run, a line each.
     n_outcomes, n_judged, n_examples : int
-        The numbers of stored outcomes, of those that were judged again, and of counterexamples, which all were.
+        The numbers of stored outcomes, of those that were judged again, and of witnesses and counterexamples, which all
+        were.
     seconds : float
         The time of the audit.
     """
@@ -79,31 +82,30 @@ def audit(
     start = perf_counter()
     changes = find_changes(run)
     rows = _open_rows(run, subjects, questions, sampling)
-    derived = [_derive(row, opened, sampling) for row, opened in zip(run.rows, rows, strict=True)]
+    derived = list(map(_derive, run.rows, rows, repeat(sampling)))
+    stored = [(row, opened) for row, opened in zip(derived, rows, strict=True) if isinstance(opened, OpenRow)]
+    samples = [_sample(row, opened, share) for row, opened in stored]
     scheduler, journal = Scheduler(), Journal()
     jobs = RunJobs(subjects, questions, sampling, journal, _report_nothing, {})
     scheduler.work(jobs.first_calls())
-    stored = [(row, opened) for row, opened in zip(derived, rows, strict=True) if isinstance(opened, OpenRow)]
-    look = SecondLook([_sample(row, opened, share) for row, opened in stored], sampling, journal, exact=not changes)
+    look = SecondLook(samples, sampling, journal, exact=not changes)
     scheduler.work(look)
     examples = counterexamples(run)
-    names = [subject.name for subject in subjects]
     differences = [
-        gap_of_rows(run, names, [question.id for question in questions]),
-        *(_other_property(row, opened, changes) for row, opened in zip(run.rows, rows, strict=True)),
+        gap_of_rows(run, [subject.name for subject in subjects], [question.id for question in questions]),
+        *map(_other_property, run.rows, rows, repeat(bool(changes))),
         *(_gap(row, opened, sampling) for row, opened in stored),
-        *(f"{name} {id_}: {entry.case}: {entry.words}" for entry in look.differences for name, id_ in [entry[:2]]),
-        *(_judge_example(example, subjects, questions, exact=not changes) for example in examples.values()),
+        *map(str, look.differences),
+        *map(_judge_example, examples.values(), repeat(subjects), repeat(questions), repeat(not changes)),
     ]
-    provided = {subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in subjects}
-    opposite = tuple(name for name in names if name in jobs.opposite_signs)
+    n_witnesses = sum(WITNESS in sample.outcomes for sample in samples)
     return Audit(
-        derived=replace(run, rows=tuple(derived), provided=provided, opposite_signs=opposite),
+        derived=replace(run, rows=tuple(derived), provided=jobs.provided, opposite_signs=jobs.opposite_names),
         changes=changes,
         differences=tuple(filter(None, differences)),
-        n_outcomes=sum(len(row.outcomes) + (row.witness is not None) for row in run.rows),
-        n_judged=look.n_judged,
-        n_examples=len(examples),
+        n_outcomes=sum(len(row.outcomes) for row in run.rows),
+        n_judged=look.n_judged - n_witnesses,
+        n_examples=len(examples) + n_witnesses,
         seconds=perf_counter() - start,
     )
 
@@ -171,14 +173,14 @@ def _sample(row: Row, opened: OpenRow, share: float) -> Sample:
     return Sample.of_row(opened, outcomes if row.witness is None else {**outcomes, WITNESS: row.witness})
 
 
-def _other_property(row: Row, opened: OpenRow | Row, changes: Sequence[str]) -> str:
-    """Return in what a stored property is not that of today; words may change with the version."""
+def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str:
+    """Return in what a stored property is not that of today; its words may change with the version."""
     info = (opened if isinstance(opened, Row) else opened.row).info
     judged = ("id", "needs", "least_contact", "usual_undecided", "quantities")
-    names = judged if changes else tuple(part.name for part in fields(PropertyInfo))
+    names = judged if other_version else tuple(part.name for part in fields(PropertyInfo))
     for name in names:
         stored, today = getattr(row.info, name), getattr(info, name)
-        if name == "quantities" and changes:
+        if name == "quantities" and other_version:
             stored, today = ([(each.name, each.unit, each.sense) for each in every] for every in (stored, today))
         if stored != today:
             return f"{row.formulation} {row.property_id}: {name} of the property are others than those of today"
@@ -202,7 +204,7 @@ def _gap(row: Row, opened: OpenRow, sampling: Sampling) -> str:
 
 
 def _judge_example(
-    example: Counterexample, subjects: Sequence[Subject], questions: Sequence[Property], *, exact: bool
+    example: Counterexample, subjects: Sequence[Subject], questions: Sequence[Property], exact: bool
 ) -> str:
     """Judge a counterexample again, and return in what it differs."""
     subject = next(subject for subject in subjects if subject.name == example.formulation)

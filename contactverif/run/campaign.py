@@ -13,7 +13,8 @@ import msgspec
 
 from contactverif.contract.errors import MisuseError
 from contactverif.run.journal import begin_journal, read_record, write_record
-from contactverif.run.run_journal import Journal, Plan, check_versions, read_plan
+from contactverif.run.run_journal import Journal
+from contactverif.run.run_plan import Plan, check_versions, read_plan
 
 _MARK = "done"
 _SHARD = "shard"  # The option in a plan that differs from shard to shard.

@@ -25,7 +25,8 @@ from contactverif.problems.named_states import named_case
 from contactverif.run import judge
 from contactverif.run.draw import CaseSource, Sampling, draw_cases, shrink
 from contactverif.run.judge import badness, verdict_over_all
-from contactverif.run.run_journal import Notes, OutcomeForm, decode_outcome, encode_outcome
+from contactverif.run.outcome_records import OutcomeForm, decode_outcome, encode_outcome
+from contactverif.run.run_journal import Notes
 from contactverif.run.scheduler import CaseChunk
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.

@@ -30,10 +30,11 @@ from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.isolation.remote_formulation import places
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
+from contactverif.run.outcome_records import WITNESS, BlockRecord
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.provenance import collect_provenance
 from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, judge_cases, open_row, shrink_case
-from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
+from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
 
@@ -177,7 +178,7 @@ class RunJobs:
         self._groups: dict[tuple[str, bool], list[Property]] = {}
         for question in sorted(questions, key=attrgetter("bodies")):
             self._groups.setdefault(sampling.group(question), []).append(question)
-        self.opposite_signs: set[str] = set()
+        self._opposite_signs: set[str] = set()
 
     def work(self, scheduler: Scheduler) -> None:
         """Do all jobs; before anything is believed of a journal without a proof, a share of it is judged again."""
@@ -199,7 +200,7 @@ class RunJobs:
     ) -> Iterable[Job]:
         opposite, first = answers
         subject.first_answers = subject.first_answers or first  # In a second run the process is warm.
-        self.opposite_signs |= {before.formulation} if opposite else set()
+        self._opposite_signs |= {before.formulation} if opposite else set()
         self._report(replace(before, count=1))
         return ()
 
@@ -221,12 +222,20 @@ class RunJobs:
         return Run(
             rows=tuple(self._close(self._rows[subject.name, question.id]) for subject, question in pairs),
             not_loaded=not_loaded,
-            provided={
-                subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects
-            },
-            opposite_signs=tuple(subject.name for subject in self._subjects if subject.name in self.opposite_signs),
+            provided=self.provided,
+            opposite_signs=self.opposite_names,
             provenance=provenance,
         )
+
+    @property
+    def provided(self) -> dict[str, dict[str, bool]]:
+        """The optional parts that each formulation has, or has not."""
+        return {subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects}
+
+    @property
+    def opposite_names(self) -> tuple[str, ...]:
+        """The formulations with forces of the opposite sign, once all are called."""
+        return tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs)
 
     def _close(self, row: OpenRow | Row) -> Row:
         """Return a row as far as it is judged."""

@@ -19,8 +19,9 @@ from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.subject import Subject
 from contactverif.run import draw, judge
 from contactverif.run.draw import PlannedCases, Sampling
+from contactverif.run.outcome_records import WITNESS, BlockRecord
 from contactverif.run.rows import OpenRow, open_row
-from contactverif.run.run_journal import WITNESS, BlockRecord, Journal
+from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Job, Scheduler
 
 SHARE = 0.01  # The share of the cases of a row that is judged again, at least one case.
@@ -43,6 +44,9 @@ class Difference(NamedTuple):
     property_id: str
     number: int
     words: str
+
+    def __str__(self) -> str:
+        return f"{self.formulation} {self.property_id}: {self.case}: {self.words}"
 
     @property
     def case(self) -> str:

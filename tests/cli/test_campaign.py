@@ -8,7 +8,7 @@ import pytest
 from asking import Ask, asking
 
 from contactverif import Property, load_properties
-from contactverif.run.run_journal import KnownOutcomes
+from contactverif.run.known_outcomes import KnownOutcomes
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
 

@@ -12,8 +12,9 @@ from asking import Ask, without_rows
 from fresh_process import MAIN, PYTHON
 
 from contactverif.run.journal import begin_journal, journal_folder
+from contactverif.run.known_outcomes import KnownOutcomes
 from contactverif.run.rows import OutcomeStore
-from contactverif.run.run_journal import KnownOutcomes, Plan
+from contactverif.run.run_plan import Plan
 from contactverif_reports.netcdf.differences import same_data
 
 IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")

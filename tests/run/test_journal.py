@@ -24,18 +24,13 @@ from contactverif.run.journal import (
     read_messages,
     remove_journal,
 )
+from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.run.outcome_records import BlockRecord, OutcomeFile
 from contactverif.run.provenance import machine
 from contactverif.run.rows import find_gap
 from contactverif.run.run import RunStopped, run
-from contactverif.run.run_journal import (
-    BlockRecord,
-    Journal,
-    KnownOutcomes,
-    OutcomeFile,
-    Plan,
-    check_versions,
-    read_plan,
-)
+from contactverif.run.run_journal import Journal
+from contactverif.run.run_plan import Plan, check_versions, read_plan
 from contactverif.run.scheduler import Progress
 
 NAMES = ("nts", "vts-ppt")

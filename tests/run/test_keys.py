@@ -8,7 +8,7 @@ import pytest
 
 from contactverif.run.journal import JournalKey, begin_journal, remove_journal, withdraw_journal
 from contactverif.run.keys import make_key, read_key, state_folder
-from contactverif.run.run_journal import Plan
+from contactverif.run.run_plan import Plan
 
 
 @pytest.fixture(autouse=True)

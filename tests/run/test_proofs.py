@@ -14,8 +14,11 @@ from test_scheduler import facts
 from contactverif import Run, load_formulation, load_properties
 from contactverif.run import second_look
 from contactverif.run.journal import record_files, write_record
+from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.run.outcome_records import FormRecord, OutcomeRecord
 from contactverif.run.run import run
-from contactverif.run.run_journal import FormRecord, Journal, KnownOutcomes, OutcomeRecord, Plan, is_provable
+from contactverif.run.run_journal import Journal
+from contactverif.run.run_plan import Plan, is_provable
 
 IDS = ("balance.force", "patch.flat.transmission")
 EXAMPLES, SEED = 12, 3
@@ -138,6 +141,21 @@ def test_outcomes_of_another_seed_are_found(
     assert facts(result) == facts(unbroken[0])
     assert len(journal.remarks) == 2
     assert journal.doubt == f"{2 * EXAMPLES + 1}, of which {2 * EXAMPLES + 1} were judged again"
+
+
+def test_a_row_that_is_not_believed_is_not_believed_after_a_kill(unbroken: tuple[Run, Path], copy: Path) -> None:
+    forge(without_key(copy), scale_numbers)
+    journal = Journal(plan_of(), copy, [copy])
+    for property_id in IDS:
+        journal.distrust("nts", property_id, "it differs")
+    journal.close()  # The run is killed before it judges anything.
+    again = Journal(plan_of(), copy, [copy])
+    assert again.known.n_outcomes == 0
+    result = judge(again)
+    assert facts(result) == facts(unbroken[0])
+    assert again.doubt == ""
+    third = Journal(plan_of(), None, [copy])  # What was judged since then counts.
+    assert third.known.n_outcomes == 2 * EXAMPLES + 1
 
 
 def test_a_key_that_a_plugin_could_read_proves_nothing(unbroken: tuple[Run, Path], tmp_path: Path) -> None:

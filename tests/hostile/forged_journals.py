@@ -1,0 +1,211 @@
+"""Forge and damage journals without the key, go on with them, and count what is believed of them.
+
+`python tests/hostile/forged_journals.py COUNT SEED` prints a table by kind. A run that goes on must come to what it
+would have come to without the forgery, name what does not fit, and never end in a traceback.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+from damage import BYTES
+from forged_records import Record, frame, read, say_pass, scale_numbers
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import Run
+from contactverif.run.journal import JournalKey, begin_journal, record_files, write_record
+from contactverif.run.outcome_records import OutcomeRecord
+from contactverif.run.provenance import machine
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.run import run
+from contactverif.run.run_journal import Journal
+from contactverif.run.run_plan import Plan
+
+IDS = ("balance.force", "patch.flat.transmission")
+EXAMPLES, SEED = 10, 3
+ENDINGS = ("named", "judged again", "refused", "believed", "traceback")
+HARM = frozenset(ENDINGS[-2:])
+_Change = Callable[[Record, random.Random], Record]
+_BOX = {"isolation": {"isolation": "box"}}
+
+
+def plan_of(seed: int = SEED) -> Plan:
+    """Return the plan of a run in which no plugin can read the key."""
+    return Plan(formulations=("nts",), properties=IDS, examples=EXAMPLES, seed=seed, machine=machine(), options=_BOX)
+
+
+def judge(journal: Journal, seed: int = SEED) -> Run:
+    """Judge what the journal does not have."""
+    return run([load_formulation("nts")], load_properties(IDS), examples=EXAMPLES, seed=seed, journal=journal)
+
+
+def facts(result: Run) -> list[str]:
+    """Return what a run came to, without its seconds."""
+    return [
+        f"{row.verdict} {row.reason} {row.planned} {row.witness and (row.witness.verdict, row.witness.measurement)} "
+        f"{[(each.verdict, each.reason, each.measurement, each.summary) for each in row.outcomes]}"
+        for row in result.rows
+    ]
+
+
+def _other_seed(folder: Path, chance: random.Random, others: Path) -> None:
+    """Put the records of a run with another seed into the file."""
+    (path,) = record_files(folder)
+    shutil.copy(record_files(others / "seed")[0], path)
+
+
+def _other_run(folder: Path, chance: random.Random, others: Path) -> None:
+    """Add the file of another run with the same plan, under its name."""
+    path = record_files(others / "same")[0]
+    shutil.copy(path, folder / path.name)
+
+
+def _other_file(folder: Path, chance: random.Random, others: Path) -> None:
+    """Give the file of the run another name."""
+    (path,) = record_files(folder)
+    path.rename(folder / f"1-{chance.getrandbits(32):08x}.outcomes")
+
+
+def _other_place(folder: Path, chance: random.Random, others: Path) -> None:
+    """Repeat the bytes of a record at the end of the file."""
+    (path,) = record_files(folder)
+    data = path.read_bytes()
+    places = [*(place for place, _ in read(path)), len(data)]
+    number = chance.randrange(len(places) - 1)
+    path.write_bytes(data + data[places[number] : places[number + 1]])
+
+
+def _other_header(folder: Path, chance: random.Random, others: Path) -> None:
+    """Change the plan, and with it the identity, and the numbers of all outcomes."""
+    write_record(folder / "header", msgspec.structs.replace(plan_of(), nonce="another"))
+    _records(lambda record, chance: scale_numbers(record), share=1.0)(folder, chance, others)
+
+
+def _records(change: _Change, share: float = 0.2) -> Callable[[Path, random.Random, Path], None]:
+    """Return a forgery that changes some records, with right lengths, checksums and places of forms."""
+
+    def forge(folder: Path, chance: random.Random, others: Path) -> None:
+        (path,) = record_files(folder)
+        data, places, whole = b"", dict[int, int](), path.read_bytes()
+        records = list(read(path))
+        ends = [*(place for place, _ in records[1:]), len(whole)]
+        chosen = {chance.randrange(len(records))}
+        for number, ((place, record), end) in enumerate(zip(records, ends, strict=True)):
+            changed = change(record, chance) if number in chosen or chance.random() < share else record
+            if isinstance(changed, OutcomeRecord):
+                changed = msgspec.structs.replace(changed, form=places.get(changed.form, changed.form))
+            places[place] = len(data)
+            data += whole[place:end] if changed is record else frame(changed)
+        path.write_bytes(data)
+
+    return forge
+
+
+def _bytes(change: Callable[[bytes, random.Random], bytes]) -> Callable[[Path, random.Random, Path], None]:
+    def damage(folder: Path, chance: random.Random, others: Path) -> None:
+        path = chance.choice([*record_files(folder), folder / "header"])
+        path.write_bytes(change(path.read_bytes(), chance))
+
+    return damage
+
+
+def _another(field: str, *values: int) -> _Change:
+    def change(record: Record, chance: random.Random) -> Record:
+        return msgspec.structs.replace(record, **{field: chance.choice(values)}) if _is_outcome(record) else record
+
+    return change
+
+
+def _is_outcome(record: Record) -> bool:
+    return isinstance(record, OutcomeRecord)
+
+
+KINDS: dict[str, Callable[[Path, random.Random, Path], None]] = {
+    **{f"bytes: {kind}": _bytes(change) for kind, change in BYTES.items()},
+    "another verdict": _records(lambda record, chance: say_pass(record), share=1.0),
+    "other numbers": _records(lambda record, chance: scale_numbers(record)),
+    "another row": _records(_another("row", 0, 1, -1, 2, 2**31, 2**62)),
+    "another case": _records(_another("number", -1, 0, 5, EXAMPLES, -(2**40), 2**63)),
+    "another form": _records(_another("form", 0, 1, -1, 2**40, 2**63)),
+    "records of another seed": _other_seed,
+    "records of another run": _other_run,
+    "records in another file": _other_file,
+    "records at another place": _other_place,
+    "another identity": _other_header,
+}
+
+
+class Campaign:
+    """A proven journal, and how runs ended that went on with a forgery of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.counts: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+        for name, seed in (("whole", SEED), ("same", SEED), ("seed", SEED + 1)):
+            begin_journal(folder / name, plan_of(seed), [])
+            result = judge(Journal(plan_of(seed), folder / name), seed)
+            if name == "whole":
+                self.right = facts(result)
+
+    def attack(self, kind: str, chance: random.Random) -> str:
+        """Go on with a forged copy, and return how that ended."""
+        copy = self.folder / "copy"
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(self.folder / "whole", copy)
+        KINDS[kind](copy, chance, self.folder)
+        ending = self._go_on(copy)
+        self.counts[kind][ending] += 1
+        return ending
+
+    def _go_on(self, copy: Path) -> str:
+        try:
+            journal = Journal(plan_of(), None, [copy])
+            result = judge(journal)
+        except MisuseError:
+            return "refused"
+        except Exception:
+            traceback.print_exc()
+            return "traceback"
+        if facts(result) != self.right:
+            return "believed"
+        return "named" if journal.remarks else "judged again"
+
+    @property
+    def harm(self) -> int:
+        """The number of forgeries that were believed, or ended in a traceback."""
+        return sum(counts[word] for counts in self.counts.values() for word in HARM)
+
+    def table(self) -> str:
+        """Return the table in Markdown."""
+        lines = [f"| forgery | {' | '.join(ENDINGS)} |", "|---|" + "---:|" * len(ENDINGS)]
+        total = sum(self.counts.values(), Counter[str]())
+        for kind, counts in {**self.counts, "all": total}.items():
+            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in ENDINGS)} |")
+        return "\n".join(lines)
+
+
+def main(count: int, seed: int) -> int:
+    """Run the campaign; return 1 if a forgery did harm."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["XDG_STATE_HOME"] = f"{folder}/state"
+        campaign = Campaign(Path(folder))
+        assert JournalKey.read(Path(folder) / "whole").key
+        for number in range(count):
+            kind = list(KINDS)[number % len(KINDS)]
+            campaign.attack(kind, random.Random(f"{seed}/{number}"))
+        print(campaign.table(), flush=True)
+    return int(campaign.harm > 0)
+
+
+if __name__ == "__main__":
+    sys.path.append(str(Path(__file__).parents[1]))
+    sys.exit(main(*(int(word) for word in [*sys.argv[1:], "1000", "1"][:2])))

@@ -1,0 +1,23 @@
+"""A forged journal is not believed. `forged_journals.py` forges many more."""
+
+import random
+
+import pytest
+from forged_journals import HARM, KINDS, Campaign
+
+N_FORGED = 2
+# The change of a byte may make a record that nobody asks for unreadable; what is moved or changed is always named.
+NAMED = ("other numbers", "records of another seed", "records of another run", "records in another file")
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    return Campaign(tmp_path_factory.mktemp("forged"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_forged_journal_is_not_believed(campaign: Campaign, kind: str) -> None:
+    endings = [campaign.attack(kind, random.Random(f"{kind}/{number}")) for number in range(N_FORGED)]
+    assert not HARM & {*endings}
+    if kind in NAMED:
+        assert {*endings} == {"named"}
