@@ -25,7 +25,7 @@ from contactverif.isolation.control_group import MOST_PROCESSES, ControlGroup, m
 from contactverif.isolation.host import end_all
 from contactverif.isolation.landlock import NETWORK, landlock_version
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
+from contactverif.isolation.loading import load_remote, python_program
 
 LIMITS = Limits(seconds=20.0, memory=2000, box=Box())
 needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
@@ -220,11 +220,12 @@ def test_a_box_that_forgets_to_end_with_its_parent_is_ended(monkeypatch: pytest.
 
 
 @needs_box
-def test_daemons_that_fork_as_they_are_ended_end_with_the_box() -> None:
-    load_remote(boxed_few.PROGRAM, "Daemons", LIMITS)
+def test_daemons_that_fork_as_they_are_ended_end_with_the_box(tmp_path: Path) -> None:
+    program = tmp_path / "boxed_few.py"  # Another path than in the tests that run at the same time.
+    program.write_text(Path(boxed_few.__file__).read_text(encoding="utf-8"), encoding="utf-8")
+    load_remote(python_program(str(program)), "Daemons", LIMITS)
     process.end_marked()
-    left = [other for other in psutil.process_iter() if boxed_few.__file__ in _words(other)]
-    assert not left
+    assert not [other for other in psutil.process_iter() if str(program) in _words(other)]
 
 
 def _words(other: psutil.Process) -> list[str]:
