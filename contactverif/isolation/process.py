@@ -208,19 +208,24 @@ class PluginProcess:
 
     def end(self) -> None:
         """End the process and all that it started, as far as they stayed in its session; see `end_marked`."""
-        if self._encloses:
-            self._end_box()
+        # A plugin can make the first process in its box forget to end with its parent. With it ends all of the box.
+        first = self._first_in_box() if self._encloses else []
+        for process in first:
+            with suppress(psutil.Error):
+                process.kill()
         self._child.end()
+        psutil.wait_procs(first, timeout=_SECONDS_TO_DIE)
         self.output.wait()
         self._progress.close()
         if self._group is not None:
             self._group.remove()
 
-    def _end_box(self) -> None:
-        """End the first process in the box, and with it all. A plugin can make it forget to end with its parent."""
-        with suppress(psutil.Error):
-            for process in psutil.Process(self._child.pid).children():
-                process.kill()
+    def _first_in_box(self) -> list[psutil.Process]:
+        """Return the first process in the box, if it is there."""
+        try:
+            return list(psutil.Process(self._child.pid).children())
+        except psutil.Error:
+            return []
 
 
 class Output:

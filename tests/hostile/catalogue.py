@@ -26,6 +26,7 @@ KINDS = {
     "leaves": "hostile_leftovers",
     "says": "hostile_messages",
     "cheats": "hostile_cheats",
+    "reaches": "hostile_box",
 }
 # {name: (module, end, what it does)} of modules that act when they are imported, so that nobody imports them here.
 AT_IMPORT = {

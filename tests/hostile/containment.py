@@ -1,8 +1,9 @@
 """Run `contactverif verify nts BAD vts-ppt` for each hostile plugin, and judge how the harness stands it.
 
-`tox -e hostile` writes `reports/trust/hostile.csv`, a line for each plugin and each way to run it: in a process of its
-own, and in the process of the harness (`inline`). Every answer of the table is looked up outside of the harness: in the
-report, in the exit status, and among the processes and files that are there afterwards.
+`tox -e hostile` writes `reports/trust/hostile.csv`, a line for each plugin and each way to run it: in a box, in a
+process of its own, and in the process of the harness (`inline`). Every answer of the table is looked up outside of the
+harness: in the report, in the exit status, and among the processes and files that are there afterwards, some of them
+bait (`bait.py`).
 """
 
 import json
@@ -19,11 +20,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bait import BAIT, bait
 from catalogue import FOLDER, PLUGINS, HostilePlugin, install
 from hostile_kit import CAUGHT, IMPURE, LIKE_NTS, STOPS
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded, Run
+from contactverif.isolation.box import why_no_box
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
@@ -35,6 +38,7 @@ FOR_KINDS = {"process": "patch.flat.nodal", "cheats": "patch.flat.transmission",
 FOR_VERBS = {"tangent": "tangent.directional", "contact_points": "projection.place"}
 EXAMPLES = 4
 MODES = {
+    "box": ("--isolation", "box", "--time-limit", "2", "--memory-limit", "1024"),
     "process": ("--isolation", "process", "--time-limit", "2", "--memory-limit", "1024"),
     "inline": ("--isolation", "inline"),
 }
@@ -86,20 +90,18 @@ def run_command(folder: Path, *arguments: str, seconds: float = SECONDS) -> Fini
         "NO_COLOR": "1",
         "COLUMNS": "140",
     }
-    shared = set(Path("/dev/shm").glob("hostile-*"))
     facts_file = folder / "facts.json"
     reaper = [sys.executable, str(FOLDER.parent / "reaper.py"), str(facts_file), str(seconds), str(MEGABYTES)]
-    with (folder / "out").open("wb") as out, (folder / "err").open("wb") as err:
+    with (folder / "out").open("wb") as out, (folder / "err").open("wb") as err, bait(folder / "bait") as beside:
         command = [*reaper, sys.executable, "-c", MAIN, *arguments]
+        variables[BAIT] = str(beside.folder)
         subprocess.run(command, cwd=here, env=variables, stdout=out, stderr=err, check=True)
+        changes = beside.changes()
     facts: dict[str, Any] = json.loads(facts_file.read_text())
-    blocks = set(Path("/dev/shm").glob("hostile-*")) - shared
     left = [f"process {line}" for line in facts["left"]]
     left += [f"file {path.name}" for path in sorted(temporary.iterdir())]
     left += [f"file {path.name}" for path in sorted(here.iterdir()) if path.name != "report.nc"]
-    left += [f"shared memory {path.name}" for path in sorted(blocks)]
-    for path in blocks:
-        path.unlink()
+    left += changes
     output, errors = ((folder / name).read_bytes() for name in ("out", "err"))
     return Finish(facts["status"], facts["seconds"], output, errors, tuple(left), here / "report.nc")
 
@@ -272,7 +274,7 @@ def _judged_together(names: tuple[str, ...], mode: str) -> dict[str, list[str]]:
 def cells(key: str) -> list[str]:
     """Return the cells of a key such as `process/dies-exit-0`."""
     mode, _, name = key.partition("/")
-    if mode == "process":
+    if mode != "inline":
         names = tuple(plugin.name for plugin in groups()[name])
         lines = _judged_together(names, mode)
         if len(names) > 1 and all(set(line[2 : 2 + len(CHECKS)]) == {"yes"} for line in lines.values()):
@@ -290,5 +292,6 @@ if __name__ == "__main__":
     from tables import fill
 
     processes = int(sys.argv[1]) if len(sys.argv) > 1 else 1
+    modes = [mode for mode in MODES if mode != "box" or not why_no_box()]
     names = [name for chunk in dict.fromkeys(groups().values()) for name in (plugin.name for plugin in chunk)]
-    fill("hostile.csv", HEADS, [f"{mode}/{name}" for mode in MODES for name in names], cells, processes=processes)
+    fill("hostile.csv", HEADS, [f"{mode}/{name}" for mode in modes for name in names], cells, processes=processes)

@@ -25,25 +25,35 @@ not is on the page [What a plugin can do](../../docs/concepts/containment.md).
 
 ## Plugins against a run
 
-Each line is `contactverif verify nts BAD vts-ppt --isolation process` with one hostile plugin `BAD`. The answers are
-looked up outside of the harness:
+Each line is `contactverif verify nts BAD vts-ppt` with one hostile plugin `BAD`. The answers are looked up outside of
+the harness:
 
 - *goes on*: the run ends by itself, with exit status 0 or 1 and without a traceback.
 - *others unchanged*: `nts` and `vts-ppt` have the same numbers, bit by bit, as in a run without the plugin.
 - *report complete*: the report has every row, and an outcome of every planned case.
 - *exit status right*: 0 only if the plugin was judged and keeps its promises. A plugin whose answers are right although
   it misbehaves must get the same numbers as `nts`, whose answers it gives.
-- *nothing left*: no process, temporary file or block of shared memory is there afterwards.
+- *nothing left*: no process, temporary file or block of shared memory is there afterwards, and nothing is changed of
+  the files, sockets and processes that lie beside the run as bait.
 - *output clean*: what is printed has no control characters, and less than 100 kB.
 
 """
-SUMMARY = """{plugins} plugins{rest} in a process of their own: {whole} are contained in everything, and of
+# The ways to run them apart from the harness, the strongest first.
+PLACES = {"box": "in a box", "process": "in a process of their own"}
+SUMMARY = """{plugins} plugins{rest} {place}: {whole} are contained in everything, and of
 {answers} answers {yes} are yes.
-{inline}
 """
 INLINE = """In the process of the harness (`--isolation inline`), {whole} of {plugins} are contained, {lost} lose the
 results of everybody, and {zero} end with exit status 0 though the plugin was not judged.{rest}
 """
+# {how they ran: {plugin: why it is not contained there}}, the short list of the page about containment.
+NOT_CONTAINED = {
+    "box": {
+        "reaches-key": "Linux has the keyrings of a user once, and not for each box.",
+        "reaches-device-times": "A plugin of the root user may change rights and times of `/dev/null` and its like.",
+    },
+    "process": {},
+}
 KILLED = """## Kills
 
 Runs were killed by SIGKILL at random moments, half of them with all their processes, half the first process alone, and
@@ -80,10 +90,15 @@ def table(heads: list[str], lines: list[list[str]]) -> str:
     return "\n".join([*text, *(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)]) + "\n"
 
 
-def by_kind() -> str:
+def places() -> list[str]:
+    """Return the ways apart from the harness in which plugins were run, the strongest first."""
+    return [mode for mode in PLACES if rows(mode)]
+
+
+def by_kind(mode: str) -> str:
     """Return a table with a line for each kind of plugin: in how many plugins of it each answer is yes."""
     groups: dict[str, list[Row]] = defaultdict(list)
-    for row in rows("process"):
+    for row in rows(mode):
         groups[PLUGINS[name_of(row)].kind].append(row)
     lines = [
         [kind, str(len(group)), *(f"{sum(row[check] == 'yes' for row in group)}" for check in CHECKS)]
@@ -92,46 +107,52 @@ def by_kind() -> str:
     return table(["kind", "plugins", *CHECKS], lines)
 
 
-def summary() -> str:
-    """Return the numbers of both ways to run the plugins."""
-    process, inline = rows("process"), rows("inline")
-    answers = [row[check] == "yes" for row in process for check in CHECKS]
-    words = ""
-    if inline:
-        words = INLINE.format(
-            whole=sum(map(is_whole, inline)),
-            plugins=len(inline),
-            lost=sum(row["report complete"] == "no" for row in inline),
-            zero=sum(row["status"] == "0" and row["exit status right"] == "no" for row in inline),
-            rest=f" {missing} more did not run there." if (missing := len(PLUGINS) - len(inline)) else "",
-        )
-    missing = len(PLUGINS) - len(process)
+def summary(mode: str) -> str:
+    """Return the numbers of a way to run the plugins."""
+    lines = rows(mode)
+    answers = [row[check] == "yes" for row in lines for check in CHECKS]
+    missing = len(PLUGINS) - len(lines)
     rest = f" ({missing} more have not run yet)" if missing else ""
-    numbers = {"plugins": len(process), "rest": rest, "whole": sum(map(is_whole, process)), "answers": len(answers)}
-    return SUMMARY.format(**numbers, yes=sum(answers), inline=words)
+    numbers = {"plugins": len(lines), "rest": rest, "whole": sum(map(is_whole, lines)), "answers": len(answers)}
+    return SUMMARY.format(**numbers, place=PLACES[mode], yes=sum(answers))
 
 
-def exceptions() -> str:
-    """Return a table of the plugins that are not contained in everything."""
-    heads = ["plugin", "what it does", "not contained", "remarks"]
+def inline() -> str:
+    """Return the numbers of the plugins in the process of the harness; empty if there are none."""
+    lines = rows("inline")
+    if not lines:
+        return ""
+    return INLINE.format(
+        whole=sum(map(is_whole, lines)),
+        plugins=len(lines),
+        lost=sum(row["report complete"] == "no" for row in lines),
+        zero=sum(row["status"] == "0" and row["exit status right"] == "no" for row in lines),
+        rest=f" {missing} more did not run there." if (missing := len(PLUGINS) - len(lines)) else "",
+    )
+
+
+def exceptions(mode: str) -> str:
+    """Return a table of the plugins that are not contained in everything, with the reason where it is known."""
+    heads = ["plugin", "what it does", "not contained", "why", "remarks"]
     lines = [
         [
             f"`{name_of(row)}`",
             PLUGINS[name_of(row)].summary,
             ", ".join(check for check in CHECKS if row[check] != "yes"),
+            NOT_CONTAINED.get(mode, {}).get(name_of(row), ""),
             row["remarks"],
         ]
-        for row in rows("process")
+        for row in rows(mode)
         if not is_whole(row)
     ]
-    return "Those that are not contained in everything:\n\n" + table(heads, lines) if lines else ""
+    return f"Those {PLACES[mode]} that are not contained in everything:\n\n" + table(heads, lines) if lines else ""
 
 
-def all_plugins() -> str:
+def all_plugins(mode: str) -> str:
     """Return the long table."""
     heads = ["plugin", "what it does", *CHECKS, "seconds", "verdict"]
     lines = []
-    for row in rows("process"):
+    for row in rows(mode):
         name = name_of(row)
         verdict = row["result"].partition(":")[0]
         answers = [row[check] for check in CHECKS]
@@ -167,12 +188,14 @@ def page() -> str:
         for row in read(COMMITS)
         if row["table"] in (TABLE, KILLS, *CAMPAIGNS)
     )
-    parts = [
-        INTRODUCTION.format(commits=commits) + summary() + "\n" + by_kind(),
-        exceptions(),
+    parts = [INTRODUCTION.format(commits=commits).rstrip() + "\n"]
+    for mode in places():
+        parts += [summary(mode), by_kind(mode), exceptions(mode)]
+    parts += [
+        inline(),
         kills(),
         campaigns().rstrip() + "\n" if campaigns() else "",
-        "## All plugins\n\n" + all_plugins(),
+        f"## All plugins {PLACES[places()[0]]}\n\n" + all_plugins(places()[0]),
     ]
     return "\n".join(part for part in parts if part)
 

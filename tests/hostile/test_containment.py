@@ -7,6 +7,7 @@ import pytest
 from catalogue import KINDS, PLUGINS
 from containment import CHECKS, HEADS, judge, run_command, scratch
 
+from contactverif.isolation.box import why_no_box
 from contactverif_reports.bench.results import Outcome
 from contactverif_reports.netcdf.bench_file import read_bench
 
@@ -19,6 +20,16 @@ CAUGHT = (
     "prints-write-rubbish-everywhere",
     "says-say-misuse",
 )
+REACHES = (
+    "reaches-write-file",
+    "reaches-write-pipe",
+    "reaches-stop-process",
+    "reaches-connect-port",
+    "reaches-setting",
+    "reaches-namespaces",
+    "reaches-endless-code",
+)
+needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
 LIKE_NTS = ("prints-print-escapes", "leaves-daemon", "process-no-paths", "process-other-folder")
 
 
@@ -28,9 +39,17 @@ def test_there_are_enough_plugins_of_every_kind_and_each_says_what_it_does() -> 
     assert all(plugin.summary.endswith(".") for plugin in PLUGINS.values())
 
 
-@pytest.mark.parametrize("names", [CAUGHT, LIKE_NTS], ids=["caught", "like nts"])
-def test_hostile_plugins_are_contained(names: tuple[str, ...]) -> None:
-    lines = judge([PLUGINS[name] for name in names], "process")
+@pytest.mark.parametrize(
+    ("mode", "names"),
+    [
+        pytest.param("process", CAUGHT, id="caught"),
+        pytest.param("process", LIKE_NTS, id="like nts"),
+        pytest.param("box", CAUGHT, id="caught in a box", marks=needs_box),
+        pytest.param("box", REACHES, id="reaches out of a box", marks=needs_box),
+    ],
+)
+def test_hostile_plugins_are_contained(mode: str, names: tuple[str, ...]) -> None:
+    lines = judge([PLUGINS[name] for name in names], mode)
     for name, line in lines.items():
         cells = dict(zip(HEADS[1:], line, strict=True))
         assert all(cells[check] == "yes" for check in CHECKS), f"{name}: {cells}"
