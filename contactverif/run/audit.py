@@ -116,7 +116,7 @@ def find_changes(run: Run) -> tuple[str, ...]:
     today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
     stored = {name: run.provenance.get(name, "unknown") for name in today}
     changed = [name for name in today if stored[name] != today[name]]
-    return tuple(f"{name.replace('_', ' ')}: {stored[name]} in the report, {today[name]} here" for name in changed)
+    return tuple(f"{name}: {stored[name]} in the report, {today[name]} here" for name in changed)
 
 
 class DerivedOutcomes(Sequence[Outcome]):

@@ -25,7 +25,7 @@ from contactverif.run.registry import FORMULATIONS, PROPERTIES
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
 _DIGITS = 16
-CODE = "code of "  # What stands before a package in the name of the digest of its code.
+CODE = "code of "  # The name of a digest is this and the name of a package.
 
 
 def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:

@@ -81,7 +81,7 @@ def test_other_versions_are_said_and_numbers_agree_up_to_roundoff(
     monkeypatch.setattr(provenance, "_digest", lambda files: "another")
     answer = ask("audit", report)
     assert answer.status == 0
-    assert "  code of contactverif_nts: " in answer.out
+    assert "  code_of_contactverif_nts: " in answer.out
     assert "0 differ, up to roundoff" in answer.out
 
 

@@ -98,9 +98,9 @@ def _records(change: _Change, share: float = 0.2) -> Callable[[Path, random.Rand
         data, places, whole = b"", dict[int, int](), path.read_bytes()
         records = list(read(path))
         ends = [*(place for place, _ in records[1:]), len(whole)]
-        chosen = {chance.randrange(len(records))}
+        selection = {chance.randrange(len(records))}
         for number, ((place, record), end) in enumerate(zip(records, ends, strict=True)):
-            changed = change(record, chance) if number in chosen or chance.random() < share else record
+            changed = change(record, chance) if number in selection or chance.random() < share else record
             if isinstance(changed, OutcomeRecord):
                 changed = msgspec.structs.replace(changed, form=places.get(changed.form, changed.form))
             places[place] = len(data)

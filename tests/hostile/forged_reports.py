@@ -42,7 +42,7 @@ def _variable(file: Any, chance: random.Random, names: Sequence[str]) -> Any:
         group = groups.pop()
         groups += group.groups.values()
         every += [group.variables[name] for name in names if name in group.variables]
-    variable = chance.choice(every)
+    variable = chance.choice([each for each in every if each.dtype.kind != "S"])  # One is a table of words.
     variable.set_auto_maskandscale(False)
     return variable
 
@@ -88,14 +88,14 @@ def _change_case(run: Run, chance: random.Random) -> Run:
     name = _counterexample(row)
     assert name is not None
     outcome = getattr(row, name)
-    return _with_row(run, row, replace(row, **{name: replace(outcome, case_or_summary=_moved(outcome.case, chance))}))
+    return _with_row(run, row, replace(row, **{name: replace(outcome, case_or_summary=_move(outcome.case, chance))}))
 
 
 def _counterexample(row: Row) -> str | None:
     return next((name for name in ("shrunk", "first", "witness") if getattr(row, name) is not None), None)
 
 
-def _moved(case: Case, chance: random.Random) -> Case:
+def _move(case: Case, chance: random.Random) -> Case:
     z = np.array(case.z)
     place = chance.randrange(len(z))
     z[place] += 1e-3 * case.diameter
@@ -107,10 +107,10 @@ def _change_numbers(count: int) -> Callable[[Run, random.Random], Run]:
 
     def change(run: Run, chance: random.Random) -> Run:
         places = [(n, case) for n, row in enumerate(run.rows) for case in range(len(row.outcomes))]
-        chosen = chance.sample(places, count)
+        selection = chance.sample(places, count)
         for n, row in enumerate(run.rows):
             outcomes = list(row.outcomes)
-            for number in [case for its_row, case in chosen if its_row == n]:
+            for number in [case for its_row, case in selection if its_row == n]:
                 outcomes[number] = _with_other_value(outcomes[number])
             run = _with_row(run, run.rows[n], replace(run.rows[n], outcomes=tuple(outcomes)))
         return run
@@ -196,7 +196,7 @@ class Campaign:
 
     @property
     def as_often_as_said(self) -> bool:
-        """Whether forged numbers were seen as often as the audits say."""
+        """The comparison of how often forged numbers were seen with what the audits say, up to chance."""
         spread = sqrt(sum(share * (1 - share) for share in self.chances))
         return abs(self.n_seen - sum(self.chances)) <= _SIGMAS * spread + 0.5
 
