@@ -1,4 +1,4 @@
-"""What lies beside a run for hostile plugins to change, and what they have changed of it.
+"""The bait that lies beside a run for hostile plugins to change, and a look at what they have changed of it.
 
 A plugin finds it in the folder that the environment variable `HOSTILE_BAIT` names. What it changes of the system is
 restored here.

@@ -163,7 +163,7 @@ def test_all_processes_of_a_box_share_the_limits(monkeypatch: pytest.MonkeyPatch
 
 @needs_box
 def test_settings_of_the_system_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As root a plugin could name the program that gets images of crashed processes, and the system would run it."""
+    """The system runs the program that gets images of crashed processes, and root could name another one."""
     attempts = {"open_to_write": "/proc/sys/fs/lease-break-time"}
     assert try_targets(monkeypatch, Box(), **attempts) == set()
     assert try_targets(monkeypatch, None, **attempts) == (set(attempts) if os.geteuid() == 0 else set())

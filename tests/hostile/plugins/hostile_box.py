@@ -95,7 +95,7 @@ def write_through_others() -> None:
     """Write to a file by the root folders of all other processes."""
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
-            Path(f"{process}/root{_FILE}").write_text("changed")
+            Path(f"{process}/root{_FILE}").write_text("changed", encoding="utf-8")
 
 
 @tries
