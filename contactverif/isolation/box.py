@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from hashlib import blake2b
@@ -53,11 +54,14 @@ def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ..
     for path in box.opened:
         arguments += ["--share-net"] if path == NETWORK else ["--dev-bind", path, path]
     arguments += [word for path in box.hidden for word in _hide(path)]  # Also in what is open.
-    # As root a plugin could write the settings of the whole system in /proc, and what hides a folder takes memory.
-    closed = {"/proc", "/dev", *map(os.path.realpath, (*always_hidden, *box.hidden))}
-    closed -= set(map(os.path.realpath, box.opened))
-    arguments += [word for path in sorted(closed) if os.path.isdir(path) for word in ("--remount-ro", path)]
-    return _program(), *arguments, "--", *command
+    return _program(), *arguments, *_close((*always_hidden, *box.hidden), box.opened), "--", *command
+
+
+def _close(hidden: Iterable[str], opened: Iterable[str]) -> list[str]:
+    """Return the arguments that let nobody write to folders that only the box has, and that are not open."""
+    # A plugin of root could write the settings of the whole system in /proc, and a folder of the box takes memory.
+    closed = {"/proc", "/dev", *map(os.path.realpath, hidden)} - set(map(os.path.realpath, opened))
+    return [word for path in sorted(closed) if os.path.isdir(path) for word in ("--remount-ro", path)]
 
 
 def environment(box: Box, folder: str) -> dict[str, str]:

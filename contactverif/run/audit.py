@@ -51,7 +51,7 @@ class Audit:
     seconds: float
 
     def chance(self, n_forged: int) -> float:
-        """Return the probability that the audit met one of so many outcomes, wherever they are among all."""
+        """Return the probability that the audit met one of so many outcomes at random places."""
         missed, n_rest = 1.0, self.n_outcomes - self.n_judged
         for number in range(n_forged):
             missed *= max(n_rest - number, 0) / (self.n_outcomes - number)

@@ -1,4 +1,4 @@
-"""The bait that lies beside a run for hostile plugins to change, and a look at what they have changed of it.
+"""Bait beside a run: files, sockets and processes for hostile plugins to change, and a list of what was changed.
 
 A plugin finds it in the folder that the environment variable `HOSTILE_BAIT` names. What it changes of the system is
 restored here.
@@ -21,6 +21,7 @@ SEGMENT_KEY = 0x686F7374  # The key of a segment of shared memory of System V.
 KEY = "hostile-key"  # The name of an entry of the system's keyrings.
 DEVICE = Path(os.devnull)
 SETTING = Path("/proc/sys/fs/lease-break-time")  # Seconds that nobody misses.
+_REVOKE = 250, 3  # The call of the system that ends a key, on x86-64, where a plugin makes one.
 # Folders of the system in which a plugin may try to make something.
 PLACES = ("/dev/shm", "/run", "/dev", "/sys/fs/cgroup/*", "/dev/mqueue")
 
@@ -104,8 +105,11 @@ def _new_things() -> list[str]:
     if (segment := libc.shmget(SEGMENT_KEY, 0, 0)) >= 0:
         libc.shmctl(segment, 0, None)  # IPC_RMID
         names.append("new shared memory of System V")
-    keys = Path("/proc/keys")  # An entry ends by itself.
-    return names + (["new key"] if keys.exists() and KEY in keys.read_text() else [])
+    keys = Path("/proc/keys").read_text().splitlines() if Path("/proc/keys").exists() else []
+    numbers = [int(line.split()[0], 16) for line in keys if KEY in line]
+    for number in numbers:
+        libc.syscall(*_REVOKE, number)
+    return names + (["new key"] if numbers else [])
 
 
 @contextmanager

@@ -55,7 +55,7 @@ def _open_files() -> Iterator[tuple[int, str]]:
             yield number, os.readlink(f"/proc/self/fd/{number}")
 
 
-write_file = tries(lambda: _FILE.write_text("changed"), "Write to a file of the user.")
+write_file = tries(lambda: _FILE.write_text("changed", encoding="utf-8"), "Write to a file of the user.")
 delete_file = tries(lambda: _FILE.unlink(), "Delete a file of the user.")
 move_file = tries(lambda: _FILE.rename(BAIT / "moved"), "Rename a file of the user.")
 cut_file = tries(lambda: os.truncate(_FILE, 0), "Cut a file of the user.")
@@ -82,11 +82,11 @@ def write_through_link() -> None:
     """Write to a file of the user by a symbolic link in the temporary folder."""
     link = Path(tempfile.mkdtemp(prefix="hostile-"), "link")
     link.symlink_to(_FILE)
-    link.write_text("changed")
+    link.write_text("changed", encoding="utf-8")
 
 
 write_through_root = tries(
-    lambda: Path(f"/proc/self/root{_FILE}").write_text("changed"), "Write to a file by the root folder of the process."
+    lambda: Path(f"/proc/self/root{_FILE}").write_text("changed", encoding="utf-8"), "Write to a file by the root folder of the process."
 )
 
 
@@ -95,7 +95,7 @@ def write_through_others() -> None:
     """Write to a file by the root folders of all other processes."""
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
-            Path(f"{process}/root{_FILE}").write_text("changed", encoding="utf-8")
+            Path(process, "root", *_FILE.parts[1:]).write_text("changed", encoding="utf-8")
 
 
 @tries
@@ -132,7 +132,7 @@ offer_process = tries(
     "Offer a process of the user to the system that looks for memory.",
 )
 shared_memory = tries(
-    lambda: Path(f"/dev/shm/bait-{_numbers()[2]}").write_text("changed"), "Write to the shared memory of others."
+    lambda: Path(f"/dev/shm/bait-{_numbers()[2]}").write_text("changed", encoding="utf-8"), "Write to the shared memory of others."
 )
 
 
@@ -185,10 +185,10 @@ device_times = tries(lambda: os.utime(os.devnull, (1, 1)), "Change the times of 
 
 @tries
 def key() -> None:
-    """Leave a key in the system's keyring of the session, for a minute."""
+    """Leave a key in the system's keyring of the session, for ten minutes."""
     if os.uname().machine == "x86_64":
         number = _libc.syscall(_ADD_KEY, b"user", b"hostile-key", b"x", 1, ctypes.c_int(_SESSION))
-        _libc.syscall(_KEYCTL, _SET_TIMEOUT, number, 60)
+        _libc.syscall(_KEYCTL, _SET_TIMEOUT, number, 600)
 
 
 attach_to_parent = tries(
