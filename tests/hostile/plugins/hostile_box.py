@@ -86,7 +86,8 @@ def write_through_link() -> None:
 
 
 write_through_root = tries(
-    lambda: Path(f"/proc/self/root{_FILE}").write_text("changed", encoding="utf-8"), "Write to a file by the root folder of the process."
+    lambda: Path(f"/proc/self/root{_FILE}").write_text("changed", encoding="utf-8"),
+    "Write to a file by the root folder of the process.",
 )
 
 
@@ -132,7 +133,8 @@ offer_process = tries(
     "Offer a process of the user to the system that looks for memory.",
 )
 shared_memory = tries(
-    lambda: Path(f"/dev/shm/bait-{_numbers()[2]}").write_text("changed", encoding="utf-8"), "Write to the shared memory of others."
+    lambda: Path(f"/dev/shm/bait-{_numbers()[2]}").write_text("changed", encoding="utf-8"),
+    "Write to the shared memory of others.",
 )
 
 
