@@ -86,7 +86,7 @@ def test_what_is_open_comes_from_the_command_or_else_from_the_project(
     [
         ("[tool.contactverif]\nopen = 3", r"open in \[tool.contactverif\] of pyproject.toml: found 3; needed a list"),
         ("[tool]\ncontactverif = 3", r"open in \[tool.contactverif\] of pyproject.toml: .* needed a list of paths"),
-        ("[tool.contactverif]\nopne = []", r"\[tool.contactverif\] of pyproject.toml: found opne; needed open"),
+        ("[tool.contactverif]\nallow = []", r"\[tool.contactverif\] of pyproject.toml: found allow; needed open"),
         ("[tool", r"pyproject.toml: found .*; needed a file of settings that can be read"),
     ],
 )
