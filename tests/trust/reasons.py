@@ -35,5 +35,5 @@ SHARED = {
     **dict.fromkeys(("newton.attainable", "stability.local", "stability.stiffness"), DIGITS),
     **dict.fromkeys(("stability.sweep", "stability.translation"), DIGITS),
     **dict.fromkeys(("objectivity", "swap"), SIDES),
-    "complementarity": "A pairing that is wrong in a solution is wrong at states near it, too, and `unilateral` asks there.",
+    "complementarity": "A pairing that is wrong in a solution is wrong at single states, and `unilateral` asks there.",
 }
