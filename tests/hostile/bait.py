@@ -17,13 +17,12 @@ import psutil
 
 BAIT = "HOSTILE_BAIT"
 TEXT = "as it was"
-SEGMENT_KEY = 0x686F7374  # The key of a segment of shared memory of System V.
-KEY = "hostile-key"  # The name of an entry of the system's keyrings.
+SEGMENTS = 0x68000000  # The key of a segment of shared memory of System V is this and the number of this process.
 DEVICE = Path(os.devnull)
 SETTING = Path("/proc/sys/fs/lease-break-time")  # Seconds that nobody misses.
 _REVOKE = 250, 3  # The call of the system that ends a key, on x86-64, where a plugin makes one.
 # Folders of the system in which a plugin may try to make something.
-PLACES = ("/dev/shm", "/run", "/dev", "/sys/fs/cgroup/*", "/dev/mqueue")
+PLACES = ("/run", "/dev", "/sys/fs/cgroup/*")
 
 
 class Bait:
@@ -92,21 +91,23 @@ class Bait:
             SETTING.write_text(self._setting)
         if changed["device"]:
             os.utime(DEVICE)
-        return [f"changed {name}" for name, is_changed in changed.items() if is_changed] + _new_things()
+        return [f"changed {name}" for name, is_changed in changed.items() if is_changed] + _new_things(
+            f"hostile-{os.getpid()}"
+        )
 
 
-def _new_things() -> list[str]:
-    """Return what plugins have made in the system, and remove it."""
-    new = [path for place in PLACES for path in Path("/").glob(f"{place[1:]}/hostile-*")]
+def _new_things(name: str) -> list[str]:
+    """Return what plugins have made in the system under a name, and remove it."""
+    new = [path for place in PLACES for path in Path("/").glob(f"{place[1:]}/{name}")]
     for path in new:
         path.rmdir() if path.is_dir() else path.unlink()
     names = [f"new {path}" for path in new]
     libc = ctypes.CDLL(None)
-    if (segment := libc.shmget(SEGMENT_KEY, 0, 0)) >= 0:
+    if (segment := libc.shmget(SEGMENTS + os.getpid(), 0, 0)) >= 0:
         libc.shmctl(segment, 0, None)  # IPC_RMID
         names.append("new shared memory of System V")
     keys = Path("/proc/keys").read_text().splitlines() if Path("/proc/keys").exists() else []
-    numbers = [int(line.split()[0], 16) for line in keys if KEY in line]
+    numbers = [int(line.split()[0], 16) for line in keys if f"{name}:" in line]
     for number in numbers:
         libc.syscall(*_REVOKE, number)
     return names + (["new key"] if numbers else [])

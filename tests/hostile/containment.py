@@ -90,6 +90,7 @@ def run_command(folder: Path, *arguments: str, seconds: float = SECONDS) -> Fini
         "NO_COLOR": "1",
         "COLUMNS": "140",
     }
+    shared = set(Path("/dev/shm").glob("hostile-*"))
     facts_file = folder / "facts.json"
     reaper = [sys.executable, str(FOLDER.parent / "reaper.py"), str(facts_file), str(seconds), str(MEGABYTES)]
     with (folder / "out").open("wb") as out, (folder / "err").open("wb") as err, bait(folder / "bait") as beside:
@@ -101,6 +102,10 @@ def run_command(folder: Path, *arguments: str, seconds: float = SECONDS) -> Fini
     left = [f"process {line}" for line in facts["left"]]
     left += [f"file {path.name}" for path in sorted(temporary.iterdir())]
     left += [f"file {path.name}" for path in sorted(here.iterdir()) if path.name != "report.nc"]
+    blocks = set(Path("/dev/shm").glob("hostile-*")) - shared
+    left += [f"shared memory {path.name}" for path in sorted(blocks)]
+    for path in blocks:
+        path.unlink()
     left += changes
     output, errors = ((folder / name).read_bytes() for name in ("out", "err"))
     return Finish(facts["status"], facts["seconds"], output, errors, tuple(left), here / "report.nc")

@@ -48,6 +48,11 @@ def _numbers() -> list[int]:
     return [int(word) for word in (BAIT / "numbers").read_text().split()]
 
 
+def _name() -> str:
+    """Return the name of what a plugin makes in the system."""
+    return f"hostile-{_numbers()[2]}"
+
+
 def _open_files() -> Iterator[tuple[int, str]]:
     """Yield the open files of this process."""
     for number in range(64):
@@ -116,7 +121,7 @@ def connect_file() -> None:
 def connect_name() -> None:
     """Connect to a socket of another program that has a name and no file."""
     with socket.socket(socket.AF_UNIX) as line:
-        line.connect(f"\0hostile-{_numbers()[2]}")
+        line.connect(f"\0{_name()}")
 
 
 connect_port = tries(
@@ -141,7 +146,7 @@ shared_memory = tries(
 @tries
 def segment() -> None:
     """Leave a segment of shared memory of System V."""
-    _libc.shmget(0x686F7374, 4096, 0o1600)
+    _libc.shmget(0x68000000 + _numbers()[2], 4096, 0o1600)
 
 
 @tries
@@ -149,7 +154,7 @@ def hidden_folders() -> None:
     """Make files in folders of the system that a box hides, each of which would take memory."""
     for folder in ("/run", "/dev"):
         with suppress(OSError):
-            Path(folder, f"hostile-{os.getpid()}").write_text("left")
+            Path(folder, _name()).write_text("left")
 
 
 @tries
@@ -157,7 +162,7 @@ def control_groups() -> None:
     """Make a control group."""
     for folder in Path("/sys/fs/cgroup").glob("*"):
         with suppress(OSError):
-            (folder / f"hostile-{os.getpid()}").mkdir()
+            (folder / _name()).mkdir()
 
 
 @tries
@@ -170,7 +175,7 @@ def namespaces() -> None:
             if not _libc.unshare(_NEW_USER | _NEW_MOUNTS | _NEW_GROUPS) and not _libc.mount(
                 b"none", folder.encode(), b"cgroup2", 0, None
             ):
-                Path(folder, f"hostile-{os.getpid()}").mkdir()
+                Path(folder, _name()).mkdir()
         os._exit(0)
     os.waitpid(pid, 0)
 
@@ -189,7 +194,7 @@ device_times = tries(lambda: os.utime(os.devnull, (1, 1)), "Change the times of 
 def key() -> None:
     """Leave a key in the system's keyring of the session, for ten minutes."""
     if os.uname().machine == "x86_64":
-        number = _libc.syscall(_ADD_KEY, b"user", b"hostile-key", b"x", 1, ctypes.c_int(_SESSION))
+        number = _libc.syscall(_ADD_KEY, b"user", _name().encode(), b"x", 1, ctypes.c_int(_SESSION))
         _libc.syscall(_KEYCTL, _SET_TIMEOUT, number, 600)
 
 
