@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import numba
-from numba.core.caching import IndexDataCacheFile, InTreeCacheLocator, UserWideCacheLocator
+from numba.core import caching
+from numba.core.caching import IndexDataCacheFile
 
 _DIGEST = 32  # Bytes at the end of a file.
 
@@ -82,8 +83,10 @@ def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
 def _usual_files(function: Callable[..., Any], files: Any) -> tuple[CheckedFiles, ...]:
     """Return the files of a kernel beside its source and in the user's cache."""
     base, stamp = files._index_name.removesuffix(".nbi"), files._source_stamp
-    locators = (kind(function, function.__code__.co_filename) for kind in (InTreeCacheLocator, UserWideCacheLocator))
-    folders = [locator.get_cache_path() for locator in locators]  # type: ignore[no-untyped-call]
+    names = ("InTreeCacheLocator", "UserWideCacheLocator")  # Old versions of numba have `_` before them.
+    kinds = [getattr(caching, name, None) or getattr(caching, f"_{name}") for name in names]
+    locators = (kind(function, function.__code__.co_filename) for kind in kinds)
+    folders = [locator.get_cache_path() for locator in locators]
     return tuple(CheckedFiles(folder, base, stamp) for folder in folders)  # type: ignore[no-untyped-call]
 
 

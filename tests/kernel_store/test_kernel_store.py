@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import random
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -114,6 +115,25 @@ def test_a_store_that_cannot_be_written_later_is_no_error(tmp_path: Path, monkey
     monkeypatch.setattr(os, "replace", refuse)
     assert _hits(add) == 0
     assert not _files(tmp_path)
+
+
+def test_a_process_with_another_folder_reads_the_usual_store_and_writes_to_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, other = tmp_path / "source", tmp_path / "other"
+    folder.mkdir()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(other))
+    assert _hits(_load(folder)) == 0
+    assert not _files(folder)
+    assert list(other.rglob("*.nbc"))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    assert _hits(_load(folder)) == 0
+    before = {file: file.read_bytes() for file in _files(folder)}
+    shutil.rmtree(other)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(other))
+    assert _hits(_load(folder)) == 1
+    assert not list(other.rglob("*.nbc"))
+    assert {file: file.read_bytes() for file in _files(folder)} == before
 
 
 def test_the_inside_of_this_numba_is_known() -> None:
