@@ -266,10 +266,8 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     except (msgspec.ValidationError, TypeError) as error:
         raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
     check_versions(plan.versions, versions_of(options), argument)
-    if options.isolation.isolation in (
-        Isolation.BOX,
-        Isolation.LANDLOCK,
-    ):  # Here there may be none; the results are the same.
+    # A box or Landlock may not be had here, and the results are the same without.
+    if options.isolation.isolation in (Isolation.BOX, Isolation.LANDLOCK):
         options = replace(options, isolation=replace(options.isolation, isolation=None))
     if os.getcwd() == plan.folder:
         return options
