@@ -47,15 +47,11 @@ class PointsFirst:
         along = second - first
         angle = np.arctan2(along[:, 1], along[:, 0])
         normal = np.stack([np.sin(angle), -np.cos(angle)], axis=1)
-        offset = point[:, None] - first
+        offset, beyond = point[:, None] - first, point[:, None] - second
         xi = np.einsum("pmi,mi->pm", offset, along) / np.einsum("mi,mi->m", along, along)
-        foot = first + np.clip(xi, 0, 1)[..., None] * along
-        distance = np.where(
-            xi <= 0,
-            np.hypot(*np.moveaxis(offset, -1, 0)),
-            np.where(xi >= 1, np.hypot(*np.moveaxis(point[:, None] - second, -1, 0)),
-                     np.hypot(*np.moveaxis(point[:, None] - foot, -1, 0))),
-        )  # fmt: skip
+        nearest = point[:, None] - (first + np.clip(xi, 0, 1)[..., None] * along)
+        nearest = np.where((xi <= 0)[..., None], offset, np.where((xi >= 1)[..., None], beyond, nearest))
+        distance = np.hypot(nearest[..., 0], nearest[..., 1])
         return xi, distance, normal, np.einsum("pmi,mi->pm", offset, normal)
 
     def contact_points(self, interface: Any, pairing: Any, z: Any) -> ContactPoints:
@@ -71,12 +67,12 @@ class PointsFirst:
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         points, forces = self.contact_points(interface, pairing, z), np.zeros((interface.n_nodes, 2))
-        for at in np.flatnonzero(points.active):
-            force = points.pressure[at] * points.weight[at] * points.normal[at]
-            ends, c = interface.slave.segments[points.slave_segment[at]], points.c[at]
-            forces[ends] -= np.outer([(1 - c) / 2, (1 + c) / 2], force)
-            segment, xi = interface.master.segments[points.master_segment[at]], points.xi[at]
-            forces[segment] += np.outer([1 - xi, xi], force)
+        at = points.active
+        force = (points.pressure[at] * points.weight[at])[:, None] * points.normal[at]
+        ends, c = interface.slave.segments[points.slave_segment[at]], points.c[at]
+        segment, xi = interface.master.segments[points.master_segment[at]], points.xi[at]
+        nodes, shares = np.hstack([ends, segment]), np.stack([(c - 1) / 2, -(1 + c) / 2, 1 - xi, xi], axis=1)
+        np.add.at(forces, nodes, shares[..., None] * force[:, None])
         return forces.reshape(-1)
 
 
