@@ -64,6 +64,10 @@ class IsolationOptions:
             place = _strongest(place, tuple(opened))
         return replace(self, isolation=place, opened=opened)
 
+    def adapt(self) -> IsolationOptions:
+        """Return the options for another machine, which may have no box: the safest place there takes that of one."""
+        return replace(self, isolation=None) if self.isolation in (Isolation.BOX, Isolation.LANDLOCK) else self
+
     def limits(self, hidden: Iterable[Path] = ()) -> Limits | None:
         """Return the limits of a plugin's process, and its box, in which some paths are not there.
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import repeat
 from time import perf_counter
-from typing import overload
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
@@ -16,8 +15,8 @@ from contactverif.run import draw
 from contactverif.run.draw import Sampling
 from contactverif.run.outcome_records import WITNESS
 from contactverif.run.provenance import code_digests, collect_versions, machine
-from contactverif.run.rows import OpenRow, gap_of_rows, open_row, verdict_of_row
-from contactverif.run.run import RunJobs
+from contactverif.run.rows import OpenRow, Outcomes, gap_of_rows, open_row, verdict_of_row
+from contactverif.run.run_jobs import RunJobs
 from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Progress, Scheduler
 from contactverif.run.second_look import Sample, SecondLook, choose_share, draw_again, judge_again
@@ -119,8 +118,8 @@ def find_changes(run: Run) -> tuple[str, ...]:
     return tuple(f"{name}: {stored[name]} in the report, {today[name]} here" for name in changed)
 
 
-class DerivedOutcomes(Sequence[Outcome]):
-    """The outcomes of a row with the verdicts that follow from their numbers, each made when somebody asks for it."""
+class DerivedOutcomes(Outcomes):
+    """The outcomes of a row with the verdicts that follow from their numbers."""
 
     def __init__(self, info: PropertyInfo, outcomes: Sequence[Outcome]) -> None:
         self._info, self._outcomes = info, outcomes
@@ -128,13 +127,8 @@ class DerivedOutcomes(Sequence[Outcome]):
     def __len__(self) -> int:
         return len(self._outcomes)
 
-    @overload
-    def __getitem__(self, number: int) -> Outcome: ...
-    @overload
-    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
-    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
-        if isinstance(number, slice):
-            return tuple(judge_stored(self._info, outcome) for outcome in self._outcomes[number])
+    def at(self, number: int) -> Outcome:
+        """Return an outcome with the verdict of today."""
         return judge_stored(self._info, self._outcomes[number])
 
 

@@ -14,7 +14,7 @@ import msgspec
 from contactverif.contract.errors import MisuseError
 from contactverif.run.journal import begin_journal, read_record, write_record
 from contactverif.run.run_journal import Journal
-from contactverif.run.run_plan import Plan, check_versions, read_plan
+from contactverif.run.run_plan import Plan, check_versions, read_plan, without_place
 
 _MARK = "done"
 _SHARD = "shard"  # The option in a plan that differs from shard to shard.
@@ -149,12 +149,16 @@ def _read(folder: Path, plan: Plan) -> Journal:
 
 
 def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:
-    """Return the name of the first thing in which two plans differ; the working folder and the machine are none."""
+    """Return the name of the first thing in which two plans differ.
+
+    The working folder and the machine are none, and neither is the box that a machine may not have.
+    """
     for name in (field for field in Plan.__struct_fields__ if field not in _OF_ONE_JOURNAL):
         if getattr(a, name) != getattr(b, name):
             return name
-    for name in sorted({*a.options, *b.options} - (set() if shard_too else {_SHARD})):
-        values = (msgspec.msgpack.encode(plan.options.get(name)) for plan in (a, b))  # A file has lists for tuples.
+    both = [without_place(plan.options) for plan in (a, b)]
+    for name in sorted({*both[0], *both[1]} - (set() if shard_too else {_SHARD})):
+        values = (msgspec.msgpack.encode(options.get(name)) for options in both)  # A file has lists for tuples.
         if len({*values}) > 1:
             return name
     return ""

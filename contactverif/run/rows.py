@@ -7,9 +7,10 @@ stores. An outcome is made of them again when it is read.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from math import sqrt
@@ -35,7 +36,26 @@ SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller un
 CLEAR_RATIO = 1000.0  # A shrunk case need not fail by more than this many tolerances.
 
 
-class OutcomeStore(Sequence[Outcome]):
+class Outcomes(Sequence[Outcome]):
+    """The outcomes of a row in order, each made when somebody asks for it."""
+
+    @abstractmethod
+    def at(self, number: int) -> Outcome:
+        """Return an outcome by its number, from 0."""
+
+    @overload
+    def __getitem__(self, number: int) -> Outcome: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
+    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
+        if isinstance(number, slice):
+            return tuple(self.at(n) for n in range(*number.indices(len(self))))
+        if not -len(self) <= number < len(self):
+            raise IndexError(number)
+        return self.at(number % len(self))
+
+
+class OutcomeStore(Outcomes):
     """The outcomes of a row in order, of which the first `whole` stay as they are. `append` adds one."""
 
     def __init__(self, whole: int = WHOLE) -> None:
@@ -73,24 +93,13 @@ class OutcomeStore(Sequence[Outcome]):
     def __len__(self) -> int:
         return len(self._form_of)
 
-    @overload
-    def __getitem__(self, number: int) -> Outcome: ...
-    @overload
-    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
-    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
-        if isinstance(number, slice):
-            return tuple(self[n] for n in range(*number.indices(len(self))))
-        if not -len(self) <= number < len(self):
-            raise IndexError(number)
-        number %= len(self)
+    def at(self, number: int) -> Outcome:
+        """Return an outcome, which is made of its numbers if it did not stay whole."""
         if number in self._whole:
             return self._whole[number]
         start = self._starts[number]
         end = self._starts[number + 1] if number + 1 < len(self) else len(self._numbers)
         return decode_outcome(self._forms[self._form_of[number]], self._numbers[start:end].tolist())
-
-    def __iter__(self) -> Iterator[Outcome]:
-        return (self[number] for number in range(len(self)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,6 +47,14 @@ def is_provable(options: Mapping[str, Any]) -> bool:
     return isinstance(isolation, Mapping) and isolation.get("isolation") == "box"
 
 
+def without_place(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of a run but for the place where its plugins lived: it changes no number."""
+    isolation = options.get("isolation")
+    if not isinstance(isolation, Mapping):
+        return dict(options)
+    return {**options, "isolation": {name: value for name, value in isolation.items() if name != "isolation"}}
+
+
 def read_plan(folder: Path, argument: str) -> Plan:
     """Return the plan of a journal of a run, one of this format."""
     plan = read_header(folder, Plan, argument)

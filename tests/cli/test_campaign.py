@@ -21,7 +21,7 @@ N = 3
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Return a function that runs `contactverif` with blocks of ten cases."""
-    for module in ("draw", "run"):
+    for module in ("draw", "run_jobs"):
         monkeypatch.setattr(f"contactverif.run.{module}.BLOCK", 10)
     return asking(monkeypatch, capsys)
 
@@ -152,6 +152,15 @@ def test_a_shard_of_another_plan_is_refused_by_name(ask: Ask, shards: Path) -> N
     answer = ask("campaign", *WORDS, "--shard", "2/3", "--out", shards)
     assert answer.status == 2
     assert "found shard-2-of-3 of another plan (seed); needed the same plan, or another folder" in answer.err
+
+
+def test_plugins_of_another_shard_may_live_elsewhere(ask: Ask, shards: Path, tmp_path: Path) -> None:
+    """The place where a plugin lives changes no number, and a machine may have no box."""
+    shutil.rmtree(shards / name(2))
+    judge_shard(ask, shards, 2, "--isolation", "process")
+    assert judge_shard(ask, shards, 2) == "shard 2/3 is done already\n"
+    merged = ask("merge", shards, "--out", tmp_path / "merged.nc")
+    assert (merged.status, merged.err) == (0, "")
 
 
 def test_a_copy_under_another_name_is_refused(ask: Ask, shards: Path) -> None:

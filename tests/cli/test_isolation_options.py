@@ -62,6 +62,12 @@ def test_where_there_are_rules_of_landlock_they_stand_in_for_a_box(monkeypatch: 
 
 
 @pytest.mark.usefixtures("with_boxes")
+def test_another_machine_takes_the_safest_place_that_it_has_instead_of_a_box() -> None:
+    for place in Isolation:
+        may_lack = place in (Isolation.BOX, Isolation.LANDLOCK)
+        assert IsolationOptions(isolation=place).adapt().isolation is (None if may_lack else place)
+
+
 def test_the_last_line_says_what_the_box_was() -> None:
     assert place_line("box (bubblewrap 0.8.0)") == "The plugins ran in a box (bubblewrap 0.8.0)."
     assert place_line("process") == "The plugins ran in a process without a box: as --isolation says."

@@ -1,6 +1,7 @@
 """Run the campaigns of this folder and keep what they print in `reports/trust`, for the page.
 
-`python tests/hostile/run_campaigns.py [KILLS LINES REPORTS MESHES]`, by default 100, 5000, 2000 and 2000.
+`python tests/hostile/run_campaigns.py [COUNT ...]` takes a number of attempts for each, in the
+order of `CAMPAIGNS`.
 """
 
 import subprocess
@@ -17,6 +18,9 @@ CAMPAIGNS = {
     "command_lines.py": ("command_lines.txt", 5000),
     "damaged_reports.py": ("damaged_reports.txt", 2000),
     "damaged_meshes.py": ("damaged_meshes.txt", 2000),
+    "forged_journals.py": ("forged_journals.txt", 1000),
+    "forged_reports.py": ("forged_reports.txt", 200),
+    "ways.py": ("ways.txt", 40),
 }
 
 

@@ -14,7 +14,7 @@ from test_scheduler import facts
 
 from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formulation, load_properties, named_case
 from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.run import run as run_module
+from contactverif.run import run_jobs
 from contactverif.run.draw import Sampling
 from contactverif.run.journal import (
     JournalKey,
@@ -194,20 +194,20 @@ def test_a_block_that_is_judged_is_not_drawn(
 ) -> None:
     """Only a block of which cases stay whole is drawn again, and what stays whole stays so."""
     monkeypatch.setattr("contactverif.run.draw.BLOCK", 10)
-    monkeypatch.setattr("contactverif.run.run.BLOCK", 10)
+    monkeypatch.setattr("contactverif.run.run_jobs.BLOCK", 10)
     monkeypatch.setattr("contactverif.run.rows.WHOLE", 10)
     plan = msgspec.structs.replace(PLAN, formulations=("vts-ppt",), properties=("patch.flat.resultant",))
     subjects, questions = [load_formulation("vts-ppt")], load_properties(["patch.flat.resultant"])
     folder = new_journal(tmp_path, plan)
     first = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, folder))
     numbers: list[int] = []
-    draw = run_module.draw_chunks
+    draw = run_jobs.draw_chunks
 
     def draw_chunks(sampling: Sampling, question: object, number: int, count: object = None) -> object:
         numbers.append(number)
         return draw(sampling, question, number)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("contactverif.run.run.draw_chunks", draw_chunks)
+    monkeypatch.setattr("contactverif.run.run_jobs.draw_chunks", draw_chunks)
     second = run(subjects, questions, examples=EXAMPLES, seed=3, journal=Journal(plan, None, [folder]))
     assert numbers == [0]
     assert facts(first) == facts(second)

@@ -1,0 +1,324 @@
+"""The jobs of a run, in the order in which they are handed out.
+
+Each formulation is called once before anything else. Then the cases of a strategy are drawn, once for all formulations
+and all properties that have this strategy, they are judged, and what failed is shrunk. Properties that solve bodies
+come last. All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early. What the
+journal knows is not judged again, and a block of which it knows all is not drawn.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, islice, product
+from operator import attrgetter
+
+from contactverif.contract.case import Case
+from contactverif.contract.counterexample import counterexample_of
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.first_answers import FirstAnswers
+from contactverif.contract.property import Outcome, Property
+from contactverif.contract.result import NotLoaded, Result, Row, Run
+from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.isolation.remote_formulation import places
+from contactverif.run import draw, judge
+from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
+from contactverif.run.outcome_records import WITNESS, BlockRecord
+from contactverif.run.profiles import Shrink
+from contactverif.run.provenance import collect_provenance
+from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, judge_cases, open_row, shrink_case
+from contactverif.run.run_journal import Journal
+from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
+from contactverif.run.second_look import look_at_journal
+
+CHUNK = 25  # The number of drawn cases that are judged in one job.
+LIST_CHUNK = 5  # The same for named cases, which are often slower.
+
+
+class RunJobs:
+    """The jobs of a run, in the order that all shares of it have in common.
+
+    The parts of a run are numbered: each witness, each chunk of a finite list, each block of drawn cases. Of `share`
+    (I, N) are every N-th of them. A share fills no rows and shrinks nothing: its outcomes are in the journal.
+    """
+
+    def __init__(
+        self,
+        subjects: Sequence[Subject],
+        questions: Sequence[Property],
+        sampling: Sampling,
+        journal: Journal,
+        report: Callable[[Progress], None],
+        known: Mapping[str, str],
+        share: tuple[int, int] | None = None,
+        shrink: Shrink = "new",
+    ) -> None:
+        _check_once("formulation", map(attrgetter("name"), subjects))
+        _check_once("property", map(attrgetter("id"), questions))
+        self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
+        self._questions, self._known = questions, known
+        self._share, self._shrink = share, shrink
+        self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
+        self._rows: dict[tuple[str, str], OpenRow | Row] = {}
+        # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
+        self._groups: dict[tuple[str, bool], list[Property]] = {}
+        for question in sorted(questions, key=attrgetter("bodies")):
+            self._groups.setdefault(sampling.group(question), []).append(question)
+        self._opposite_signs: set[str] = set()
+
+    def work(self, scheduler: Scheduler) -> None:
+        """Do all jobs; before anything is believed of a journal without a proof, a share of it is judged again."""
+        scheduler.work(self.first_calls())  # Jobs that follow carry the first answers to other processes.
+        look_at_journal(self._journal, self._subjects, self._questions, self._sampling, scheduler)
+        scheduler.work(self)
+
+    def first_calls(self) -> Iterator[Job]:
+        """Yield the jobs to call each formulation for the first time."""
+        for subject in self._subjects:
+            before = Progress(subject.name, "", "first call (compiles)", 0, 1)
+            self._report(before)
+            yield Job(
+                judge.call_first, (subject, self._needs & subject.provides), partial(self._note_first, before, subject)
+            )
+
+    def _note_first(
+        self, before: Progress, subject: Subject, answers: tuple[bool, FirstAnswers | None]
+    ) -> Iterable[Job]:
+        opposite, first = answers
+        subject.first_answers = subject.first_answers or first  # In a second run the process is warm.
+        self._opposite_signs |= {before.formulation} if opposite else set()
+        self._report(replace(before, count=1))
+        return ()
+
+    def __iter__(self) -> Iterator[Job]:
+        number, count = self._share or (0, 1)
+        return chain.from_iterable(islice(self._parts(), number, None, count))
+
+    def result(self, not_loaded: tuple[NotLoaded, ...], profile: str) -> Run:
+        """Return the run with all rows as far as they are judged; one that is not complete says so."""
+        sampling = self._sampling
+        provenance = collect_provenance(profile=profile, examples=sampling.examples, seed=sampling.seed)
+        provenance |= places(self._subjects)
+        if reason := draw.why_the_engine_draws():
+            provenance["drawing"] = reason
+        provenance |= self._journal.provenance()
+        while self._groups:
+            self._open_next()
+        pairs = product(self._subjects, self._questions)
+        return Run(
+            rows=tuple(self._close(self._rows[subject.name, question.id]) for subject, question in pairs),
+            not_loaded=not_loaded,
+            provided=self.provided,
+            opposite_signs=self.opposite_names,
+            provenance=provenance,
+        )
+
+    @property
+    def provided(self) -> dict[str, dict[str, bool]]:
+        """The optional parts that each formulation has, or has not."""
+        return {subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects}
+
+    @property
+    def opposite_names(self) -> tuple[str, ...]:
+        """The formulations with forces of the opposite sign, once all are called."""
+        return tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs)
+
+    def _close(self, row: OpenRow | Row) -> Row:
+        """Return a row as far as it is judged."""
+        if isinstance(row, Row):
+            return row
+        if not row.complete:
+            row.stop(self._sampling.examples)
+        return row.row
+
+    def check_written(self) -> None:
+        """Check that all outcomes are kept."""
+        if self._journal.trouble and self._journal.folder is not None:
+            trouble = f"{self._journal.folder.name}: {self._journal.trouble}"
+            raise MisuseError("--out", trouble, "a disk with room")
+
+    def _open_next(self) -> list[OpenRow]:
+        """Open the rows of the next properties with the same cases, and return those whose cases are to be judged."""
+        group, questions = next(iter(self._groups.items()))
+        source = self._sampling.source(questions[0])
+        if isinstance(source, tuple):
+            draw.check_names(source)
+        rows = {
+            (subject.name, question.id): open_row(
+                subject, question, source, self._known.get(question.id, ""), self._sampling
+            )
+            for subject, question in product(self._subjects, questions)
+        }
+        self._rows |= rows
+        del self._groups[group]
+        return [row for row in rows.values() if isinstance(row, OpenRow)]
+
+    def _parts(self) -> Iterator[Iterable[Job]]:
+        """Yield the jobs of each part; those of a part are made when they are wanted."""
+        while self._groups:
+            group = self._open_next()
+            for row in group:
+                if row.witness is not None and not row.witness_is_listed:
+                    yield self._judge(row, CaseChunk([row.witness], WITNESS))
+            if not group:
+                continue
+            if group[0].listed is not None:
+                for row in group:
+                    yield from self._judge_list(row, group[0].listed)
+            elif self._share is None:
+                yield self._blocks(group, 0)
+            else:
+                yield from (self._blocks(group, n) for n in range(draw.number_of_blocks(self._sampling.examples)))
+
+    def _judge_list(self, row: OpenRow, cases: tuple[Case, ...]) -> Iterator[Iterable[Job]]:
+        chunks = in_chunks(cases, LIST_CHUNK)
+        yield from [self._expect(row, chunks, len(cases), last=True)] if self._share is None else []
+        yield from (self._judge(row, chunk) for chunk in chunks)
+
+    def _blocks(self, group: Sequence[OpenRow], number: int) -> Iterator[Job]:
+        """Yield the jobs of a block and, but for a share, of all blocks behind it: the rows have the same cases."""
+        question = group[0].question
+        block = self._journal.block(self._sampling.block_name(question), number)
+        while block is not None and (known := self._known_block(group, block)) is not None:
+            yield from known
+            if block.last or self._share is not None:
+                return
+            number += 1
+            block = self._journal.block(self._sampling.block_name(question), number)
+        if block is None and number > 0 and self._share is not None and not self._draws_blocks(question):
+            return  # Where a strategy runs out of cases, the first block has all of them.
+        before = Progress(group[0].subject.name, question.id, "drawing", 0, self._sampling.examples)
+        yield Job(draw_chunks, (self._sampling, question, number), partial(self._add_drawn, group, number), before)
+
+    def _draws_blocks(self, question: Property) -> bool:
+        source, sampling = self._sampling.source(question), self._sampling
+        assert source is not None
+        return draw.draws_blocks(source, seed=sampling.key(question), examples=sampling.examples)
+
+    def _known_block(self, group: Sequence[OpenRow], block: BlockRecord) -> Iterable[Job] | None:
+        """Return the jobs that follow from the outcomes of a block, if it need not be drawn.
+
+        It need not if the journal has all outcomes of all rows, and no row keeps one of these cases whole.
+        """
+        first, parts = block.number * BLOCK, []
+        for row in group:
+            earlier = self._journal.outcomes(row.subject.name, row.question.info, first, block.count)
+            if len(earlier) < block.count or (self._share is None and row.may_keep_whole(first, earlier.values())):
+                return None
+            parts.append(tuple(earlier[place] for place in range(block.count)))
+        if self._share is not None:
+            return ()
+        jobs: list[Job] = []
+        for row, outcomes in zip(group, parts, strict=True):
+            row.expect_judged(first, block.count, planned=self._count_planned(block), last=block.last)
+            jobs += self._add(row, first, JudgedCases(outcomes))
+        return jobs
+
+    def _count_planned(self, block: BlockRecord) -> int:
+        """Return the number of cases of a row, once a block is drawn."""
+        return block.number * BLOCK + block.count if block.exhausted else self._sampling.examples
+
+    def _add_drawn(self, group: Sequence[OpenRow], number: int, cases: DrawnCases) -> Iterable[Job]:
+        """Return the jobs to judge a block, then those of the next block."""
+        if number == 0:
+            for chunk in cases.chunks[: -(-WHOLE // CHUNK)]:
+                chunk.keep()
+        count = sum(chunk.count for chunk in cases.chunks)
+        block = BlockRecord(self._sampling.block_name(group[0].question), number, count, cases.exhausted, cases.last)
+        self._journal.add_block(block)
+        judging = chain.from_iterable(self._judge(row, chunk) for row in group for chunk in cases.chunks)
+        if self._share is not None:
+            return judging
+        planned = self._count_planned(block)
+        finished = [self._expect(row, cases.chunks, planned, last=cases.last) for row in group]
+        return chain(*finished, judging, () if cases.last else self._blocks(group, number + 1))
+
+    def _expect(self, row: OpenRow, chunks: Sequence[CaseChunk], planned: int, *, last: bool) -> Iterable[Job]:
+        """Let a row expect the outcomes of chunks; one without any case is complete."""
+        row.expect(chunks, planned=planned, last=last)
+        return self._finish(row)
+
+    def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
+        """Yield the job to judge the cases of a chunk that are not judged yet."""
+        name, property_id = row.subject.name, row.question.id
+        earlier = self._journal.outcomes(name, row.question.info, chunk.first, chunk.count)
+        if len(earlier) == chunk.count:
+            outcomes = tuple(earlier[place] for place in range(chunk.count))
+            yield from self._add(row, chunk.first, JudgedCases(outcomes))
+            return
+        notes = self._journal.notes(name, property_id, chunk.first)
+        arguments = row.question, row.subject, chunk, notes, earlier
+        yield Job(judge_cases, arguments, partial(self._add, row, chunk.first), self._judging(row))
+
+    def _judging(self, row: OpenRow) -> Progress:
+        return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned)
+
+    def _add(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
+        """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""
+        self._journal.note_trouble(judged.trouble)
+        if self._share is not None:
+            self.check_written()
+            return ()
+        if first == WITNESS:
+            row.add_witness(*judged.outcomes)
+        else:
+            row.add(first, judged.outcomes)
+            self._report(self._judging(row))
+        return self._finish(row)
+
+    def _finish(self, row: OpenRow) -> Iterable[Job]:
+        """Make the row if it is complete, and return the job to shrink what failed, if that is wanted."""
+        if not row.complete:
+            return ()
+        row.judge(on_scene=self._sampling.scene is not None)
+        self._report(replace(self._judging(row), row=row.row))
+        goal = row.goal()
+        if goal is None:
+            return ()
+        shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
+        if not shrinks or row.listed is not None:  # Of a list nothing is smaller.
+            return self._add_shrunk(row, goal.first, None)
+        before = Progress(row.subject.name, row.question.id, "shrinking", 0, SHRINK_CALLS)
+        arguments = self._sampling, row.question, row.subject, goal
+        return (Job(shrink_case, arguments, partial(self._add_shrunk, row, goal.first), before),)
+
+    def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> Iterable[Job]:
+        """Add the smallest case. Without one the witness shows the failure, or the first case that clearly fails."""
+        row.row = replace(row.row, shrunk=smallest)
+        if counterexample_of(row.row) is None:
+            case = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
+            row.row = replace(row.row, first=case)
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnCases:
+    """A block of the cases of a strategy, in order."""
+
+    chunks: tuple[CaseChunk, ...]
+    exhausted: bool  # The strategy has no other cases.
+    last: bool  # No further block follows.
+
+
+def draw_chunks(
+    sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
+) -> DrawnCases:
+    """Draw a block of the cases of a property, and of all properties with the same strategy."""
+    source, seed = sampling.source(question), sampling.key(question)
+    assert source is not None
+    block = draw.draw_block(source, seed=seed, examples=sampling.examples, number=number, progress=count)
+    return DrawnCases(in_chunks(block.cases, CHUNK, number * BLOCK), block.exhausted, block.last)
+
+
+def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
+    """Return cases, of which the first has a number in its row, in chunks of a size."""
+    return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
+
+
+def _check_once(argument: str, names: Iterable[str]) -> None:
+    """Check that no name stands there twice."""
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise MisuseError(argument, f"{name} {times} times", "each of them once")
