@@ -31,10 +31,10 @@ def check_penalty(penalty: float) -> float:
     return float(penalty)
 
 
-def check_count(n: int, name: str = "n") -> int:
+def check_count(n: int, name: str = "n", least: int = 1) -> int:
     """Return the option n, the number of points on a slave segment, or another option that counts, by its name."""
-    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_POINTS:
-        raise MisuseError(name, repr(n), f"a whole number from 1 to {MOST_POINTS}")
+    if isinstance(n, bool) or not isinstance(n, int) or not least <= n <= MOST_POINTS:
+        raise MisuseError(name, repr(n), f"a whole number from {least} to {MOST_POINTS}")
     return n
 
 

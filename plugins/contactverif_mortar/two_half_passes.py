@@ -259,4 +259,4 @@ def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -
         witnesses=witnesses,
         source=_SOURCE,
     )
-    return TwoHalfPasses(traits, check_penalty(penalty), Quadrature.gauss(max(2, check_count(n)), current))
+    return TwoHalfPasses(traits, check_penalty(penalty), Quadrature.gauss(check_count(n, least=2), current))

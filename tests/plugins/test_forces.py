@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
+import contactverif_mortar
 import contactverif_nts
 from contactverif import Interface, MisuseError
 
@@ -171,6 +172,7 @@ def test_several_and_closed_chains() -> None:
     [
         (contactverif_nts.vts_me, {"n": 0}, "n: found 0; needed a whole number from 1 to 1000"),
         (contactverif_nts.vts_me, {"n": 1.5}, "n: found 1.5"),
+        (contactverif_mortar.mortar_two_half_pass, {"n": 1}, "n: found 1; needed a whole number from 2 to 1000"),
         (contactverif_nts.nts_ar, {"area": "old"}, "area: found 'old'"),
         (contactverif_nts.vts_ppt, {"free_end": "open"}, "free_end: found 'open'"),
         (contactverif_nts.nts, {"tau": -1}, "tau: found -1"),

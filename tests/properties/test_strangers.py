@@ -13,7 +13,7 @@ from contactverif.contract.property import Property
 from contactverif.run.draw import draw_cases
 from contactverif.run.registry import property_ids
 
-EXAMPLES = 2  # Cases of each property, random or spread over its list
+EXAMPLES = 5  # Cases of each property, random or spread over its list
 QUESTIONS = [question for question in map(load_property, property_ids()) if not question.bodies]
 
 

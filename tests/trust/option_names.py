@@ -37,7 +37,16 @@ def values(name: str, option: str) -> tuple[str, ...]:
             return tuple(word for word in words if word != default)
         raise AssertionError(f"{name} takes any word for {option}")
     numbers = COUNTS if isinstance(default, int) else SHARES
-    return tuple(str(number) for number in numbers if number != default)
+    return tuple(str(number) for number in numbers if number != default and takes(f"{name}:{option}={number}"))
+
+
+def takes(text: str) -> bool:
+    """Return whether a factory takes the option with which a name ends."""
+    try:
+        load_formulation(text)
+    except MisuseError:
+        return False
+    return True
 
 
 def options(name: str) -> tuple[str, ...]:

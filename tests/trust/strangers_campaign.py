@@ -3,7 +3,7 @@
 `tox -e trust` writes `reports/trust/strangers.csv`, a line for each seed and formulation, with how near it came to an
 accusation. Named cases are the same for every seed, and are asked with the first one. Where a formulation states
 nothing of a property, only a crash or a breach of the contract can accuse it: where bodies are solved, such a property
-is asked with a tenth of the cases.
+is asked with every tenth case.
 """
 
 import sys
@@ -27,12 +27,12 @@ def count(key: str) -> list[str]:
     total, subject = Count(), Subject(name, STRANGERS[name])
     for question in load_properties():
         assert isinstance(question, Property)
+        part = UNSTATED if question.bodies and question.promise(subject.traits) is not True else 1
         listed = question.cases(None)
         if not isinstance(listed, tuple):
-            part = UNSTATED if question.bodies and question.promise(subject.traits) is not True else 1
             total.ask(question, random_cases(question, f"{seed}/{question.id}", EXAMPLES // part), subject)
         elif int(seed) == SEEDS[0]:
-            total.ask(question, listed, subject)
+            total.ask(question, listed[::part], subject)
     return [*total.numbers, total.closest.rpartition(", ")[2], "; ".join(total.accused)]
 
 
