@@ -45,7 +45,10 @@ class Room:
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
 BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "problems", "strategies")
-REPORTS = ("reports", *(f"reports.{name}" for name in ("netcdf", "draw", "html", "compare", "stability", "bench")))
+REPORTS = (
+    "reports",
+    *(f"reports.{name}" for name in ("netcdf", "draw", "html", "compare", "stability", "bench", "exchange")),
+)
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
@@ -98,6 +101,7 @@ ROOMS = {
         ("contract", "reports", "reports.draw", "reports.compare", "reports.bench"),
         ("numpy", "matplotlib", "jinja2", "markupsafe"),
     ),
+    "reports.exchange": Room(("contract", "reports", "reports.draw"), ("msgspec",)),
     "paper": Room(
         (*BELOW_RUN, "run", "studies", *REPORTS),
         ("numpy", "scipy", "xarray", "matplotlib", "jinja2", "markupsafe", "hypothesis"),

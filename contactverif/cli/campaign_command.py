@@ -10,6 +10,7 @@ import typer
 
 from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.run_endings import say_what_was_doubted, show_what_plugins_printed
+from contactverif.cli.settings import read_settings
 from contactverif.cli.shared_options import PropertyGlobs, SamplingOptions, formulation_argument
 from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
@@ -56,7 +57,7 @@ def campaign(
     options = VerifyOptions(
         tuple(select_names(names, False, isolation.limits())), tuple(properties or ()), sampling, isolation=isolation
     )
-    job = new_job(options, fresh_seed=_SEED, command=CAMPAIGN)
+    job = new_job(options.with_settings(read_settings()), fresh_seed=_SEED, command=CAMPAIGN)
     plan = piece.plan(job.plan())
     made_folder(out, "--out")
     folder = out.absolute() / piece.folder

@@ -11,6 +11,7 @@ import typer
 
 from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import PAGE, REPORT, OutputFiles
+from contactverif.cli.settings import read_settings
 from contactverif.cli.shared_options import (
     RESULT_FILES,
     PlaceOptions,
@@ -95,7 +96,10 @@ def _compare_formulations(typed: VerifyOptions, resume: Path | None) -> int:
     """Compare formulations, the reference being the first name; return the exit status."""
     if resume is None and not any(typed.names[:1]):
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
-    job = new_job(typed, command=COMPARE) if resume is None else resumed_job(resume, typed, COMPARE)
+    if resume is None:
+        job = new_job(typed.with_settings(read_settings()), command=COMPARE)
+    else:
+        job = resumed_job(resume, typed, COMPARE)
     from contactverif.cli.formulation_comparison import compare_formulations
 
     return compare_formulations(job)

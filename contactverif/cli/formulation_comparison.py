@@ -6,10 +6,11 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from contactverif.cli.annotations import annotate
 from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
 from contactverif.cli.console import say, show, show_as_it_is
 from contactverif.cli.counterexample_output import draw_outcome
-from contactverif.cli.output_files import PAGE, REPORT, PictureFolder
+from contactverif.cli.output_files import PAGE, PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.run_endings import (
     end_run,
@@ -19,6 +20,7 @@ from contactverif.cli.run_endings import (
     show_what_plugins_printed,
     watch_for_stops,
 )
+from contactverif.cli.run_files import run_writers
 from contactverif.cli.verify_job import Plugins, VerifyJob
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
@@ -34,7 +36,6 @@ from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.compare.comparison import Differing
 from contactverif_reports.html.comparison_page import Drawing, comparison_page
 from contactverif_reports.html.pages import write_page
-from contactverif_reports.netcdf.write import write
 
 
 def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
@@ -64,6 +65,7 @@ def compare_formulations(job: VerifyJob) -> int:
     say_how_many_are_unproven(study.run)
     show_what_plugins_printed()
     end.files.announce()
+    annotate(study.run)
     show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))
     say_where_plugins_ran(study.run.provenance)
     if not end.complete:
@@ -72,13 +74,13 @@ def compare_formulations(job: VerifyJob) -> int:
 
 
 def _writers(study: Study, plugins: Plugins) -> dict[str, Callable[[Path], None]]:
-    """Return the functions that write the report and the page."""
+    """Return the functions that write the files of the run; the page compares."""
 
     def write_html(path: Path) -> None:
         drawings = [_page_drawing(differing, *_both(differing, study, plugins)) for differing in study.differing]
         write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
 
-    return {REPORT: partial(write, study.run), PAGE: write_html}
+    return run_writers(study.run, None) | {PAGE: write_html}
 
 
 def _both(differing: Differing, study: Study, plugins: Plugins) -> tuple[Property, Subject, Subject]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.cli.settings import read_settings
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ ISOLATION_HELP = (
     "a box cannot. process: without either. inline: in this process, for debugging."
 )
 OPEN_HELP = "What a plugin in a box may use and write: a file, a folder, a device, or network. Repeatable."
-_SETTINGS = Path("pyproject.toml")
-_TABLE = "tool.contactverif"
 
 
 class Isolation(StrEnum):
@@ -56,17 +54,14 @@ class IsolationOptions:
         Without a choice of the user a plugin is in a box, or else has rules of Landlock, or else neither. Under pytest
         it is in this process, where a test may want to look into it.
         """
-        opened = _absolute(_opened_by_project() if self.opened is None else self.opened)
-        place = self.isolation
+        settings = read_settings()
+        opened = _absolute(settings.open if self.opened is None else self.opened)
+        place = self.isolation or (Isolation(settings.isolation) if settings.isolation else None)
         if place is None and "PYTEST_CURRENT_TEST" in os.environ:
             place = Isolation.INLINE
         if place in (None, Isolation.BOX, Isolation.LANDLOCK):
             place = _strongest(place, tuple(opened))
         return replace(self, isolation=place, opened=opened)
-
-    def adapt(self) -> IsolationOptions:
-        """Return the options for another machine, which may have no box: the safest place there takes that of one."""
-        return replace(self, isolation=None) if self.isolation in (Isolation.BOX, Isolation.LANDLOCK) else self
 
     def limits(self, hidden: Iterable[Path] = ()) -> Limits | None:
         """Return the limits of a plugin's process, and its box, in which some paths are not there.
@@ -125,20 +120,3 @@ def _absolute(opened: Iterable[str]) -> list[str]:
         if path != NETWORK and not os.path.exists(path):
             raise MisuseError("--open", f"{path}, which does not exist", f"a path that exists, or {NETWORK}")
     return paths
-
-
-def _opened_by_project() -> list[str]:
-    """Return the entries of the key `open` in the table of contactverif of the project's settings, if there are any."""
-    try:
-        settings: Any = tomllib.loads(_SETTINGS.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return []
-    except (OSError, ValueError) as error:
-        raise MisuseError(f"{_SETTINGS}", " ".join(str(error).split()), "a file of settings that can be read") from None
-    table = settings.get("tool", {}).get("contactverif", {})
-    opened = table.get("open", []) if isinstance(table, dict) else None
-    if not (isinstance(opened, list) and all(isinstance(path, str) for path in opened)):
-        raise MisuseError(f"open in [{_TABLE}] of {_SETTINGS}", repr(opened), "a list of paths")
-    if unknown := sorted(table.keys() - {"open"}):
-        raise MisuseError(f"[{_TABLE}] of {_SETTINGS}", unknown[0], "open, a list of paths")
-    return opened

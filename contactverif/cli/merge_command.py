@@ -51,13 +51,12 @@ def merge(
     options = options_of(plan, CAMPAIGN, _FOLDER)
     sampling = replace(options.sampling, shrink=shrink or options.sampling.shrink)
     files = " ".join(f"--out {shlex.quote(str(path))}" for path in out)
-    isolation = options.isolation.adapt()
-    job = new_job(replace(options, sampling=sampling, isolation=isolation, out=tuple(out)))
+    job = new_job(replace(options, sampling=sampling, out=tuple(out)))
     again = f"contactverif merge {shlex.quote(str(folder))} {files}{f' --shrink {shrink}' if shrink else ''}"
     if audit and REPORT not in job.files.names:
         raise MisuseError("--audit", "no report", f"--out FILE{REPORT} beside it")
     status = run_job(replace(job, sources=journals, again=again))
     if audit and job.files.paths[REPORT].exists():
-        differs = audit_report(job.files.paths[REPORT], share, options.place, isolation)
+        differs = audit_report(job.files.paths[REPORT], share, options.place, options.isolation)
         status = status or differs
     raise typer.Exit(status)

@@ -13,6 +13,10 @@ from contactverif.contract.errors import MisuseError
 
 REPORT = ".nc"
 PAGE = ".html"
+JSON = ".json"
+JUNIT = ".xml"
+SARIF = ".sarif"
+RUN_FILES = (REPORT, PAGE, JSON, JUNIT, SARIF)
 PICTURES = (".png", ".svg")
 SOLVED_SCENE = ".vtu"
 MARKDOWN = ".md"
@@ -20,6 +24,9 @@ LABELS = {
     REPORT: "report",
     PAGE: "page",
     MARKDOWN: "page",
+    JSON: "JSON",
+    JUNIT: "JUnit",
+    SARIF: "SARIF",
     ".png": "picture",
     ".svg": "picture",
     SOLVED_SCENE: "for ParaView",

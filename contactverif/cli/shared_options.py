@@ -73,7 +73,10 @@ FormulationNames = Annotated[
     formulation_argument("Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference."),
 ]
 EveryFormulation = Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")]
-RESULT_FILES = output_option("Write the results: FILE.nc a report, FILE.html a page. Repeatable.")
+RESULT_FILES = output_option(
+    "Write the results: FILE.nc a report, FILE.html a page, FILE.json, FILE.xml (JUnit) or FILE.sarif for other "
+    "programs. Repeatable."
+)
 PropertyGlobs = Annotated[
     list[str] | None,
     typer.Option(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -12,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.cli.annotations import annotate
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.output_files import REPORT, OutputFiles, PictureFolder
 from contactverif.cli.run_endings import (
     End,
     end_run,
@@ -23,6 +23,8 @@ from contactverif.cli.run_endings import (
     show_what_plugins_printed,
     watch_for_stops,
 )
+from contactverif.cli.run_files import run_writers
+from contactverif.cli.settings import read_settings
 from contactverif.cli.shared_options import (
     RESULT_FILES,
     FormulationNames,
@@ -96,7 +98,8 @@ def verify(
     if resume is not None:
         job = resumed_job(resume, typed)
     else:
-        job = new_job(replace(typed, names=tuple(select_names(names or [], all_, isolation.limits()))))
+        selected = tuple(select_names(names or [], all_, isolation.limits()))
+        job = new_job(replace(typed, names=selected).with_settings(read_settings()))
     raise typer.Exit(run_job(job))
 
 
@@ -114,7 +117,9 @@ def run_job(job: VerifyJob) -> int:
             options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
             result = run(plugins.subjects, plugins.questions, **options)
         gap = partial(find_gap, result, plugins.subjects, plugins.questions, job.sampling)
-        end = end_run(job, journal, gap, _writers(result, job.files), promises_kept=result.promises_kept)
+        end = end_run(
+            job, journal, gap, run_writers(result, job.files.names.get(REPORT)), promises_kept=result.promises_kept
+        )
     _show_results(result, plugins, end, job.pictures)
     if not end.complete:
         say_how_to_go_on(job)
@@ -136,25 +141,9 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
     end.files.announce()
     if REPORT not in end.files.names and (advice := how_to_keep(result)) is not None:
         show(advice)
+    annotate(result)
     show(f"Not complete: {end.gap}." if end.gap else summary(result))
     say_where_plugins_ran(result.provenance)
-
-
-def _writers(result: Run, files: OutputFiles) -> dict[str, Callable[[Path], None]]:
-    """Return the functions that write the report and the page."""
-
-    def write_report(path: Path) -> None:
-        from contactverif_reports.netcdf.write import write
-
-        write(result, path)
-
-    def write_html(path: Path) -> None:
-        from contactverif_reports.html.pages import write_page
-        from contactverif_reports.html.report_page import report_page
-
-        write_page(path, report_page(result, files.names.get(REPORT, Path("FILE.nc"))), "--out")
-
-    return {REPORT: write_report, PAGE: write_html}
 
 
 def _show_counterexamples(result: Run, plugins: Plugins, files: OutputFiles, folder: PictureFolder | None) -> None:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import typer
 
 from contactverif.cli.isolation_options import Isolation, IsolationOptions
-from contactverif.cli.output_files import PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.output_files import RUN_FILES, OutputFiles, PictureFolder
 from contactverif.cli.run_endings import say_what_was_doubted
+from contactverif.cli.settings import Settings
 from contactverif.cli.shared_options import PlaceOptions, SamplingOptions, WorkerOptions
 from contactverif.contract.errors import MisuseError
 
@@ -50,6 +51,24 @@ class VerifyOptions:
     place: PlaceOptions = field(default_factory=PlaceOptions)
     workers: WorkerOptions = field(default_factory=WorkerOptions)
     isolation: IsolationOptions = field(default_factory=IsolationOptions)
+
+    def with_settings(self, settings: Settings) -> VerifyOptions:
+        """Return the options with those of the project where nothing is typed; of `isolation` see there."""
+        from contactverif.contract.names import unknown_name_error
+        from contactverif.run.registry import matching_ids, property_ids
+
+        properties = self.properties or settings.properties
+        for unknown in settings.known.keys() - {*property_ids()}:
+            raise unknown_name_error("known failure", unknown, property_ids())
+        matching = {*matching_ids(properties or ("*",))} - _known_failures(self.known).keys()
+        known = (f"{name}={reason}" for name, reason in settings.known.items() if name in matching)
+        return replace(
+            self,
+            properties=properties,
+            known=(*self.known, *known),
+            sampling=replace(self.sampling, profile=self.sampling.profile or settings.profile),
+            workers=replace(self.workers, jobs=settings.jobs if self.workers.jobs is None else self.workers.jobs),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,8 +150,8 @@ class VerifyJob:
 
     @property
     def output(self) -> Path | None:
-        """The file that the journal belongs to: the report, or else the page."""
-        return self.files.names.get(REPORT) or self.files.names.get(PAGE)
+        """The file that the journal belongs to: the report, or else the page, or else another."""
+        return next((self.files.names[suffix] for suffix in RUN_FILES if suffix in self.files.names), None)
 
     @property
     def resume_line(self) -> str:
@@ -211,7 +230,7 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
     profile = profile_named(sampling.profile or "dev").resolve(
         examples=sampling.examples, seed=sampling.seed, fresh=fresh_seed
     )
-    files = OutputFiles.check(list(options.out), (REPORT, PAGE))
+    files = OutputFiles.check(list(options.out), RUN_FILES)
     folder = PictureFolder.make(options.pictures)
     settled = replace(
         options,

@@ -61,13 +61,6 @@ def test_where_there_are_rules_of_landlock_they_stand_in_for_a_box(monkeypatch: 
     assert words == f"The plugins ran in a process (Landlock 7) without a box: {FORBIDDEN}."
 
 
-@pytest.mark.usefixtures("with_boxes")
-def test_another_machine_takes_the_safest_place_that_it_has_instead_of_a_box() -> None:
-    for place in Isolation:
-        may_lack = place in (Isolation.BOX, Isolation.LANDLOCK)
-        assert IsolationOptions(isolation=place).adapt().isolation is (None if may_lack else place)
-
-
 def test_the_last_line_says_what_the_box_was() -> None:
     assert place_line("box (bubblewrap 0.8.0)") == "The plugins ran in a box (bubblewrap 0.8.0)."
     assert place_line("process") == "The plugins ran in a process without a box: as --isolation says."
@@ -85,22 +78,3 @@ def test_what_is_open_comes_from_the_command_or_else_from_the_project(
     Path("data").mkdir()
     assert IsolationOptions().settle().opened == [str(tmp_path / "data"), "network"]
     assert IsolationOptions(opened=[os.devnull]).settle().opened == [os.devnull]
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[tool.contactverif]\nopen = 3", r"open in \[tool.contactverif\] of pyproject.toml: found 3; needed a list"),
-        ("[tool]\ncontactverif = 3", r"open in \[tool.contactverif\] of pyproject.toml: .* needed a list of paths"),
-        ("[tool.contactverif]\nallow = []", r"\[tool.contactverif\] of pyproject.toml: found allow; needed open"),
-        ("[tool", r"pyproject.toml: found .*; needed a file of settings that can be read"),
-    ],
-)
-@pytest.mark.usefixtures("with_boxes")
-def test_wrong_settings_of_a_project_are_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, message: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("pyproject.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(MisuseError, match=message):
-        IsolationOptions().settle()

@@ -1,0 +1,92 @@
+"""The place of a formulation's factory in the working copy, for programs that mark it there. Nothing is imported."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import os
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.names import parse_name
+from contactverif.run.registry import FORMULATIONS
+
+_MOST_HOPS = 8  # A name may be imported from module to module.
+
+
+@cache
+def factory_place(name: str) -> tuple[str, int] | None:
+    """Return file and line of the factory of a formulation; of a wrapped one, that of the inner formulation.
+
+    None if the file is not below the working folder, as that of an installed package.
+    """
+    try:
+        inner = parse_name("formulation", name)[0].rpartition("/")[2]
+    except MisuseError:
+        return None
+    for entry in entry_points(group=FORMULATIONS, name=inner):
+        place = _follow(entry.module, entry.attr)
+        if place is not None and place[0].is_relative_to(os.getcwd()):
+            return place[0].relative_to(os.getcwd()).as_posix(), place[1]
+    return None
+
+
+def _follow(module: str, name: str) -> tuple[Path, int] | None:
+    """Return file and line where a name of a module is defined, through the imports of packages."""
+    for _ in range(_MOST_HOPS):
+        file = _file_of(module)
+        if file is None:
+            return None
+        try:
+            tree = ast.parse(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError, SyntaxError):
+            return file, 1
+        line = next((node.lineno for node in tree.body if name in _names(node)), None)
+        if line is not None:
+            return file, line
+        origin = next(_origins(tree, module, name, is_package=file.name == "__init__.py"), None)
+        if origin is None:
+            return file, 1
+        module, name = origin
+    return None
+
+
+def _file_of(module: str) -> Path | None:
+    """Return the file of a module. Of a package no more than its place is looked up."""
+    top, *rest = module.split(".")
+    try:
+        spec = importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        return None
+    if spec is None or spec.origin is None:
+        return None
+    path = Path(spec.origin)
+    if rest:
+        path = path.parent.joinpath(*rest)
+        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return path.resolve()
+
+
+def _names(node: ast.stmt) -> list[str]:
+    """Return the names that a statement defines."""
+    match node:
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+            return [name]
+        case ast.Assign(targets=targets):
+            return [target.id for target in targets if isinstance(target, ast.Name)]
+    return []
+
+
+def _origins(tree: ast.Module, module: str, name: str, *, is_package: bool) -> Iterator[tuple[str, str]]:
+    """Yield (module, name) from which a module imports a name."""
+    for node in tree.body:
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        for alias in node.names:
+            if (alias.asname or alias.name) == name:
+                parts = module.split(".")
+                base = ".".join(parts[: len(parts) - node.level + is_package]) if node.level else ""
+                yield ".".join(filter(None, (base, node.module))), alias.name

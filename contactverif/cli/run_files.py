@@ -1,0 +1,45 @@
+"""The files that hold a run: a report, a page, and what other programs read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contactverif.cli.output_files import JSON, JUNIT, PAGE, REPORT, SARIF
+
+if TYPE_CHECKING:
+    from contactverif.contract.result import Run
+
+
+def run_writers(run: Run, report: Path | None) -> dict[str, Callable[[Path], None]]:
+    """Return the function that writes a run to a path for each suffix. `report` is the report that a page names."""
+
+    def write_report(path: Path) -> None:
+        from contactverif_reports.netcdf.write import write
+
+        write(run, path)
+
+    def write_html(path: Path) -> None:
+        from contactverif_reports.html.pages import write_page
+        from contactverif_reports.html.report_page import report_page
+
+        write_page(path, report_page(run, report or Path("FILE.nc")), "--out")
+
+    def write_document(path: Path) -> None:
+        from contactverif_reports.exchange.run_document import write_json
+
+        write_json(run, path)
+
+    def write_suites(path: Path) -> None:
+        from contactverif_reports.exchange.junit import write_junit
+
+        write_junit(run, path)
+
+    def write_log(path: Path) -> None:
+        from contactverif.cli.factory_places import factory_place
+        from contactverif_reports.exchange.sarif import write_sarif
+
+        write_sarif(run, path, factory_place)
+
+    return {REPORT: write_report, PAGE: write_html, JSON: write_document, JUNIT: write_suites, SARIF: write_log}

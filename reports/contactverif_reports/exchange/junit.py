@@ -1,0 +1,89 @@
+"""A run as JUnit's XML, as servers read it that run tests: a suite for each formulation, a test case for each row.
+
+A row that makes the run fail is a failure, or an error where the plugin crashed. What is not asked, and what fails as
+stated, is skipped, with the reason. A failure without a promise is none of the test: its words are its output.
+"""
+
+from __future__ import annotations
+
+import os
+from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
+
+from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
+from contactverif_reports.draw import as_text
+from contactverif_reports.files import whole
+
+_SKIPPED = (Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.UNDECIDED)
+
+
+def write_junit(run: Run, path: str | os.PathLike[str]) -> None:
+    """Write a run as the XML that JUnit has made common."""
+    tree = ElementTree(suites_of(run))
+    indent(tree)
+    with whole(path) as part:
+        tree.write(part, encoding="utf-8", xml_declaration=True)
+
+
+def suites_of(run: Run) -> Element:
+    """Return the element `testsuites` of a run."""
+    examples = {(each.formulation, each.property_id): each for each in counterexamples(run).values()}
+    suites = Element("testsuites", name="contactverif")
+    for formulation in run.formulations:
+        suite = SubElement(suites, "testsuite", name=formulation)
+        for row in run.rows_of(formulation):
+            _add_row(suite, row, examples.get((formulation, row.property_id)))
+        if formulation in run.opposite_signs:
+            _add_case(suite, formulation, "sign", 0.0, "failure", OPPOSITE_SIGN, "opposite sign")
+        _count(suite)
+    for item in run.not_loaded:
+        suite = SubElement(suites, "testsuite", name=item.formulation)
+        _add_case(suite, item.formulation, "import", 0.0, "error", item.reason, str(Result.NOT_LOADED))
+        _count(suite)
+    return suites
+
+
+def _add_row(suite: Element, row: Row, example: Counterexample | None) -> None:
+    """Add the test case of a row, with its counterexample as text."""
+    seconds, words = row.seconds, row.reason or str(row.result)
+    if row.unexpected:
+        tag = "error" if row.verdict is Verdict.CRASHED else "failure"
+        element = _add_case(suite, row.formulation, row.property_id, seconds, tag, words, str(row.result))
+        element.text = _printable("\n".join([f"{row.unexpected}: {row.reason}", *_drawing(example)]))
+    elif row.result in _SKIPPED:
+        reason = f"{row.result}: {row.known or row.reason}".removesuffix(": ")
+        _add_case(suite, row.formulation, row.property_id, seconds, "skipped", reason)
+    elif row.verdict is Verdict.FAIL:
+        element = _add_case(suite, row.formulation, row.property_id, seconds, "system-out")
+        element.text = _printable(f"fails, and promises nothing here: {row.reason}")
+    else:
+        _add_case(suite, row.formulation, row.property_id, seconds)
+
+
+def _add_case(
+    suite: Element, formulation: str, name: str, seconds: float, tag: str = "", message: str = "", kind: str = ""
+) -> Element:
+    """Add a test case; return what says how it ended, or the case itself if it passed."""
+    case = SubElement(suite, "testcase", classname=_printable(formulation), name=name, time=f"{seconds:.3f}")
+    if not tag:
+        return case
+    attributes = {"message": _printable(message), "type": kind}
+    return SubElement(case, tag, {key: text for key, text in attributes.items() if text})
+
+
+def _count(suite: Element) -> None:
+    """Write how many test cases a suite has, and how they ended."""
+    suite.set("tests", str(len(suite)))
+    for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+        suite.set(name, str(len(suite.findall(f"testcase/{tag}"))))
+    suite.set("time", f"{sum(float(case.attrib['time']) for case in suite):.3f}")
+
+
+def _drawing(example: Counterexample | None) -> list[str]:
+    return [] if example is None else [example.label, as_text(example.case)]
+
+
+def _printable(text: str) -> str:
+    """Return a text without the characters that XML cannot have."""
+    return "".join(letter for letter in text if letter in "\n\t" or letter.isprintable())

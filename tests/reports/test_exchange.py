@@ -1,0 +1,113 @@
+"""Other programs read of a run: JSON with its schema, JUnit's XML, and SARIF."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+
+from contactverif import Run, load_formulation, load_properties, verify
+from contactverif.contract.result import NotLoaded
+from contactverif_reports.exchange.junit import write_junit
+from contactverif_reports.exchange.run_document import SCHEMA, RunDocument, document_of, schema, write_json
+from contactverif_reports.exchange.sarif import write_sarif
+
+IDS = ["patch.flat.single", "patch.flat.transmission", "hard.dead-zone", "complementarity", "balance.force"]
+PLACE = ("plugins/mine.py", 7)
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    """Return a run with rows of all kinds: kept, stated to fail, failed without a promise, broken, not loaded."""
+    result = verify([load_formulation("nts"), load_formulation("vts-ppt")], load_properties(IDS), examples=3, seed=1)
+    broken = [
+        replace(row, promise=True) if (row.formulation, row.property_id) == ("nts", "patch.flat.single") else row
+        for row in result.rows
+    ]
+    return replace(
+        result, rows=tuple(broken), not_loaded=(NotLoaded("gone", "no \x1b[31mmodule"),), opposite_signs=("vts-ppt",)
+    )
+
+
+def test_the_document_says_what_the_run_says(run: Run, tmp_path: Path) -> None:
+    write_json(run, tmp_path / "run.json")
+    document = msgspec.json.decode((tmp_path / "run.json").read_bytes(), type=RunDocument)
+    assert document == document_of(run)
+    assert not document.promises_kept
+    rows = {(row.formulation, row.property): row for row in document.rows}
+    assert len(rows) == len(run.rows) == 2 * len(IDS)
+    broken = rows["nts", "patch.flat.single"]
+    assert broken.breaks == "promised to pass, but fails"
+    assert broken.counterexample is not None
+    assert len(broken.counterexample.nodes) == len(broken.counterexample.positions) >= 4
+    assert broken.counterexample.slave[0] == [0, 1]
+    assert [number.name for number in broken.counterexample.numbers]
+    assert document.not_loaded[0].name == "gone"
+    assert document.opposite_signs == ["vts-ppt"]
+
+
+def test_the_schema_in_the_repository_is_that_of_the_document() -> None:
+    """`python -c "…exchange.run_document import *; SCHEMA.write_bytes(schema())"` writes it anew."""
+    assert SCHEMA.read_bytes() == schema()
+
+
+def test_a_number_that_is_not_finite_is_null(run: Run, tmp_path: Path) -> None:
+    rows = [row for row in run.rows if row.property_id == "hard.dead-zone"]
+    document = document_of(replace(run, rows=tuple(rows)))
+    number = document.rows[0].closest
+    assert number is not None
+    encoded = msgspec.json.encode(msgspec.structs.replace(number, value=float("inf")))
+    assert msgspec.json.decode(encoded)["value"] is None
+
+
+def suites(path: Path) -> dict[str, ElementTree.Element]:
+    return {str(suite.get("name")): suite for suite in ElementTree.parse(path).getroot()}
+
+
+def test_each_row_is_a_test_case_that_ends_as_the_row_does(run: Run, tmp_path: Path) -> None:
+    write_junit(run, tmp_path / "run.xml")
+    by_name = suites(tmp_path / "run.xml")
+    nts = by_name["nts"]
+    assert (nts.get("tests"), nts.get("failures"), nts.get("errors"), nts.get("skipped")) == ("5", "1", "0", "2")
+    tags = {str(case.get("name")): [each.tag for each in case] for case in nts}
+    assert tags["patch.flat.single"] == ["failure"]
+    assert tags["patch.flat.transmission"] == tags["complementarity"] == ["skipped"]
+    assert tags["hard.dead-zone"] == ["system-out"]
+    assert tags["balance.force"] == []
+    failure = nts.find("testcase[@name='patch.flat.single']/failure")
+    assert failure is not None
+    assert str(failure.text).startswith("promised to pass, but fails: ")
+    assert "slave" in str(failure.text)  # The drawing
+    assert [case.get("name") for case in by_name["vts-ppt"].findall("testcase[failure]")] == ["sign"]
+    assert by_name["gone"].get("errors") == "1"
+
+
+def results(run: Run, path: Path, place: tuple[str, int] | None = PLACE) -> list[dict[str, Any]]:
+    write_sarif(run, path, lambda name: place)
+    log = msgspec.json.decode(path.read_bytes())
+    (only,) = log["runs"]
+    assert log["version"] == "2.1.0"
+    rules = {rule["id"] for rule in only["tool"]["driver"]["rules"]}
+    assert {result["ruleId"] for result in only["results"]} <= rules
+    list_of_results: list[dict[str, Any]] = only["results"]
+    return list_of_results
+
+
+def test_what_fails_the_run_is_an_error_and_a_failure_without_promise_a_warning(run: Run, tmp_path: Path) -> None:
+    levels = {(result["ruleId"], result["level"]) for result in results(run, tmp_path / "run.sarif")}
+    assert levels == {
+        ("import", "error"),
+        ("sign", "error"),
+        ("patch.flat.single", "error"),
+        ("hard.dead-zone", "warning"),
+    }
+
+
+def test_a_result_stands_where_the_factory_does(run: Run, tmp_path: Path) -> None:
+    (location,) = results(run, tmp_path / "run.sarif")[0]["locations"]
+    assert location["physicalLocation"]["artifactLocation"]["uri"] == PLACE[0]
+    assert location["physicalLocation"]["region"]["startLine"] == PLACE[1]
+    (location,) = results(run, tmp_path / "run.sarif", None)[0]["locations"]
+    assert "physicalLocation" not in location
