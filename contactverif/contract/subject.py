@@ -6,10 +6,14 @@ is filled in here; a part that breaks the contract raises a `ContractError` here
 
 from __future__ import annotations
 
+import inspect
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from contextvars import copy_context
+from difflib import get_close_matches
+from traceback import walk_tb
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -19,7 +23,7 @@ from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, f
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.first_answers import FirstAnswers
-from contactverif.contract.foreign_text import describe_error, name_line
+from contactverif.contract.foreign_text import describe_error, name_line, one_line
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
@@ -30,6 +34,7 @@ FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time,
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
+_SEPARATOR = re.compile(r"[\\/]")
 _COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 
@@ -101,9 +106,12 @@ class Subject:
         self.name = name_line(name)
         self._make = make
         self.first_answers: FirstAnswers | None = None
+        if flaw := _flaw_of_factory(make):
+            raise ContractError(f"make: {flaw}")
         plugin = _call_plugin("make", make, penalty=1.0)
         if not callable(getattr(plugin, "residual", None)):
-            raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`")
+            hint = _nearest(plugin, "residual")
+            raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`{hint}")
         traits = _call_plugin("traits", getattr, plugin, "traits", Traits())
         if not isinstance(traits, Traits):
             raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.contract.traits.Traits")
@@ -325,6 +333,29 @@ class CheckedFormulation:
             raise MisuseError("z", f"shape {z.shape}", f"(..., {interface.n_unknowns + count}), {needed}")
 
 
+def _flaw_of_factory(make: Callable[..., Any]) -> str:
+    """Return why a factory does not take the penalty; empty if it does, or if its signature cannot be told."""
+    try:
+        parameters = inspect.signature(make)
+        name = name_line(getattr(make, "__name__", "make"))
+        try:
+            parameters.bind(penalty=1.0)
+        except TypeError as error:
+            return f"found {name}{one_line(str(parameters))} ({one_line(str(error))}); needed {name}(*, penalty)"
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # A stranger's signature may raise anything; the call will say what is wrong.
+        return ""
+    return ""
+
+
+def _nearest(plugin: Any, method: str) -> str:
+    """Return the name of a plugin that is nearest to that of a method it lacks, in words; empty if none is near."""
+    names = [name for name in _call_plugin(method, dir, plugin) if isinstance(name, str) and name != method]
+    near = get_close_matches(method, names, n=1)
+    return f"; the nearest name is `{name_line(near[0])}`" if near else ""
+
+
 def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Return the answer of a plugin; whatever it raises becomes a PluginError that names the method."""
     try:
@@ -334,7 +365,18 @@ def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **o
         raise
     except BaseException as error:
         cause = "memory" if isinstance(error, MemoryError) else "exit" if isinstance(error, SystemExit) else "exception"
-        raise PluginError(f"{method}: {describe_error(error)}", cause) from error
+        raise PluginError(f"{method}: {describe_error(error)}{_place_of(error)}", cause) from error
+
+
+def _place_of(error: BaseException) -> str:
+    """Return where a plugin raised an error: the last line in the folder of the file that was called, in brackets."""
+    codes = [(frame.f_code, line) for frame, line in walk_tb(error.__traceback__)][1:]  # The first is that of the call.
+    if not codes:
+        return ""
+    folders = [_SEPARATOR.split(code.co_filename) for code, _ in codes]
+    last = max(number for number, parts in enumerate(folders) if parts[:-1] == folders[0][:-1])
+    code, line = codes[last]
+    return f" ({name_line(folders[last][-1])}, line {line}, in {name_line(code.co_name)})"
 
 
 def _check_forces(verb: str, forces: Any, z: Array) -> Array:
