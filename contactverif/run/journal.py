@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 import struct
 import zlib
@@ -232,8 +233,8 @@ def begin_journal(folder: Path, plan: msgspec.Struct, outputs: Iterable[Path], a
             with hold_journal(folder, argument):
                 _discard(aside)
                 os.replace(folder, aside)
+        _remove_stale(folder)
         part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-        shutil.rmtree(part, ignore_errors=True)
         part.mkdir()
         write_record(part / _HEADER, msgspec.structs.replace(plan, nonce=token_hex(_NONCE)))
         make_key(JournalKey.read(part).identity)
@@ -245,6 +246,25 @@ def begin_journal(folder: Path, plan: msgspec.Struct, outputs: Iterable[Path], a
         needed = "a folder that may be written to, and a disk that is not full"
         raise MisuseError(argument, f"{folder.name}: {error.strerror}", needed) from error
     return aside.name if had_one else ""
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove what processes left behind that were killed while they made a journal of this name."""
+    name = re.compile(rf"\.{re.escape(folder.name)}\.(\d+)\.part")
+    for path in list(folder.parent.iterdir()):
+        match = name.fullmatch(path.name)
+        if match and (int(match[1]) == os.getpid() or not _is_alive(int(match[1]))):
+            _discard(path)
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def keep_earlier(folder: Path, outputs: Iterable[Path]) -> None:

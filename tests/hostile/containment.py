@@ -47,6 +47,7 @@ GROUP = 8  # Plugins of one run.
 ALONE = ("memory", "leaves", "says")  # Plugins of these kinds run alone.
 MEGABYTES = 4000  # The address space of a whole run, plugins included.
 MOST_OUTPUT = 100_000  # Bytes that the command may print.
+PURE_IN_A_BOX = ("inputs-by-process",)  # There the number of its process is always the same.
 CHECKS = ("goes on", "others unchanged", "report complete", "exit status right", "nothing left", "output clean")
 HEADS = ("mode/plugin", "seconds", "status", *CHECKS, "result", "remarks")
 CONTROL = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]|\xc2[\x80-\x9f]")
@@ -194,21 +195,22 @@ def _result(run: Run, plugin: str) -> str:
     return ", ".join(f"{word} {count}" for word, count in counts.items()) + (f": {reason}" if reason else "")
 
 
-def _status_is_right(plugin: HostilePlugin, run: Run, finish: Finish, alone: Run) -> str:
+def _status_is_right(plugin: HostilePlugin, run: Run, finish: Finish, alone: Run, mode: str) -> str:
     """Return what is wrong with exit status and verdict; empty if both are right."""
     like_nts = not differences(only(run, plugin.name, "nts"), only(alone, "nts", "nts"))
     kept = finish.status == 0
+    pure = mode == "box" and plugin.name in PURE_IN_A_BOX
     if finish.status not in (0, 1) or kept != run.promises_kept:
         return f"exit status {finish.status}, but the report says {'kept' if run.promises_kept else 'broken'}"
     if plugin.ends == LIKE_NTS and not (like_nts and kept):
         return "not judged as nts"
     impure = [row for row in run.rows_of(plugin.name) if row.property_id == "purity" and row.unexpected]
-    if plugin.ends == IMPURE and not impure:
+    if plugin.ends == IMPURE and not impure and not pure:
         return "purity does not fail"
     accused = any(item.formulation == plugin.name for item in run.not_loaded) or any(
         row.unexpected for row in run.rows_of(plugin.name)
     )
-    if plugin.ends in (CAUGHT, IMPURE) and (kept or not accused):
+    if plugin.ends in (CAUGHT, IMPURE) and (kept or not accused) and not pure:
         return "not caught"
     if kept and accused:
         return "exit status 0, but the plugin is accused"
@@ -235,7 +237,7 @@ def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
             more: list[str] = []
             answers, result = (False, False, False), ""
             if run is not None:
-                answers, result, more = _look(plugin, run, finish, alone, properties)
+                answers, result, more = _look(plugin, run, finish, alone, properties, mode)
             elif plugin.ends == STOPS:  # Nobody can go on without the parent; what counts is that no report is broken.
                 ended, answers = finish.status is not None, (True, True, finish.status not in (0, None))
             verdicts = (ended, *answers, not finish.left, clean)
@@ -247,12 +249,12 @@ def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
 
 
 def _look(
-    plugin: HostilePlugin, run: Run, finish: Finish, alone: Run, properties: tuple[str, ...]
+    plugin: HostilePlugin, run: Run, finish: Finish, alone: Run, properties: tuple[str, ...], mode: str
 ) -> tuple[tuple[bool, bool, bool], str, list[str]]:
     """Return what the report says: (others unchanged, report complete, exit status right), the verdict, remarks."""
     changes = [line for name in OTHERS for line in differences(only(run, name, name), only(alone, name, name))]
     complete = _is_complete(run, plugin.name, properties)
-    wrong = _status_is_right(plugin, run, finish, alone)
+    wrong = _status_is_right(plugin, run, finish, alone, mode)
     return (not changes, complete, not wrong), _result(run, plugin.name), [*changes[:1], *([wrong] if wrong else [])]
 
 

@@ -2,6 +2,8 @@
 
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -61,3 +63,17 @@ def test_where_no_key_can_be_kept_a_journal_begins_without_one(tmp_path: Path, s
     state.write_text("a file")
     begin_journal(tmp_path / "a", Plan(), [])
     assert JournalKey.read(tmp_path / "a").key == b""
+
+
+def test_a_run_that_was_killed_as_it_made_its_journal_leaves_nothing_for_long(tmp_path: Path, state: Path) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    begin_journal(tmp_path / "r", Plan(), [])
+    unfinished, of_another = (tmp_path / f".r.{pid}.part" for pid in (ended.pid, os.getppid()))
+    (tmp_path / "r").rename(unfinished)
+    of_another.mkdir()  # A process that is alive may be about to finish it.
+    key = JournalKey.read(unfinished)
+    assert key.key
+    begin_journal(tmp_path / "r", Plan(), [])
+    assert sorted(path.name for path in tmp_path.glob("*r*")) == [of_another.name, "r"]
+    assert not read_key(key.identity)
