@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import repeat
 from time import perf_counter
 
-from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Counterexample, Origin, counterexamples
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import Row, Run
 from contactverif.contract.subject import Subject
@@ -96,6 +97,7 @@ def audit(
         *(_gap(row, opened, sampling) for row, opened in stored),
         *map(str, look.differences),
         *map(_judge_example, examples.values(), repeat(subjects), repeat(questions), repeat(not changes)),
+        *([] if changes else map(_other_case, examples.values(), repeat(dict(zip(run.rows, rows, strict=True))))),
     ]
     n_witnesses = sum(WITNESS in sample.outcomes for sample in samples)
     return Audit(
@@ -207,6 +209,21 @@ def _judge_example(
         return f"{example.id}: the property is not asked of the formulation"
     (words,) = judge_again(question, subject, [(example.case, example.outcome)], exact)
     return f"{example.id}: {words}" if words else ""
+
+
+def _other_case(example: Counterexample, rows: Mapping[Row, OpenRow | Row]) -> str:
+    """Return whether a stored case with a name is another one than that of today, which measures what it measured."""
+    opened, case = rows[example.row], example.case
+    if not isinstance(opened, OpenRow):
+        return ""
+    named = [opened.witness] if example.origin is Origin.WITNESS else list(opened.listed or ())
+    today = next((each for each in named if each is not None and each.name == case.name), None)
+    same = today is None or _bytes_of(case) == _bytes_of(today)
+    return "" if same else f"{example.id}: its mesh is not that of {case.name} today"
+
+
+def _bytes_of(case: Case) -> dict[str, tuple[str, bytes]]:
+    return {name: (str(array.shape), array.tobytes()) for name, array in case.to_arrays().items()}
 
 
 def _report_nothing(progress: Progress) -> None:

@@ -1,6 +1,7 @@
 """The command `audit`: an honest report passes, and what disagrees with its numbers or with today is listed."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import netCDF4
@@ -11,6 +12,7 @@ from asking import Ask, check_mistake
 from contactverif.run import provenance
 from contactverif.run.audit import Audit
 from contactverif_reports.netcdf.read import read_run
+from contactverif_reports.netcdf.write import write
 
 WORDS = ("nts", "vts-ppt", "-p", "patch.flat.transmission", "-p", "hard.deep", "--examples", "12", "--seed", "1")
 
@@ -65,6 +67,23 @@ def test_a_changed_number_is_listed_if_all_are_judged_again(ask: Ask, report: Pa
     answer = ask("audit", report, "--share", "1")
     assert answer.status == 1
     assert "  vts-ppt patch.flat.transmission: case 5: error of a nodal force is " in answer.out
+
+
+def test_a_witness_on_another_mesh_is_found(ask: Ask, report: Path) -> None:
+    """Its numbers alone may not show it: they do not know where a node is that nothing touches."""
+    run = read_run(report)
+    (row,) = [row for row in run.rows if row.witness is not None and row.formulation == "nts"]
+    assert row.witness is not None
+    case = row.witness.case
+    z = np.array(case.z)
+    z[2 * case.interface.n_slave_nodes + np.argmax(z[2 * case.interface.n_slave_nodes :: 2]) * 2] += 1e-3
+    witness = replace(row.witness, case_or_summary=replace(case, z=z))
+    rows = tuple(replace(each, witness=witness) if each is row else each for each in run.rows)
+    write(replace(run, rows=rows), report)
+    answer = ask("audit", report)
+    assert answer.status == 1
+    lines = [line for line in answer.out.splitlines() if line.startswith("  ")]
+    assert f"  nts.patch.flat.transmission.witness: its mesh is not that of {case.name} today" in lines
 
 
 def test_another_seed_is_found(ask: Ask, report: Path) -> None:

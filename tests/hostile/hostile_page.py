@@ -57,6 +57,8 @@ NOT_CONTAINED = {
     },
     "process": {},
 }
+REACHES = "reaches-"  # The names of plugins that were written against the box begin so.
+ONLY_A_BOX = "A process alone does not keep a plugin from this; a box does."
 KILLED = """## Kills
 
 Runs were killed by SIGKILL at random moments, half of them with all their processes, half the first process alone, and
@@ -142,13 +144,20 @@ def exceptions(mode: str) -> str:
             f"`{name_of(row)}`",
             PLUGINS[name_of(row)].summary,
             ", ".join(check for check in CHECKS if row[check] != "yes"),
-            NOT_CONTAINED.get(mode, {}).get(name_of(row), ""),
+            reason(mode, name_of(row)),
             row["remarks"],
         ]
         for row in rows(mode)
         if not is_whole(row)
     ]
     return f"Those {PLACES[mode]} that are not contained in everything:\n\n" + table(heads, lines) if lines else ""
+
+
+def reason(mode: str, name: str) -> str:
+    """Return why a plugin is not contained somewhere, where that is known."""
+    if mode != "box" and name.startswith(REACHES):
+        return ONLY_A_BOX
+    return NOT_CONTAINED.get(mode, {}).get(name, "")
 
 
 def all_plugins(mode: str) -> str:
