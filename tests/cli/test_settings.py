@@ -102,6 +102,6 @@ def test_wrong_settings_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_known_failure_of_no_property_suggests_the_nearest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write_table(tmp_path, '[tool.contactverif.known]\n"miror" = "why"\n', monkeypatch)
-    with pytest.raises(MisuseError, match="'miror'; needed a name that exists; the nearest: mirror"):
+    write_table(tmp_path, '[tool.contactverif.known]\n"mirrors" = "why"\n', monkeypatch)
+    with pytest.raises(MisuseError, match="'mirrors'; needed a name that exists; the nearest: mirror"):
         VerifyOptions(("nts",)).with_settings(read_settings())

@@ -78,14 +78,17 @@ class SmoothedNormals:
 
     @staticmethod
     def _project(a: Any, along: Any, normals: Any, nodes: Any) -> Any:
-        """Return where on the slave (n_slave, n_master, 2) the field points at the nodes of master segments."""
-        offset = nodes[None] - a[:, None, None]
-        first, change = normals[:, None, None, 0], (normals[:, 1] - normals[:, 0])[:, None, None]
-        d = along[:, None, None]
-        c0, c1, c2 = cross(offset, first), cross(offset, change) - cross(d, first), -cross(d, change)
+        """Return where on the slave (n_slave, n_master, 2) the field points at the nodes of master segments.
+
+        Of two such places that counts which is nearer to the middle of the segment, so that neither end is preferred.
+        """
+        offset = nodes[None] - (a + along / 2)[:, None, None]
+        middle, change = ((normals[:, 1] + sign * normals[:, 0])[:, None, None] / 2 for sign in (1, -1))
+        d = along[:, None, None] / 2
+        c0, c1, c2 = cross(offset, middle), cross(offset, change) - cross(d, middle), -cross(d, change)
         with np.errstate(invalid="ignore", divide="ignore"):
             root = np.sqrt(c1 * c1 - 4 * c2 * c0)
-            return -2 * c0 / (c1 + np.copysign(root, c1))
+            return (1 - 2 * c0 / (c1 + np.copysign(root, c1))) / 2
 
     @staticmethod
     def _shoot(a: Any, along: Any, s: Any, n: Any, ends: Any) -> tuple[Any, Any]:
