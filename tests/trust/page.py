@@ -7,10 +7,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 from option_names import is_pair
 from options import SEED, SLOW
+from stranger_cases import EXAMPLES, SEEDS, UNSTATED
+from strangers import STRANGERS as ALL_STRANGERS
 from tables import COMMITS, FOLDER, SURVIVES, UNKNOWN, read
 
 PAGE, FIGURE = "README.md", "kills.svg"
-_TABLES = ("campaign.csv", "options.csv", "kills.csv", "smallest_cases.csv", "smallest_errors.csv", "curved_damage.csv")
+_TABLES = (
+    "campaign.csv",
+    "strangers.csv",
+    "options.csv",
+    "kills.csv",
+    "smallest_cases.csv",
+    "smallest_errors.csv",
+    "curved_damage.csv",
+)
 COUNTS = ("cases", "accusations", "undecided", "idle")
 
 INTRODUCTION = """# Trust
@@ -27,6 +37,15 @@ largest number over its tolerance in a case that passes, and the formulation tha
 In *idle* cases nothing is in contact. The campaign has random cases alone: no scene with a name, such as those of the
 paper, and no finite list, such as those of `hard.*` and `accuracy.*`. These are the same for every seed, and the tests
 ask them.
+
+"""
+STRANGERS = """## Right formulations of strangers
+
+{formulations} formulations are written from papers and textbooks, and share no code with the plugins. Each was asked
+every property that makes sense for it: {examples} random cases of each with seeds {seeds}, or 5/12 as many where bodies
+are solved, and all named cases. Where it states nothing of a property that solves bodies, which can then accuse it of a
+crash or a breach of the contract alone, one in {part} of these. {cases:,} cases, {accusations} accusations.{rest}
+*Nearest* is as above.
 
 """
 OPTIONS = """## Every option of every formulation
@@ -172,6 +191,35 @@ def base_name(formulation: str) -> str:
     return outer.partition(":")[0] + slash
 
 
+def stranger_rows() -> list[Row]:
+    """Return the rows of all seeds and formulations of strangers."""
+    return read("strangers.csv")
+
+
+def strangers() -> str:
+    """Return the part about right formulations of strangers."""
+    groups = defaultdict[str, list[Row]](list)
+    for row in stranger_rows():
+        groups[row["seed/formulation"].partition("/")[2]].append(row)
+    lines, sums = [], [0, 0]
+    for name, members in groups.items():
+        counts = [sum(int(row[count]) for row in members) for count in COUNTS]
+        sums = [sums[0] + counts[0], sums[1] + counts[1]]
+        nearest = max(members, key=lambda row: float(row["nearest"]))
+        lines.append([name, *map(str, counts), nearest["nearest"], f"`{nearest['property']}`"])
+    missing = len(SEEDS) * len(ALL_STRANGERS) - len(stranger_rows())
+    text = STRANGERS.format(
+        formulations=len(ALL_STRANGERS),
+        seeds=", ".join(map(str, SEEDS)),
+        examples=EXAMPLES,
+        part=UNSTATED,
+        cases=sums[0],
+        accusations=sums[1],
+        rest=f" {missing} of the campaign's lines have not run yet." if missing else "",
+    )
+    return text + table(["formulation", "cases", "accused", "undecided", "idle", "nearest", "in"], lines)
+
+
 def options() -> str:
     """Return the part about options."""
     rows, groups = option_rows(), defaultdict[str, list[Row]](list)
@@ -280,7 +328,7 @@ def page() -> str:
         f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in _TABLES
     )
     return INTRODUCTION.format(commits=commits) + "\n".join(
-        [campaign(), options(), kills(), small_cases(), smallest(), damage()]
+        [campaign(), strangers(), options(), kills(), small_cases(), smallest(), damage()]
     )
 
 

@@ -9,6 +9,7 @@ is asked with every tenth case.
 import sys
 
 from campaign import NUMBERS, Count, random_cases
+from stranger_cases import EXAMPLES, SEEDS, UNSTATED
 from strangers import STRANGERS
 from tables import fill
 
@@ -16,8 +17,6 @@ from contactverif import Subject, load_properties
 from contactverif.contract.property import Property
 
 FILE = "strangers.csv"
-SEEDS, EXAMPLES = (1, 2, 3), 300
-UNSTATED = 10  # The part of the cases of a property that solves bodies, if nothing is stated of it.
 HEADS = ("seed/formulation", *NUMBERS, "property", "accused")
 
 

@@ -2,8 +2,10 @@
 
 import pytest
 from option_names import all_variants
-from page import PAGE, campaign_counts, caught_alone, kill_rows, option_rows, page, size_of
+from page import PAGE, campaign_counts, caught_alone, kill_rows, option_rows, page, size_of, stranger_rows
 from reasons import SHARED
+from stranger_cases import SEEDS
+from strangers import STRANGERS
 from subjects import load_property
 from tables import FOLDER, read
 
@@ -24,6 +26,12 @@ def test_the_page_says_what_the_tables_say() -> None:
 def test_nobody_who_is_right_is_accused() -> None:
     assert sum(count["cases"] for count in COUNTS.values()) >= LEAST_CASES
     assert not [row["accused"] for row in read("campaign.csv") if row["accused"] or row["accusations"] != "0"]
+
+
+def test_no_stranger_who_is_right_is_accused() -> None:
+    rows = stranger_rows()
+    assert {row["seed/formulation"] for row in rows} <= {f"{seed}/{name}" for seed in SEEDS for name in STRANGERS}
+    assert not [row["accused"] for row in rows if row["accused"] or row["accusations"] != "0"]
 
 
 def test_every_formulation_with_every_option_was_asked_and_nobody_is_accused() -> None:
