@@ -14,6 +14,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name
 from contactverif.run.registry import FORMULATIONS
 
+_INSTALLED = {"site-packages", "dist-packages"}  # An environment may lie in the working folder.
 _MOST_HOPS = 8  # A name may be imported from module to module.
 
 
@@ -21,7 +22,7 @@ _MOST_HOPS = 8  # A name may be imported from module to module.
 def factory_place(name: str) -> tuple[str, int] | None:
     """Return file and line of the factory of a formulation; of a wrapped one, that of the inner formulation.
 
-    None if the file is not below the working folder, as that of an installed package.
+    None if the file is not below the working folder, or is that of an installed package.
     """
     try:
         inner = parse_name("formulation", name)[0].rpartition("/")[2]
@@ -29,7 +30,7 @@ def factory_place(name: str) -> tuple[str, int] | None:
         return None
     for entry in entry_points(group=FORMULATIONS, name=inner):
         place = _follow(entry.module, entry.attr)
-        if place is not None and place[0].is_relative_to(os.getcwd()):
+        if place is not None and place[0].is_relative_to(os.getcwd()) and not _INSTALLED & {*place[0].parts}:
             return place[0].relative_to(os.getcwd()).as_posix(), place[1]
     return None
 

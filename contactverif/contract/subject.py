@@ -7,13 +7,11 @@ is filled in here; a part that breaks the contract raises a `ContractError` here
 from __future__ import annotations
 
 import inspect
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from contextvars import copy_context
 from difflib import get_close_matches
-from traceback import walk_tb
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -34,7 +32,6 @@ FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time,
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
-_SEPARATOR = re.compile(r"[\\/]")
 _COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 
@@ -365,18 +362,7 @@ def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **o
         raise
     except BaseException as error:
         cause = "memory" if isinstance(error, MemoryError) else "exit" if isinstance(error, SystemExit) else "exception"
-        raise PluginError(f"{method}: {describe_error(error)}{_place_of(error)}", cause) from error
-
-
-def _place_of(error: BaseException) -> str:
-    """Return where a plugin raised an error: the last line in the folder of the file that was called, in brackets."""
-    codes = [(frame.f_code, line) for frame, line in walk_tb(error.__traceback__)][1:]  # The first is that of the call.
-    if not codes:
-        return ""
-    folders = [_SEPARATOR.split(code.co_filename) for code, _ in codes]
-    last = max(number for number, parts in enumerate(folders) if parts[:-1] == folders[0][:-1])
-    code, line = codes[last]
-    return f" ({name_line(folders[last][-1])}, line {line}, in {name_line(code.co_name)})"
+        raise PluginError(f"{method}: {describe_error(error)}", cause) from error
 
 
 def _check_forces(verb: str, forces: Any, z: Array) -> Array:

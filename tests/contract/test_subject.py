@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -125,8 +124,7 @@ VERBS = ["pair", "residual", "tangent", "residual_and_tangent", "contact_points"
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_plugin_that_raises(verb: str) -> None:
-    place = r"\(test_subject.py, line \d+, in raising\)"
-    with pytest.raises(PluginError, match=rf"^{verb}: ZeroDivisionError: by nothing {place}$") as caught:
+    with pytest.raises(PluginError, match=f"^{verb}: ZeroDivisionError: by nothing$") as caught:
         answer_to(verb, **{verb: raising})
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
     assert isinstance(caught.value, ContractError)
@@ -298,29 +296,6 @@ class Misspelt:
 
     def residuals(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
         return z
-
-
-def fail_deep(z: Any) -> Any:
-    return np.linalg.inv(z)
-
-
-def test_an_error_says_where_the_plugin_raised_it() -> None:
-    """It is the last line of the plugin's files: libraries below it do not count."""
-
-    def residual(_: Interface, __: Pairing, z: Any) -> Any:
-        return fail_deep(z)
-
-    (line,) = [n for n, text in enumerate(Path(__file__).read_text().splitlines(), 1) if "np.linalg.inv(z)" in text][:1]
-    with pytest.raises(PluginError, match=rf"\(test_subject.py, line {line}, in fail_deep\)$"):
-        subject(residual=residual).for_case(CASE).residual(PAIR, None, Z)
-
-
-def test_an_error_of_the_call_itself_has_no_place() -> None:
-    def residual(only: Any) -> Any:
-        return only
-
-    with pytest.raises(PluginError, match=r"positional arguments? but 3 were given$"):
-        subject(residual=residual).for_case(CASE).residual(PAIR, None, Z)
 
 
 @pytest.mark.parametrize(
