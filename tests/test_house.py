@@ -63,7 +63,7 @@ ROOMS = {
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "run": Room(
         ("contract", "problems", "strategies", "isolation"),
-        ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec"),
+        ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec", "psutil"),
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
@@ -87,7 +87,7 @@ ROOMS = {
         ("numpy", "scipy", "hypothesis"),
         QUIET,
     ),
-    "reports": Room(("contract",), ("numpy",)),
+    "reports": Room(("contract",), ("numpy", "psutil")),
     "reports.bench": Room(("contract", "reports"), ("numpy",)),
     "reports.netcdf": Room(
         ("contract", "isolation", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4", "msgspec")

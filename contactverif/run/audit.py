@@ -9,6 +9,7 @@ from time import perf_counter
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample, Origin, counterexamples
+from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import Row, Run
 from contactverif.contract.subject import Subject
@@ -16,7 +17,7 @@ from contactverif.run import draw
 from contactverif.run.draw import Sampling
 from contactverif.run.outcome_records import WITNESS
 from contactverif.run.provenance import code_digests, collect_versions, machine
-from contactverif.run.rows import OpenRow, Outcomes, gap_of_rows, open_row, verdict_of_row
+from contactverif.run.rows import OpenRow, gap_of_rows, open_row, verdict_of_row
 from contactverif.run.run_jobs import RunJobs
 from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Progress, Scheduler

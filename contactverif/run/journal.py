@@ -23,6 +23,7 @@ from secrets import token_hex
 from typing import IO, NamedTuple, TypeVar
 
 import msgspec
+import psutil
 
 from contactverif.contract.errors import MisuseError
 from contactverif.run.keys import make_key, read_key, remove_key
@@ -250,21 +251,11 @@ def begin_journal(folder: Path, plan: msgspec.Struct, outputs: Iterable[Path], a
 
 def _remove_stale(folder: Path) -> None:
     """Remove what processes left behind that were killed while they made a journal of this name."""
-    name = re.compile(rf"\.{re.escape(folder.name)}\.(\d+)\.part")
+    name = re.compile(rf"\.{re.escape(folder.name)}\.(\d{{1,9}})\.part")
     for path in list(folder.parent.iterdir()):
         match = name.fullmatch(path.name)
-        if match and (int(match[1]) == os.getpid() or not _is_alive(int(match[1]))):
+        if match and (int(match[1]) == os.getpid() or not psutil.pid_exists(int(match[1]))):
             _discard(path)
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
 
 
 def keep_earlier(folder: Path, outputs: Iterable[Path]) -> None:

@@ -7,17 +7,16 @@ stores. An outcome is made of them again when it is read.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from math import sqrt
-from typing import overload
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import OF_TRAITS, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
@@ -34,25 +33,6 @@ WHOLE = 100  # The first outcomes of a row that stay as they are.
 FAILURES = 100  # The failures behind them that stay as they are.
 SHRINK_ENDS = 8  # A case that ends the process of the plugin is made smaller until it has ended so often.
 CLEAR_RATIO = 1000.0  # A shrunk case need not fail by more than this many tolerances.
-
-
-class Outcomes(Sequence[Outcome]):
-    """The outcomes of a row in order, each made when somebody asks for it."""
-
-    @abstractmethod
-    def at(self, number: int) -> Outcome:
-        """Return an outcome by its number, from 0."""
-
-    @overload
-    def __getitem__(self, number: int) -> Outcome: ...
-    @overload
-    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
-    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
-        if isinstance(number, slice):
-            return tuple(self.at(n) for n in range(*number.indices(len(self))))
-        if not -len(self) <= number < len(self):
-            raise IndexError(number)
-        return self.at(number % len(self))
 
 
 class OutcomeStore(Outcomes):

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
+
 from contactverif.contract.errors import MisuseError
 
 _LARGE = 2**26  # The size of a large file, in bytes.
@@ -93,21 +95,11 @@ def _part(target: Path) -> Path:
 
 def _remove_stale(target: Path) -> None:
     """Remove the temporary files of the same name that killed processes left behind."""
-    name = re.compile(rf"\.{re.escape(target.name)}\.(\d+)\.part")
+    name = re.compile(rf"\.{re.escape(target.name)}\.(\d{{1,9}})\.part")
     for entry in target.parent.iterdir():
         match = name.fullmatch(entry.name)
-        if match and not _alive(int(match[1])):
+        if match and not psutil.pid_exists(int(match[1])):
             entry.unlink(missing_ok=True)
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
 
 
 def _sync(path: Path) -> None:

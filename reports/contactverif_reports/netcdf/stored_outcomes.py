@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import LEAST_CONTACT, NONE_UNDECIDED, Outcome, PropertyInfo, Verdict
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group
@@ -157,7 +158,7 @@ class OutcomeArrays:
         return values.reshape(-1, *values.shape[len(self._dims) :])
 
 
-class StoredOutcomes(Sequence[Outcome]):
+class StoredOutcomes(Outcomes):
     """The outcomes of one row, in the order of the run.
 
     `first` is the flat number of the first, and `named` has the cases that the report stores whole, by their names.
@@ -172,16 +173,8 @@ class StoredOutcomes(Sequence[Outcome]):
     def __len__(self) -> int:
         return self._n_cases
 
-    @overload
-    def __getitem__(self, number: int) -> Outcome: ...
-    @overload
-    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
-    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
-        if isinstance(number, slice):
-            return tuple(self[n] for n in range(*number.indices(self._n_cases)))
-        if not -self._n_cases <= number < self._n_cases:
-            raise IndexError(number)
-        number %= self._n_cases
+    def at(self, number: int) -> Outcome:
+        """Return an outcome, with its case if the report stores that whole."""
         outcome = self._arrays.outcome(self._first + number, seconds=float(self._seconds[number]))
         assert outcome is not None
         case = self._named.get(outcome.summary.name)
