@@ -43,6 +43,7 @@ MODES = {
     "inline": ("--isolation", "inline"),
 }
 SECONDS = 300.0  # The longest run; one without a hostile plugin takes a few seconds.
+INLINE_SECONDS = 60.0  # The longest run in the process of the harness, where nothing ends a plugin that hangs.
 GROUP = 8  # Plugins of one run.
 ALONE = ("memory", "leaves", "says")  # Plugins of these kinds run alone.
 MEGABYTES = 4000  # The address space of a whole run, plugins included.
@@ -131,11 +132,11 @@ def questions(plugin: HostilePlugin) -> tuple[str, ...]:
     return PROPERTY, *sorted(str(name) for name in more)
 
 
-def verify(folder: Path, mode: str, properties: tuple[str, ...], *names: str) -> Finish:
+def verify(folder: Path, mode: str, properties: tuple[str, ...], *names: str, seconds: float = SECONDS) -> Finish:
     """Verify some formulations with few cases."""
     globs = [word for name in properties for word in ("-p", name)]
     sampling = ["--examples", str(EXAMPLES), "--seed", "1", "--jobs", "1"]
-    return run_command(folder, "verify", *names, *globs, *sampling, "--out", "report.nc", *MODES[mode])
+    return run_command(folder, "verify", *names, *globs, *sampling, "--out", "report.nc", *MODES[mode], seconds=seconds)
 
 
 def only(run: Run, formulation: str, name: str) -> Run:
@@ -220,16 +221,17 @@ def _status_is_right(plugin: HostilePlugin, run: Run, finish: Finish, alone: Run
 def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
     """Run some plugins in one run, between the others; return {plugin: cells of its line}."""
     properties = questions(plugins[0])
-    alone = reference(mode, properties)
+    alone, seconds = reference(mode, properties), INLINE_SECONDS if mode == "inline" else SECONDS
+    names = ("nts", *(plugin.name for plugin in plugins), "vts-ppt")
     with scratch() as folder:
-        finish = verify(folder, mode, properties, "nts", *(plugin.name for plugin in plugins), "vts-ppt")
+        finish = verify(folder, mode, properties, *names, seconds=seconds)
         run, remark = _read(finish)
         text = finish.output + finish.errors
         clean = len(text) < MOST_OUTPUT * len(plugins) and not CONTROL.search(text.replace(b"\r\n", b"\n"))
         ended = finish.status in (0, 1) and b"Traceback" not in finish.errors
         remarks = [remark] if remark else []
         if finish.status is None:
-            remarks.append(f"no end within {SECONDS:g} s")
+            remarks.append(f"no end within {seconds:g} s")
         if not ended:
             remarks.append(finish.errors.decode(errors="replace").strip()[-100:])
         lines = {}
