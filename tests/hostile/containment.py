@@ -136,7 +136,8 @@ def verify(folder: Path, mode: str, properties: tuple[str, ...], *names: str, se
     """Verify some formulations with few cases."""
     globs = [word for name in properties for word in ("-p", name)]
     sampling = ["--examples", str(EXAMPLES), "--seed", "1", "--jobs", "1"]
-    return run_command(folder, "verify", *names, *globs, *sampling, "--out", "report.nc", *MODES[mode], seconds=seconds)
+    options = (*globs, *sampling, "--keep-going", "--out", "report.nc", *MODES[mode])
+    return run_command(folder, "verify", *names, *options, seconds=seconds)
 
 
 def only(run: Run, formulation: str, name: str) -> Run:

@@ -1,5 +1,7 @@
 """The page of hostile plugins says what the tables say."""
 
+from catalogue import PLUGINS
+from containment import MODES
 from hostile_page import NOT_CONTAINED, PAGE, REACHES, is_whole, name_of, page, rows
 from tables import FOLDER
 
@@ -15,3 +17,8 @@ def test_all_hostile_plugins_in_a_box_are_contained_but_those_with_a_reason() ->
 def test_without_a_box_all_are_contained_but_those_that_were_written_against_it() -> None:
     others = {name_of(row) for row in rows("process") if not is_whole(row)}
     assert {name for name in others if not name.startswith(REACHES)} <= {"leaves-memory-file"}
+
+
+def test_every_plugin_was_run_in_every_way() -> None:
+    for mode in MODES:
+        assert {name_of(row) for row in rows(mode)} == set(PLUGINS)
