@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -52,7 +53,14 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never: a change of partner moves forces between nodes and leaves their sum as it is.
     """
     state = freeze_state(case, subject)
-    return _judge(FORCE_IMBALANCE, float(np.linalg.norm(state.forces.sum(axis=0))), 1.0, state, subject.traits)
+    total = state.forces.sum(axis=0)
+    measurement = _judge(FORCE_IMBALANCE, float(np.linalg.norm(total)), 1.0, state, subject.traits)
+    if measurement.numbers[0].ratio <= 1:
+        return measurement
+    slave = -state.forces[: state.case.interface.n_slave_nodes].sum(axis=0)
+    names = ("force on the master", "minus that on the slave")
+    place = "all nodes of a side together, x and y"
+    return replace(measurement, finding=Finding(place, tuple(-total - slave), tuple(-slave), "N", *names))
 
 
 @_define(id="balance.moment", quantities=(MOMENT_IMBALANCE,), promise=lambda traits: traits.promises.conserves_moment)

@@ -29,6 +29,7 @@ from contactverif.problems.flat_states import (
 from contactverif_properties.shared import uniform_pressure
 from contactverif_properties.shared.applicability import knows_total, may_act_twice
 from contactverif_properties.shared.roundoff import gap_tolerance, ratio, rounding_distance, stated_gap_quantity
+from contactverif_properties.shared.worst_force import worst_force
 
 TOTAL = stated_gap_quantity("error of the total force")
 NODAL = stated_gap_quantity("error of a nodal force")
@@ -57,13 +58,15 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     along, normal = case.parameters["direction"], uniform_pressure.normal_of(case)
     numbers = [ALONG.check(ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
-    broken = "" if push > 0 else "nothing pushes the slave out of the master"
+    broken, finding = "" if push > 0 else "nothing pushes the slave out of the master", None
     if knows_total(traits):
         numbers.append(TOTAL.check(abs(push / whole - 1), tolerance))
     if traits.promises.patch.flat is not False:
         forces, largest = uniform_pressure.forces_of_gap(case, subject, exact)
         numbers.append(NODAL.check(float(np.linalg.norm(forces - exact, axis=1).max()) / whole, tolerance * largest))
-    return Measurement(numbers, broken=broken)
+        if numbers[-1].ratio > 1:
+            finding = worst_force(case.interface, forces, exact)
+    return Measurement(numbers, broken=broken, finding=finding)
 
 
 def exact_forces(case: Case) -> FloatArray:

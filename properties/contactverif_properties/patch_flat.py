@@ -28,6 +28,7 @@ from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, gap_quantity, gap_tolerance
 from contactverif_properties.shared.solved_patch import point_errors
+from contactverif_properties.shared.worst_force import total_force, worst_force
 
 FORCE = gap_quantity("error of a nodal force")
 TOTAL = gap_quantity("error of the total force")
@@ -72,7 +73,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
     """
-    return Measurement([FORCE.check(*uniform_pressure.transmission_error(case, subject))])
+    return uniform_pressure.measure_transmission(FORCE, case, subject)
 
 
 def refuse_unknown_total(traits: Traits) -> str:
@@ -118,13 +119,15 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     exact = uniform_pressure.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.rules.area == "reference":
         exact = exact * stretch
-    error = float(np.linalg.norm(uniform_pressure.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0) - exact))
+    total = uniform_pressure.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
+    error = float(np.linalg.norm(total - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
     undecided = ""
     if value > tolerance:
         rounding = COORDINATE_ROUNDING * case.largest_coordinate
         undecided = explain_by_kink(state, rounding, {"forces": error})
-    return Measurement([TOTAL.check(value, tolerance)], undecided)
+    finding = total_force(total, exact) if value > tolerance else None
+    return Measurement([TOTAL.check(value, tolerance)], undecided, finding=finding)
 
 
 def promise_single(traits: Traits) -> bool | None:
@@ -149,7 +152,8 @@ def measure_class(case: Case, subject: Subject) -> Measurement:
 
 def _measure_once(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
-    numbers = [FORCE.check(*uniform_pressure.transmission_error(case, subject))]
+    transmission = uniform_pressure.measure_transmission(FORCE, case, subject)
+    numbers = [*transmission.numbers]
     state = uniform_pressure.uniform_state(case, subject)
     if state.has_points:
         tolerance = gap_tolerance(case, case.parameter("penetration"))
@@ -157,7 +161,7 @@ def _measure_once(case: Case, subject: Subject) -> Measurement:
         numbers.append(GAP.check(gap, tolerance))
         if subject.traits.rules.penalty != "nodal":  # A nodal formulation knows forces only.
             numbers.append(PRESSURE.check(pressure, tolerance))
-    return Measurement(numbers)
+    return Measurement(numbers, finding=transmission.finding)
 
 
 def _is_within(measurement: Measurement, factor: float) -> bool:
@@ -299,7 +303,8 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
         values[GAP] = point_errors(state, case.penalty, case.penalty * depth)[0]
         if not unbiased:
             values[REPORTED_FORCE] = point_errors(state, case.penalty, spring)[1]
-    return Measurement(check_all(values, tolerance))
+    finding = worst_force(interface, forces, exact) if values[FORCE] > tolerance else None
+    return Measurement(check_all(values, tolerance), finding=finding)
 
 
 @_define(
@@ -335,7 +340,9 @@ def patch_flat_published(case: Case, subject: Subject) -> Measurement:
         return Measurement(idle=True)
     n_slave, forces = case.interface.n_slave_nodes, _forces_of_unit(case, subject)
     error = float(np.linalg.norm(forces - stated, axis=1).max() / np.abs(stated[:n_slave]).sum())
-    return Measurement([STATED.check(error, gap_tolerance(case, case.parameter("penetration")))])
+    number = STATED.check(error, gap_tolerance(case, case.parameter("penetration")))
+    finding = worst_force(case.interface, forces, stated) if number.ratio > 1 else None
+    return Measurement([number], finding=finding)
 
 
 def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:

@@ -19,6 +19,7 @@ from contactverif_properties.shared import linear_gaps, roundoff
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.same_answer import Carry, compare, same_answer_quantities
+from contactverif_properties.shared.worst_force import worst_force
 
 OFF_NORMAL = roundoff.stated_gap_quantity("part of the force off the normal")
 TOTAL = roundoff.stated_gap_quantity("error of the total force")
@@ -140,7 +141,9 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
     """
     exact, forces = linear_gaps.exact_slave_forces(case, subject.traits), linear_gaps.slave_forces(case, subject)
     error = float(np.linalg.norm(forces - exact, axis=1).max()) / float(np.linalg.norm(exact.sum(axis=0)))
-    return Measurement([NODAL.check(error, _tolerance(case, subject.traits))], idle=not forces.any())
+    number = NODAL.check(error, _tolerance(case, subject.traits))
+    finding = worst_force(case.interface, forces, exact) if number.ratio > 1 else None
+    return Measurement([number], idle=not forces.any(), finding=finding)
 
 
 @Property.define(

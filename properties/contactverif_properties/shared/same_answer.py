@@ -21,6 +21,7 @@ from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import ask_forces_and_tangents
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
+from contactverif_properties.shared.worst_force import worst_force
 
 TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
 SHARE = 0.1875  # A uniform multiplier over the shortest segment, with c = 1: as large as a penetration would be.
@@ -116,8 +117,13 @@ def compare(
     if explain and not undecided and any(number.value > number.tolerance for number in numbers):
         # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
         undecided = _find_tie(first) or _find_tie(second)
+    finding = None
+    if numbers[0].ratio > 1:
+        back = forces_there[carry.nodes] @ carry.matrix
+        finding = worst_force(case.interface, back, forces, ("force in the second state", "in the first"))
     details = {BITS: float(sum(np.count_nonzero(each.change) for each in changes))}
-    return Measurement(numbers, undecided, details=details, idle=not (forces.any() or forces_there.any()))
+    idle = not (forces.any() or forces_there.any())
+    return Measurement(numbers, undecided, details=details, idle=idle, finding=finding)
 
 
 def _find_tie(state: FrozenState) -> str:

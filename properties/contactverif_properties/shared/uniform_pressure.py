@@ -9,6 +9,7 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.scene import Scene
@@ -16,6 +17,7 @@ from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import gap_tolerance
+from contactverif_properties.shared.worst_force import worst_force
 
 
 def normal_of(case: Case) -> FloatArray:
@@ -82,16 +84,17 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
     return nodal * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0), 1.0
 
 
-def transmission_error(case: Case, subject: Subject) -> tuple[float, float]:
-    """Return the largest |F − F_exact| of a uniform penetration over the force on the slave, and its tolerance.
+def measure_transmission(quantity: Quantity, case: Case, subject: Subject) -> Measurement:
+    """Measure the largest |F − F_exact| of a uniform penetration over the force on the slave.
 
-    Both are dimensionless. The tolerance is `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
+    The tolerance is `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
     """
     exact = forces_of_penetration(case)
     size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
     forces, largest = forces_of_gap(case, subject, exact)
     error = float(np.linalg.norm(forces - exact, axis=1).max())
-    return error / size, gap_tolerance(case, case.parameter("penetration")) * largest
+    number = quantity.check(error / size, gap_tolerance(case, case.parameter("penetration")) * largest)
+    return Measurement([number], finding=worst_force(case.interface, forces, exact) if number.ratio > 1 else None)
 
 
 def unit_forces(state: FrozenState) -> FloatArray:

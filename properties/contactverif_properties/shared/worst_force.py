@@ -1,0 +1,59 @@
+"""The nodal force that is furthest from the exact one, for a person who looks for the mistake."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.interface import Interface
+from contactverif.contract.measurement import Finding
+
+_ASIDE = 2.0**-20  # The part of a force that may point aside by roundoff if both lie on one line.
+
+
+def worst_force(
+    interface: Interface, forces: FloatArray, exact: FloatArray, names: tuple[str, str] = ("force", "exact")
+) -> Finding:
+    """Return the force at the node where it errs most, beside the exact one.
+
+    Parameters
+    ----------
+    interface : Interface
+        The mesh.
+    forces, exact : FloatArray, shape (n, 2)
+        The forces that push all nodes, or those of the slave alone.
+    names : tuple[str, str]
+        The words for both.
+
+    Returns
+    -------
+    Finding
+        Two numbers if both forces lie on one line, counted along the exact one, with their ratio; else x and y of both.
+    """
+    node = int(np.linalg.norm(forces - exact, axis=1).argmax())
+    return _beside(describe_node(interface, node), forces[node], exact[node], names)
+
+
+def total_force(total: FloatArray, exact: FloatArray) -> Finding:
+    """Return the total force (2,) on the slave beside the exact one, as `worst_force` does for a node."""
+    return _beside("all slave nodes together", total, exact, ("force", "exact"))
+
+
+def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, str]) -> Finding:
+    """Return a force beside the one that is right: one number of each if they lie on one line."""
+    line = right if right.any() else force
+    direction = line / np.linalg.norm(line)
+    aside = abs(float(force[0] * direction[1] - force[1] * direction[0]))
+    if not aside <= _ASIDE * float(np.abs(np.stack([force, right])).max()):
+        return Finding(f"{place}, x and y", tuple(force), tuple(right), "N", *names)
+    along, size = float(force @ direction), float(right @ direction)
+    ratio = f"ratio {along / size:.4g}" if size else ""
+    return Finding(place, (along,), (size,), "N", *names, ratio)
+
+
+def describe_node(interface: Interface, node: int) -> str:
+    """Return a node in words: its side, its number, and whether the side ends there."""
+    on_slave = node < interface.n_slave_nodes
+    surface = interface.slave if on_slave else interface.master
+    ends = surface.segments[surface.neighbours < 0]
+    return f"{'slave' if on_slave else 'master'} node {node}{' (free end)' if node in ends else ''}"
