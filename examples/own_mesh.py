@@ -29,7 +29,7 @@ print(f"{len(interface.slave)} slave segments on {len(interface.master)} master 
 result = verify(
     [load_formulation("vts-me"), load_formulation("vts-ppt")],
     load_properties(["patch.flat.transmission", "balance.force"]),
-    interface=interface,
+    place=interface,
     examples=20,
     seed=1,
 )

@@ -35,6 +35,8 @@ def _failures(run: Run) -> Iterator[tuple[str, str, str]]:
     for name in run.opposite_signs:
         yield name, f"{name}: sign", OPPOSITE_SIGN
     for row in run.unexpected:
+        if row.omitted:
+            continue
         yield row.formulation, f"{row.formulation} {row.property_id}: {row.unexpected}", row.reason
 
 

@@ -97,8 +97,7 @@ def _sampling(run: Run, place: PlaceOptions) -> Sampling:
         examples, seed = (int(run.provenance[name]) for name in ("examples", "seed"))
     except (KeyError, ValueError):
         raise MisuseError("REPORT", "a report without its number of cases or its seed", "an undamaged report") from None
-    scene = place.make_scene()
-    return Sampling(examples, seed, place.read_interface() if scene is None else scene.interface, scene)
+    return Sampling.at(place.read(), examples, seed)
 
 
 def _show(run: Run, audit: Audit, derivable: list[str]) -> None:

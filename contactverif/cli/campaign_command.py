@@ -55,7 +55,11 @@ def campaign(
 
     piece = Shard.parse(shard)
     options = VerifyOptions(
-        tuple(select_names(names, False, isolation.limits())), tuple(properties or ()), sampling, isolation=isolation
+        tuple(select_names(names, False, isolation.limits())),
+        tuple(properties or ()),
+        sampling,
+        keep_going=True,
+        isolation=isolation,
     )
     job = new_job(options.with_settings(read_settings()), fresh_seed=_SEED, command=CAMPAIGN)
     plan = piece.plan(job.plan())

@@ -85,6 +85,7 @@ def compare(
         sampling,
         tuple(out or ()),
         pictures,
+        keep_going=True,
         place=place,
         workers=workers,
         isolation=isolation,

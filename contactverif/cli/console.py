@@ -31,6 +31,7 @@ STYLES = {  # Red only where the run fails by it. What a formulation states abou
     Result.WRONG_TRAITS: "red",
     Result.NOT_LOADED: "red",
     Result.NOT_JUDGED: "yellow",
+    Result.OMITTED: "yellow",
     Result.UNDECIDED: "yellow",
 }
 _Item = TypeVar("_Item")

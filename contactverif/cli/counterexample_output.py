@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 
 import typer
@@ -27,23 +29,27 @@ def failing_examples(run: Run) -> list[Counterexample]:
     return [example for example in counterexamples(run).values() if example.row.verdict in failures]
 
 
-def counterexample_text(example: Counterexample, report: Path | None) -> Text:
-    """Return numbers and drawing of a counterexample, and the line that replays it if there is a report."""
+def counterexample_text(example: Counterexample, report: Path | None, width: int = 10**4) -> Text:
+    """Return numbers and drawing of a counterexample, and the line that replays it if there is a report.
+
+    Words are folded to a width. A drawing and a command are not.
+    """
     row, outcome = example.row, example.outcome
-    return indent_below(
+    words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
+    text = indent_below(
         f"{row.formulation}, {row.property_id}: {row.result}, {example.label}",
-        *_numbers(row.info, outcome),
+        *chain.from_iterable(words),
         *as_text(outcome.case).splitlines(),
         *([] if report is None else [example.replay_command(str(report))]),
     )
+    text.no_wrap, text.overflow = True, "ignore"
+    return text
 
 
-def how_to_keep(run: Run) -> Text | None:
-    """Say how the drawn cases are stored, so that they can be replayed; None where none was drawn."""
-    if not failing_examples(run):
-        return None
+def how_to_keep(run: Run) -> str:
+    """Say how the cases that fail are stored, so that they can be replayed; empty where there is none."""
     seed = run.provenance.get("seed")
-    return Text(f"\nTo keep these cases and replay them, run the same command with --seed {seed} --out FILE.nc\n")
+    return f"to keep these cases: the same command with --seed {seed} --out FILE.nc" if failing_examples(run) else ""
 
 
 def replay_table(example: Counterexample, formulation: str, outcome: Outcome) -> Table:
@@ -110,11 +116,13 @@ def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
     if measurement is None:
         return [outcome.reason]
     lines = [measurement.broken] if measurement.broken else []
-    for number in checked_numbers(info, measurement):
-        mark, quantity = "✗" if number.ratio > 1 else "✓", number.quantity
-        lines.append(f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}")
     if measurement.finding is not None:
         lines.append(str(measurement.finding))
+    numbers = checked_numbers(info, measurement)
+    wrong = [number for number in numbers if number.ratio > 1]
+    for number in wrong or numbers:
+        mark, quantity = "✗" if wrong else "✓", number.quantity
+        lines.append(f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}")
     others = [_detail(name, value) for name, value in measurement.details.items() if not _is_ending(name)]
     return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])
 

@@ -12,7 +12,7 @@ import typer
 from contactverif.cli.audit_command import SHARE, Share, audit_report, check_share
 from contactverif.cli.campaign_command import CAMPAIGN
 from contactverif.cli.output_files import REPORT
-from contactverif.cli.shared_options import RESULT_FILES, SHRINK_HELP
+from contactverif.cli.shared_options import RESULT_FILES, SHRINK_HELP, ScreenOptions
 from contactverif.cli.verify_command import run_job
 from contactverif.cli.verify_job import new_job, options_of
 from contactverif.contract.errors import MisuseError
@@ -29,6 +29,8 @@ def merge(
         bool, typer.Option("--audit", help="Audit the report, as for shards that strangers computed.")
     ] = False,
     share: Share = SHARE,
+    *,
+    screen: ScreenOptions,
 ) -> None:
     """Make the report of a campaign: that of one verify with the same seed.
 
@@ -55,7 +57,7 @@ def merge(
     again = f"contactverif merge {shlex.quote(str(folder))} {files}{f' --shrink {shrink}' if shrink else ''}"
     if audit and REPORT not in job.files.names:
         raise MisuseError("--audit", "no report", f"--out FILE{REPORT} beside it")
-    status = run_job(replace(job, sources=journals, again=again))
+    status = run_job(replace(job, sources=journals, again=again), screen)
     if audit and job.files.paths[REPORT].exists():
         differs = audit_report(job.files.paths[REPORT], share, options.place, options.isolation)
         status = status or differs

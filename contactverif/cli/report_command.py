@@ -7,7 +7,7 @@ from typing import Annotated
 
 from contactverif.cli.output_files import REPORT, RUN_FILES, OutputFiles
 from contactverif.cli.run_files import run_writers
-from contactverif.cli.shared_options import ReportPath, output_option
+from contactverif.cli.shared_options import ReportPath, ScreenOptions, output_option
 
 
 def report(
@@ -15,8 +15,10 @@ def report(
     out: Annotated[
         list[Path] | None, output_option("Write FILE.html, a page; or FILE.json, FILE.xml (JUnit), FILE.sarif.")
     ] = None,
+    *,
+    screen: ScreenOptions,
 ) -> None:
-    """Show a stored report: its table here, or all of it as a page.
+    """Show a stored report: its results here, or all of it as a page.
 
     The page is one file without links to other files. It can be read on a
     phone and printed. Other programs read JSON, JUnit's XML and SARIF.
@@ -31,14 +33,16 @@ def report(
       contactverif report vts-ppt.nc --out vts-ppt.html --out vts-ppt.xml
     """
     from contactverif.cli.console import show
-    from contactverif.cli.run_tables import RunTable, summary
+    from contactverif.cli.run_tables import summary
+    from contactverif.cli.verify_command import show_run
     from contactverif_reports.netcdf.read import read_run
 
     files = OutputFiles.check(out, [suffix for suffix in RUN_FILES if suffix != REPORT])
     run = read_run(path)
     if not files.paths:
-        show(RunTable(run))
-        show(summary(run))
+        if not screen.quiet:
+            show_run(run, screen, path)
+        show(summary(run, quiet=screen.quiet))
         return
     writers = run_writers(run, path)
     for suffix, target in files.paths.items():

@@ -87,14 +87,14 @@ def end_run(
 def watch_for_stops(job: VerifyJob) -> Iterator[None]:
     """Open a block in which a job is judged. After Ctrl-C it shows what was judged; if a worker dies, how to go on."""
     from contactverif.cli.console import show
-    from contactverif.cli.run_tables import RunTable
+    from contactverif.cli.run_screen import RunScreen
     from contactverif.run.run import RunStopped
     from contactverif.run.scheduler import WorkerError
 
     try:
         yield
     except RunStopped as stop:
-        show(RunTable(stop.run))
+        show(RunScreen(stop.run))
         say_how_to_go_on(job)
         raise typer.Exit(STOPPED) from None
     except WorkerError:

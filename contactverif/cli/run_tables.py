@@ -17,7 +17,8 @@ from contactverif.cli.console import PLAIN_STYLE, STYLES, fold, line
 from contactverif.cli.coverage_tables import coverage_text
 from contactverif.contract.case_counts import whole_percent
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.result import BROKEN_BY_FAILING, OPPOSITE_SIGN, Result, Row, Run
+from contactverif.run.telling import by_telling
 
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 _COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
@@ -36,6 +37,7 @@ _MEANINGS = {  # The results that are explained below the table where they occur
     Result.WRONG_TRAITS: "a mistake in the traits: they state a failure, and name no case that shows it (a witness)",
     Result.UNDECIDED: "roundoff or a kink leaves open whether it passes; the reason stands beside it",
     Result.NOT_JUDGED: "fewer than 90 % of the planned cases could be decided, or too few were in contact",
+    Result.OMITTED: "an earlier property explains what all others would show; --keep-going asks them",
     Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
     Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
 }
@@ -45,8 +47,10 @@ _COUNTED = {  # {result: (words for one, words for several)} in the last line
     Result.CRASHED: ("crash", "crashes"),
     Result.WRONG_TRAITS: ("mistake in the traits", "mistakes in the traits"),
     Result.NOT_JUDGED: ("property not judged", "properties not judged"),
+    Result.OMITTED: ("property not asked", "properties not asked"),
     Result.NOT_LOADED: ("plugin not loaded", "plugins not loaded"),
 }
+_MOST_SUMMED_UP = 3  # Rows of one result that the last line names.
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +86,10 @@ def headline(provenance: Mapping[str, str]) -> str:
     return f"profile {profile}: {examples} random cases for each property, seed {seed}"
 
 
-def summary(run: Run) -> Text:
+def summary(run: Run, *, quiet: bool = False) -> Text:
     """Say in the last lines whether every promise is kept, and how many there are, or what is wrong."""
     if run.promises_kept:
-        return Text(f"{run.praise}\n{run.promises}", style="green")
+        return Text(run.praise if quiet else f"{run.praise}\n{run.promises}", style="green")
     signs = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
     return conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
 
@@ -94,15 +98,18 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequ
     """Sum up rows and plugins that did not load, behind sentences about whole formulations."""
     sentences = list(accusations)
     for result, (singular, plural) in _COUNTED.items():
-        names = [_name(row) for row in rows if row.result is result and row.unexpected]
+        names = [_name(row) for row in by_telling(rows) if row.result is result and row.unexpected]
         names += not_loaded if result is Result.NOT_LOADED else []
         if names:
-            sentences.append(f"{len(names)} {singular if len(names) == 1 else plural}: {'; '.join(names)}.")
+            named = f": {_list(names, _MOST_SUMMED_UP)}" if result is not Result.OMITTED else ""
+            sentences.append(f"{len(names)} {singular if len(names) == 1 else plural}{named}.")
     return Text(" ".join(sentences) or "Nothing was checked.", style="red")
 
 
 def _name(row: Row) -> str:
-    reason = f" ({row.unexpected})" if row.result is Result.BROKEN_PROMISE else ""
+    reason = (
+        f" ({row.unexpected})" if row.unexpected != BROKEN_BY_FAILING and row.result is Result.BROKEN_PROMISE else ""
+    )
     return f"{row.formulation} {row.property_id}{reason}"
 
 
@@ -123,7 +130,7 @@ def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:
             yield Text(row.formulation, style="bold")
         previous = row.formulation
         columns = space + _align(cells, widths, space)
-        remark = _remark(row)
+        remark = remark_of(row)
         options = ("; ".join(text for text in (remark, _quantity(row)) if text), remark)
         behind = next((text for text in options if len(columns) + 2 + len(text) <= max_width), "")
         text = line(f"{columns}  {behind}".rstrip())
@@ -160,7 +167,7 @@ def _quantity(row: Row) -> str:
     return " in ".join(text for text in (quantity, row.closest_name) if text)
 
 
-def _remark(row: Row) -> str:
+def remark_of(row: Row) -> str:
     """Return what a reader should know besides the result."""
     parts = [
         row.unexpected if row.result is Result.BROKEN_PROMISE else "",
@@ -170,24 +177,23 @@ def _remark(row: Row) -> str:
         f"{row.undecided} undecided" if row.undecided else "",
         f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",
         row.suspicion,
-        _finding(row) if row.verdict is Verdict.PASS else "",
+        finding_of(row),
     ]
     return "; ".join(part for part in parts if part)
 
 
-def _finding(row: Row) -> str:
+def finding_of(row: Row) -> str:
     """Return the sentence that a property says of the case with the closest number although it passes."""
-    if row.closest is None or row.closest.case is None:
+    if row.verdict is not Verdict.PASS or row.closest is None or row.closest.case is None:
         return ""
     measurement = row.outcomes[row.closest.case].measurement
     finding = measurement.finding if measurement is not None else None
     return "" if finding is None or finding.found else str(finding)
 
 
-def _list(names: Sequence[str]) -> str:
-    """Return the first names of a finite list of cases, and how many more there are."""
-    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return "; ".join(names[:_MOST_NAMES]) + more
+def _list(names: Sequence[str], most: int = _MOST_NAMES) -> str:
+    """Return the first names of a list, and how many more there are."""
+    return "; ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _align(cells: Sequence[str], widths: Sequence[int], space: str) -> str:

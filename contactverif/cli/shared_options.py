@@ -13,7 +13,7 @@ import typing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -24,14 +24,21 @@ if TYPE_CHECKING:
     from contactverif.contract.case import Case
     from contactverif.contract.interface import Interface
 
+ShowOption = Literal["first", "all"]
+
 PROFILE_HELP = (
     "dev: 100 cases of each property, new ones in every run. ci: 100 cases, always the same. "
     "nightly: 2000 cases, new ones in every run. (default: dev)"
 )
 
 SHRINK_HELP = (
-    "The failures whose mesh is made as small as it goes. new: those that neither the formulation nor --known states; "
-    "the others show a witness, or the first case that clearly fails. (default: new)"
+    "The failures whose mesh is made as small as it goes. one: the most telling one of each formulation; new: those "
+    "that neither the formulation nor --known states; the others show a witness, or the first case that clearly fails. "
+    "(default: one)"
+)
+KEEP_GOING_HELP = (
+    "Ask all properties, even if the first show an opposite sign, a crash, a breach of the contract, or answers that "
+    "depend on earlier calls."
 )
 JOBS_HELP = (
     "Number of processes that share the work; the results are the same. "
@@ -106,6 +113,31 @@ class SamplingOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class FailureOptions:
+    """The failures that count, and what the others of a formulation are worth once one is found."""
+
+    known: Annotated[
+        list[str] | None,
+        typer.Option("--known", help="A known failure, with its reason. Repeatable.", metavar="ID=REASON"),
+    ] = None
+    keep_going: Annotated[bool, typer.Option("--keep-going", help=KEEP_GOING_HELP)] = False
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenOptions:
+    """The parts of the results that are printed."""
+
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Show every row, every counterexample, and what the cases were worth."),
+    ] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show the last line alone.")] = False
+    show: Annotated[
+        ShowOption, typer.Option(help="The counterexamples that are drawn: the most telling one, or all.")
+    ] = "first"
+
+
+@dataclass(frozen=True, slots=True)
 class WorkerOptions:
     """The number of processes that share the work of a run."""
 
@@ -133,6 +165,10 @@ class PlaceOptions:
     scene: Annotated[
         str | None, typer.Option(help="Check on this scene: c or c:refine=2,penalty=1e4.", metavar="NAME[:OPTIONS]")
     ] = None
+
+    def read(self) -> Interface | Case | None:
+        """Return the interface of the mesh, or the scene; None for random ones."""
+        return self.make_scene() or self.read_interface()
 
     def read_interface(self) -> Interface | None:
         """Return the interface of the mesh, None without a mesh."""

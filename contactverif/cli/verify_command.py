@@ -13,7 +13,7 @@ import typer
 
 from contactverif.cli.annotations import annotate
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import REPORT, OutputFiles, PictureFolder
+from contactverif.cli.output_files import REPORT, PictureFolder
 from contactverif.cli.run_endings import (
     End,
     end_run,
@@ -27,10 +27,12 @@ from contactverif.cli.run_files import run_writers
 from contactverif.cli.settings import read_settings
 from contactverif.cli.shared_options import (
     RESULT_FILES,
+    FailureOptions,
     FormulationNames,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
+    ScreenOptions,
     WorkerOptions,
 )
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, resumed_job
@@ -52,18 +54,19 @@ def verify(
     pictures: Annotated[
         Path | None, typer.Option(help="Draw each counterexample into this folder.", metavar="FOLDER")
     ] = None,
-    known: Annotated[
-        list[str] | None,
-        typer.Option("--known", help="A known failure, with its reason. Repeatable.", metavar="ID=REASON"),
-    ] = None,
+    failures: FailureOptions,
     place: PlaceOptions,
     workers: WorkerOptions,
     isolation: IsolationOptions,
+    screen: ScreenOptions,
     resume: Annotated[
         Path | None, typer.Option(help="Go on with the run that was to write FILE and was stopped.", metavar="FILE")
     ] = None,
 ) -> None:
-    """Check every property of a formulation: print a table, draw what fails.
+    """Check every property of a formulation, and draw what fails.
+
+    What is wrong comes first, then what is kept, in few lines. Progress goes
+    to standard error.
 
     With --out, every outcome goes to the folder FILE.journal as soon as it is
     there, and --resume FILE goes on with a run that was stopped or killed.
@@ -90,7 +93,8 @@ def verify(
         sampling,
         tuple(out or ()),
         pictures,
-        tuple(known or ()),
+        tuple(failures.known or ()),
+        failures.keep_going,
         place,
         workers,
         isolation,
@@ -100,10 +104,10 @@ def verify(
     else:
         selected = tuple(select_names(names or [], all_, isolation.limits()))
         job = new_job(replace(typed, names=selected).with_settings(read_settings()))
-    raise typer.Exit(run_job(job))
+    raise typer.Exit(run_job(job, screen))
 
 
-def run_job(job: VerifyJob) -> int:
+def run_job(job: VerifyJob, screen: ScreenOptions) -> int:
     """Judge what a job says, show the tables and write the files; return the exit status."""
     from contactverif.cli.progress import Bar
     from contactverif.run.rows import find_gap
@@ -120,45 +124,62 @@ def run_job(job: VerifyJob) -> int:
         end = end_run(
             job, journal, gap, run_writers(result, job.files.names.get(REPORT)), promises_kept=result.promises_kept
         )
-    _show_results(result, plugins, end, job.pictures)
+    _show_results(result, plugins, end, job.pictures, screen)
     if not end.complete:
         say_how_to_go_on(job)
     return end.status
 
 
-def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder | None) -> None:
-    """Show the table, the counterexamples, the names of the files, and the last line."""
+def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder | None, screen: ScreenOptions) -> None:
+    """Show the results, the names of the files, and the last line; draw the pictures."""
     from contactverif.cli.console import show
     from contactverif.cli.counterexample_output import how_to_keep
-    from contactverif.cli.run_tables import RunTable, summary
+    from contactverif.cli.run_tables import summary
 
-    show(RunTable(result))
-    if remark := result.provenance.get("drawing"):
-        show(f"{remark}.")
-    say_how_many_are_unproven(result)
-    _show_counterexamples(result, plugins, end.files, folder)
+    pictures = _draw_pictures(result, plugins, folder)
     show_what_plugins_printed()
-    end.files.announce()
-    if REPORT not in end.files.names and (advice := how_to_keep(result)) is not None:
-        show(advice)
     annotate(result)
-    show(f"Not complete: {end.gap}." if end.gap else summary(result))
-    say_where_plugins_ran(result.provenance)
+    if not screen.quiet:
+        show_run(result, screen, end.files.names.get(REPORT))
+        if remark := result.provenance.get("drawing"):
+            show(f"{remark}.")
+        say_how_many_are_unproven(result)
+        if folder is not None:
+            show(f"pictures of {pictures} counterexamples: {folder.name}")
+        end.files.announce()
+        if REPORT not in end.files.names and not result.promises_kept and (advice := how_to_keep(result)):
+            show(advice)
+    show(f"Not complete: {end.gap}." if end.gap else summary(result, quiet=screen.quiet))
+    if not screen.quiet:
+        say_where_plugins_ran(result.provenance)
 
 
-def _show_counterexamples(result: Run, plugins: Plugins, files: OutputFiles, folder: PictureFolder | None) -> None:
-    """Print a mesh of each failure, and draw it if the user named a folder."""
-    from contactverif.cli.console import say, show_as_it_is
-    from contactverif.cli.counterexample_output import counterexample_text, draw_outcome, failing_examples
+def show_run(result: Run, screen: ScreenOptions, report: Path | None) -> None:
+    """Show a run as the user wants it: its few telling lines, or every row, and counterexamples."""
+    from contactverif.cli.console import show, show_as_it_is
+    from contactverif.cli.counterexample_output import counterexample_text, failing_examples
+    from contactverif.cli.run_screen import RunScreen
+    from contactverif.cli.run_tables import RunTable
+
+    show(RunTable(result) if screen.verbose else RunScreen(result, report))
+    if screen.verbose or screen.show == "all":
+        for example in failing_examples(result):
+            show_as_it_is(counterexample_text(example, report))
+
+
+def _draw_pictures(result: Run, plugins: Plugins, folder: PictureFolder | None) -> int:
+    """Draw a picture of each counterexample, if the user named a folder; return how many there are."""
+    if folder is None:
+        return 0
+    from contactverif.cli.counterexample_output import draw_outcome, failing_examples
     from contactverif.contract.counterexample import case_id
 
-    for example in failing_examples(result):
-        show_as_it_is(counterexample_text(example, files.names.get(REPORT)))
-        if folder is not None:
-            subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
-            name = f"{case_id(subject.name, question.id)}.png"
-            draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
-            say(f"    picture: {folder.name / name}")
+    examples = failing_examples(result)
+    for example in examples:
+        subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
+        name = f"{case_id(subject.name, question.id)}.png"
+        draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
+    return len(examples)
 
 
 def select_names(names: list[str], every: bool, limits: Limits | None = None) -> list[str]:

@@ -48,6 +48,7 @@ class VerifyOptions:
     out: tuple[Path, ...] = ()
     pictures: Path | None = None
     known: tuple[str, ...] = ()
+    keep_going: bool = False
     place: PlaceOptions = field(default_factory=PlaceOptions)
     workers: WorkerOptions = field(default_factory=WorkerOptions)
     isolation: IsolationOptions = field(default_factory=IsolationOptions)
@@ -99,8 +100,7 @@ class VerifyJob:
     profile: Profile
     files: OutputFiles
     pictures: PictureFolder | None
-    scene: Case | None  # The scene on which everything is checked.
-    interface: Interface | None  # The interface on which everything is checked.
+    place: Interface | Case | None  # The interface or scene on which everything is checked; None for random ones.
     known: dict[str, str]  # {property: reason} of the known failures.
     sources: tuple[Path, ...] = ()  # The journals whose outcomes are not judged again.
     resumes: bool = False  # The run goes on with its own journal.
@@ -127,10 +127,10 @@ class VerifyJob:
         """Return the options of a run, those of `contactverif.run.run.run`, and others beside them."""
         return others | {
             "profile": self.profile,
-            "interface": self.interface,
-            "scene": self.scene,
+            "place": self.place,
             "known": self.known,
-            "shrink": self.options.sampling.shrink or "new",
+            "keep_going": self.options.keep_going,
+            "shrink": self.options.sampling.shrink or "one",
         }
 
     @property
@@ -145,8 +145,7 @@ class VerifyJob:
         from contactverif.run.draw import Sampling
 
         assert self.profile.seed is not None
-        place = self.interface if self.scene is None else self.scene.interface
-        return Sampling(self.profile.examples, self.profile.seed, place, self.scene)
+        return Sampling.at(self.place, self.profile.examples, self.profile.seed)
 
     @property
     def output(self) -> Path | None:
@@ -238,9 +237,8 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
         isolation=options.isolation.settle(),
         sampling=replace(sampling, examples=profile.examples, seed=profile.seed, profile=profile.name),
     )
-    scene = options.place.make_scene()
-    interface = options.place.read_interface()
-    return VerifyJob(settled, profile, files, folder, scene, interface, _known_failures(options.known), command=command)
+    known = _known_failures(options.known)
+    return VerifyJob(settled, profile, files, folder, options.place.read(), known, command=command)
 
 
 def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> VerifyJob:
@@ -307,7 +305,7 @@ def _check_alone(typed: VerifyOptions) -> None:
     """Refuse other options beside `--resume`: the journal has them all."""
     defaults = VerifyOptions()
     for name in (entry.name for entry in fields(VerifyOptions)):
-        if name != "workers" and getattr(typed, name) != getattr(defaults, name):
+        if name not in ("workers", "keep_going") and getattr(typed, name) != getattr(defaults, name):
             needed = "--jobs at most: all other options come from the journal"
             raise MisuseError("--resume", f"{name} beside it", needed)
 

@@ -32,6 +32,7 @@ JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what
 BROKEN_BY_FAILING = "promised to pass, but fails"
 BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"
+OMITTED = "not asked: "  # The beginning of the reason of a row that another row made pointless.
 WRONG_TRAITS = "wrong traits"
 OF_TRAITS = "traits: "  # The beginning of the reason of a row whose traits name no witness that can be judged.
 OPPOSITE_SIGN = (
@@ -51,6 +52,7 @@ class Result(StrEnum):
     WRONG_TRAITS = "wrong traits"
     UNDECIDED = "undecided"
     NOT_JUDGED = "not judged"
+    OMITTED = "not asked"
     NOT_APPLICABLE = "not applicable"
     NOT_PROVIDED = "not provided"
     NOT_LOADED = "not loaded"
@@ -251,6 +253,11 @@ class Row:
         return self.verdict is Verdict.CRASHED and self.reason.startswith(OF_TRAITS)
 
     @property
+    def omitted(self) -> bool:
+        """Return whether the row was left out, since an earlier one had shown a mistake that explains all others."""
+        return self.verdict is Verdict.NOT_JUDGED and self.reason.startswith(OMITTED)
+
+    @property
     def unexpected(self) -> str:
         """The reason why this row makes the run fail; empty if it does not."""
         match self.verdict:
@@ -276,6 +283,8 @@ class Row:
         failed = self.verdict in (Verdict.FAIL, Verdict.CRASHED)
         if failed and not self.unexpected and (self.promise is False or self.known):
             return Result.FAILS_AS_STATED
+        if self.omitted:
+            return Result.OMITTED
         return Result.WRONG_TRAITS if self.traits_are_wrong else Result[self.verdict.name]
 
 

@@ -11,7 +11,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample, Origin, counterexamples
 from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
-from contactverif.contract.result import Row, Run
+from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.run import draw
 from contactverif.run.draw import Sampling
@@ -144,7 +144,12 @@ def _open_rows(
     source_of = {question.id: sampling.source(question) for question in questions}
     return [
         open_row(
-            subject_of[row.formulation], question_of[row.property_id], source_of[row.property_id], row.known, sampling
+            subject_of[row.formulation],
+            question_of[row.property_id],
+            source_of[row.property_id],
+            row.known,
+            sampling,
+            row.reason.removeprefix(OMITTED) if row.omitted else "",
         )
         for row in run.rows
     ]

@@ -51,6 +51,13 @@ class Sampling:
     interface: Interface | None = None  # The interface on which everything is checked; None for random ones.
     scene: Case | None = None  # The scene on which bodies are checked; None for random ones.
 
+    @classmethod
+    def at(cls, place: Interface | Case | None, examples: int, seed: int) -> Sampling:
+        """Return the sampling on an interface, on a scene, or on random ones."""
+        if isinstance(place, Case):
+            return cls(examples, seed, place.interface, place)
+        return cls(examples, seed, place)
+
     def source(self, question: Property) -> CaseSource | None:
         """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
         if question.bodies and self.interface is not None and self.scene is None:

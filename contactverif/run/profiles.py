@@ -14,7 +14,7 @@ from contactverif.contract.names import unknown_name_error
 
 MOST_EXAMPLES = 10**9
 # The failures that are shrunk: those that nobody stated, all, or none. The others show a witness or the first case.
-Shrink = Literal["new", "all", "none"]
+Shrink = Literal["one", "new", "all", "none"]  # The failures that are shrunk.
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.result import OF_TRAITS, NotLoaded, Row, Run
+from contactverif.contract.result import OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.isolation.remote_formulation import count_ends
 from contactverif.problems.named_states import named_case
@@ -233,9 +233,17 @@ def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdic
 
 
 def open_row(
-    subject: Subject, question: Property, source: CaseSource | None, known: str, sampling: Sampling
+    subject: Subject,
+    question: Property,
+    source: CaseSource | None,
+    known: str,
+    sampling: Sampling,
+    stopped: str = "",
 ) -> OpenRow | Row:
-    """Return a row whose cases are to be judged, or the row itself if there is nothing to judge."""
+    """Return a row whose cases are to be judged, or the row itself if there is nothing to judge.
+
+    `stopped` says why the formulation is asked nothing more; it is empty if all is asked.
+    """
     promise = question.promise(subject.traits)
     row = Row(formulation=subject.name, info=question.info, verdict=Verdict.PASS, promise=promise, known=known)
     if reason := question.refusal(subject.traits):
@@ -247,6 +255,8 @@ def open_row(
         )
     if source is None:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")
+    if stopped:
+        return replace(row, verdict=Verdict.NOT_JUDGED, reason=f"{OMITTED}{stopped}")
     # The formulation fails on some scene, not on every one, and where it reports what shows it.
     if promise is False and (sampling.scene is not None or question.shown_by - subject.provides):
         row = replace(row, promise=None)

@@ -38,13 +38,13 @@ def run(
     profile: Profile | str = "dev",
     examples: int | None = None,
     seed: int | None = None,
-    interface: Interface | None = None,
-    scene: Case | None = None,
+    place: Interface | Case | None = None,
     known: Mapping[str, str] | None = None,
     shrink: Shrink = "new",
     progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
     journal: Journal | None = None,
+    keep_going: bool = True,
 ) -> Run:
     """Check every property of every formulation.
 
@@ -58,16 +58,16 @@ def run(
         The numbers of cases and the seed.
     examples, seed : int | None
         Numbers that overrule those of the profile.
-    interface : Interface | None
-        Check everything on this interface, with random states, instead of on random interfaces.
-    scene : Case | None
-        Check what needs bodies on this scene alone, and all else on its interface. A pass there breaks no statement
-        that the formulation fails.
+    place : Interface | Case | None
+        Check everything on this interface, with random states, instead of on random interfaces. Of a scene, check what
+        needs bodies on it alone, and all else on its interface; a pass there breaks no statement that the formulation
+        fails.
     known : Mapping[str, str] | None
         {property id: reason why its failure is known}.
     shrink : Shrink
-        The failures that are shrunk: `"new"` those that neither the formulation nor `known` states, `"all"` or
-        `"none"`. One that is not shrunk shows the witness, or the first case that clearly fails.
+        The failures that are shrunk: `"new"` those that neither the formulation nor `known` states, `"one"` the most
+        telling one of each formulation, `"all"` or `"none"`. One that is not shrunk shows the witness, or the first
+        case that clearly fails.
     progress : Callable[[Progress], None] | None
         A function that is called after every case; with an executor, after every job. It gets each row as soon as
         its cases are judged, those of cheap properties first.
@@ -77,6 +77,10 @@ def run(
         process does all.
     journal : Journal | None
         The journal, in which every outcome is noted, and whose outcomes are not judged again.
+    keep_going : bool
+        Ask all properties of a formulation, whatever the first of them show. Else a formulation is asked nothing more
+        once its forces have the opposite sign, or it crashes, breaks the contract or is impure in the cases of
+        `purity`.
 
     Returns
     -------
@@ -95,13 +99,13 @@ def run(
     known = known or {}
     check_known(known, properties)
     if shrink not in get_args(Shrink):
-        raise MisuseError("shrink", repr(shrink), "new, all or none")
+        raise MisuseError("shrink", repr(shrink), "one, new, all or none")
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
     scheduler, journal = Scheduler(executor, progress), journal or Journal()
     loaded, questions = _of_kind(Subject, subjects), _of_kind(Property, properties)
-    sampling = Sampling(resolved.examples, resolved.seed, interface if scene is None else scene.interface, scene)
-    jobs = RunJobs(loaded, questions, sampling, journal, scheduler.report, known, shrink=shrink)
+    sampling = Sampling.at(place, resolved.examples, resolved.seed)
+    jobs = RunJobs(loaded, questions, sampling, journal, scheduler.report, known, shrink=shrink, keep_going=keep_going)
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
     with closing(journal):
         try:

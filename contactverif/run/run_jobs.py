@@ -1,9 +1,10 @@
 """The jobs of a run, in the order in which they are handed out.
 
-Each formulation is called once before anything else. Then the cases of a strategy are drawn, once for all formulations
-and all properties that have this strategy, they are judged, and what failed is shrunk. Properties that solve bodies
-come last. All planned cases of a row are judged before one is shrunk, so that a failure ends nothing early. What the
-journal knows is not judged again, and a block of which it knows all is not drawn.
+Each formulation is called once before anything else, and cheap and telling properties are asked first. The cases of a
+strategy are drawn, once for all formulations and all properties that have this strategy, they are judged, and what
+failed is shrunk. Properties that solve bodies come last. All planned cases of a row are judged before one is shrunk, so
+that a failure ends nothing early. What the journal knows is not judged again, and a block of which it knows all is not
+drawn.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.first_answers import FirstAnswers
-from contactverif.contract.property import Outcome, Property
+from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.isolation.remote_formulation import places
@@ -28,13 +29,17 @@ from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
 from contactverif.run.outcome_records import WITNESS, BlockRecord
 from contactverif.run.profiles import Shrink
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, judge_cases, open_row, shrink_case
+from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, Shrinking, judge_cases, open_row, shrink_case
 from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
+from contactverif.run.telling import most_telling
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
+# The properties that are asked first: cheap ones, of which one fails for most mistakes. What the very first shows
+# may explain all that others would.
+FIRST = ("purity", "unilateral", "scaling", "balance.force", "patch.flat.resultant", "tangent.sparsity")
 
 
 class RunJobs:
@@ -54,25 +59,47 @@ class RunJobs:
         known: Mapping[str, str],
         share: tuple[int, int] | None = None,
         shrink: Shrink = "new",
+        keep_going: bool = True,
     ) -> None:
         _check_once("formulation", map(attrgetter("name"), subjects))
         _check_once("property", map(attrgetter("id"), questions))
         self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
         self._questions, self._known = questions, known
-        self._share, self._shrink = share, shrink
+        self._share, self._shrink, self._keep_going = share, shrink, keep_going
         self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
         self._rows: dict[tuple[str, str], OpenRow | Row] = {}
         # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
         self._groups: dict[tuple[str, bool], list[Property]] = {}
-        for question in sorted(questions, key=attrgetter("bodies")):
+        for question in sorted(questions, key=_turn):
             self._groups.setdefault(sampling.group(question), []).append(question)
         self._opposite_signs: set[str] = set()
+        self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
 
     def work(self, scheduler: Scheduler) -> None:
         """Do all jobs; before anything is believed of a journal without a proof, a share of it is judged again."""
         scheduler.work(self.first_calls())  # Jobs that follow carry the first answers to other processes.
         look_at_journal(self._journal, self._subjects, self._questions, self._sampling, scheduler)
+        if not self._keep_going:
+            self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
+            # All jobs of these properties end before it is known who is asked more, so that it does not depend on time.
+            if any(question.id == FIRST[0] for question in self._questions):
+                scheduler.work(chain.from_iterable(self._parts_of_next()))
+            self._stop_wrong()
         scheduler.work(self)
+        if self._shrink == "one":
+            scheduler.work(self._shrink_most_telling())
+
+    def _stop_wrong(self) -> None:
+        """Note the formulations of which the first properties have shown what may explain every failure to come."""
+        for (name, property_id), row in self._rows.items():
+            if not isinstance(row, OpenRow) or not row.row.unexpected or name in self._stopped:
+                continue
+            if row.row.verdict is Verdict.CRASHED:
+                self._stopped[name] = f"the plugin crashes in {property_id}"
+            elif row.row.breach:
+                self._stopped[name] = f"the contract is broken in {property_id}"
+            elif property_id == FIRST[0] and row.row.verdict is Verdict.FAIL:
+                self._stopped[name] = f"{property_id} fails"
 
     def first_calls(self) -> Iterator[Job]:
         """Yield the jobs to call each formulation for the first time."""
@@ -147,7 +174,12 @@ class RunJobs:
             draw.check_names(source)
         rows = {
             (subject.name, question.id): open_row(
-                subject, question, source, self._known.get(question.id, ""), self._sampling
+                subject,
+                question,
+                source,
+                self._known.get(question.id, ""),
+                self._sampling,
+                self._stopped.get(subject.name, ""),
             )
             for subject, question in product(self._subjects, questions)
         }
@@ -158,19 +190,23 @@ class RunJobs:
     def _parts(self) -> Iterator[Iterable[Job]]:
         """Yield the jobs of each part; those of a part are made when they are wanted."""
         while self._groups:
-            group = self._open_next()
+            yield from self._parts_of_next()
+
+    def _parts_of_next(self) -> Iterator[Iterable[Job]]:
+        """Yield the parts of the next properties with the same cases."""
+        group = self._open_next()
+        for row in group:
+            if row.witness is not None and not row.witness_is_listed:
+                yield self._judge(row, CaseChunk([row.witness], WITNESS))
+        if not group:
+            return
+        if group[0].listed is not None:
             for row in group:
-                if row.witness is not None and not row.witness_is_listed:
-                    yield self._judge(row, CaseChunk([row.witness], WITNESS))
-            if not group:
-                continue
-            if group[0].listed is not None:
-                for row in group:
-                    yield from self._judge_list(row, group[0].listed)
-            elif self._share is None:
-                yield self._blocks(group, 0)
-            else:
-                yield from (self._blocks(group, n) for n in range(draw.number_of_blocks(self._sampling.examples)))
+                yield from self._judge_list(row, group[0].listed)
+        elif self._share is None:
+            yield self._blocks(group, 0)
+        else:
+            yield from (self._blocks(group, n) for n in range(draw.number_of_blocks(self._sampling.examples)))
 
     def _judge_list(self, row: OpenRow, cases: tuple[Case, ...]) -> Iterator[Iterable[Job]]:
         chunks = in_chunks(cases, LIST_CHUNK)
@@ -278,7 +314,23 @@ class RunJobs:
         if goal is None:
             return ()
         shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
-        if not shrinks or row.listed is not None:  # Of a list nothing is smaller.
+        return self._shrink_row(row, goal) if shrinks else self._add_shrunk(row, goal.first, None)
+
+    def _shrink_most_telling(self) -> Iterator[Job]:
+        """Yield the job to shrink the failure of each formulation that a person wants to see first."""
+        for subject in self._subjects:
+            rows = {
+                id(row.row): row
+                for (name, _), row in self._rows.items()
+                if name == subject.name and isinstance(row, OpenRow)
+            }
+            row = most_telling(each.row for each in rows.values())
+            if row is not None and (goal := rows[id(row)].goal()) is not None:
+                yield from self._shrink_row(rows[id(row)], goal)
+
+    def _shrink_row(self, row: OpenRow, goal: Shrinking) -> Iterable[Job]:
+        """Return the job to shrink what failed in a row; of a list of cases nothing is smaller."""
+        if row.listed is not None:
             return self._add_shrunk(row, goal.first, None)
         before = Progress(row.subject.name, row.question.id, "shrinking", 0, SHRINK_CALLS)
         arguments = self._sampling, row.question, row.subject, goal
@@ -286,7 +338,7 @@ class RunJobs:
 
     def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> Iterable[Job]:
         """Add the smallest case. Without one the witness shows the failure, or the first case that clearly fails."""
-        row.row = replace(row.row, shrunk=smallest)
+        row.row = replace(row.row, shrunk=smallest, first=None)
         if counterexample_of(row.row) is None:
             case = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
             row.row = replace(row.row, first=case)
@@ -315,6 +367,11 @@ def draw_chunks(
 def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
     """Return cases, of which the first has a number in its row, in chunks of a size."""
     return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
+
+
+def _turn(question: Property) -> tuple[bool, int]:
+    """Return the key by which properties are asked: those that solve bodies last, since they take long."""
+    return question.bodies, FIRST.index(question.id) if question.id in FIRST else len(FIRST)
 
 
 def _check_once(argument: str, names: Iterable[str]) -> None:

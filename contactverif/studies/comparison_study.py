@@ -37,8 +37,7 @@ def run_comparison(
     candidates: Sequence[Subject | NotLoaded],
     properties: Sequence[Property | NotLoaded],
     *,
-    interface: Interface | None = None,
-    scene: Case | None = None,
+    place: Interface | Case | None = None,
     **options: Any,
 ) -> Study:
     """Check every property of the reference and of the candidates, on the same cases; options are those of `run`."""
@@ -46,10 +45,10 @@ def run_comparison(
         raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")
     if any(_name(candidate) == reference.name for candidate in candidates):
         raise MisuseError("--against", f"{reference.name}, which is compared too", "another formulation than those")
-    result = run([reference, *candidates], properties, interface=interface, scene=scene, **options)
+    result = run([reference, *candidates], properties, place=place, **options)
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    differing = _with_cases(find_differing(result, comparison), properties, result, interface, scene)
+    differing = _with_cases(find_differing(result, comparison), properties, result, place)
     return Study(result, comparison, differing, measure_costs([reference, *loaded]))
 
 
@@ -57,13 +56,11 @@ def _with_cases(
     every: Sequence[Differing],
     properties: Sequence[Property | NotLoaded],
     result: Run,
-    interface: Interface | None,
-    scene: Case | None,
+    place: Interface | Case | None,
 ) -> tuple[Differing, ...]:
     """Return the differing outcomes with their cases; a run of many examples does not keep them all."""
     facts = result.provenance
-    place = interface if scene is None else scene.interface
-    sampling = Sampling(int(facts["examples"]), int(facts["seed"]), place, scene)
+    sampling = Sampling.at(place, int(facts["examples"]), int(facts["seed"]))
     question_of = {question.id: question for question in properties if isinstance(question, Property)}
     complete = []
     for differing in every:

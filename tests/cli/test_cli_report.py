@@ -16,7 +16,7 @@ def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
     """Return a report of NTS, which fails the patch test as it states, and the output of `verify`."""
     path = tmp_path / "nts.nc"
     options = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3", "--shrink", "all")
-    return path, ask("verify", "nts", "vts-ppt", *options, "--out", path)
+    return path, ask("verify", "nts", "vts-ppt", *options, "--out", path, "-v")
 
 
 @pytest.mark.parametrize("files", [("page.html",), ("words.nc", "page.html")])
@@ -37,7 +37,7 @@ def test_verify_writes_the_page_with_or_without_the_report(
 
 def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:
     path, verified = run
-    answer = ask("report", path)
+    answer = ask("report", path, "-v")
     assert (answer.status, answer.err) == (0, "")
     *table, verdict, promises = answer.out.splitlines()
     assert len(table) > 8

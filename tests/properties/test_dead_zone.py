@@ -113,7 +113,7 @@ def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> 
     )
     assert [row.verdict for row in result.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
     assert result.promises_kept
-    (row,) = run([load_subject("sts")], [patch_dead_zone], scene=load_scene_case("c")).rows
+    (row,) = run([load_subject("sts")], [patch_dead_zone], place=load_scene_case("c")).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
     assert dead_zone_cases(make_scene("c").case()) is None
 

@@ -98,7 +98,7 @@ def test_a_pressure_that_is_not_what_is_pushed_is_found_out(scene: str) -> None:
 
 def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
     assert variant_cases(load_scene_case("c:sides=free")) is None
-    result = run([load_subject("vts-ppt")], [patch_flat_solve], scene=load_scene_case("c:sides=free"))
+    result = run([load_subject("vts-ppt")], [patch_flat_solve], place=load_scene_case("c:sides=free"))
     assert result.rows[0].verdict is Verdict.NOT_APPLICABLE
 
 
@@ -113,9 +113,9 @@ def test_every_variant_is_drawn() -> None:
 
 @pytest.mark.parametrize("question", [patch_flat_solve, patch_variants])
 def test_on_a_given_scene_a_promise_to_fail_is_not_held_against_it(question: Property) -> None:
-    (row,) = run([load_subject("vts-me")], [question], scene=load_scene_case("b")).rows
+    (row,) = run([load_subject("vts-me")], [question], place=load_scene_case("b")).rows
     assert (row.verdict, row.promise, row.witness, row.planned) == (Verdict.PASS, None, None, 1)
-    (row,) = run([load_subject("vts-me")], [question], scene=load_scene_case("c")).rows
+    (row,) = run([load_subject("vts-me")], [question], place=load_scene_case("c")).rows
     assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
 
 

@@ -169,7 +169,7 @@ def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
     scene = two_blocks(
         Rectangle([0, 1, 3], [0, 2]), Rectangle([-1, 1.2, 4], [-2, 0]), penalty=10.0, approach=0.1
     ).case()
-    (row,) = run([Subject("nothing", make)], [newton_history], scene=scene).rows
+    (row,) = run([Subject("nothing", make)], [newton_history], place=scene).rows
     assert (row.verdict, row.unexpected) == (Verdict.NOT_JUDGED, "not judged"), row.reason
 
 

@@ -447,7 +447,7 @@ def test_a_missing_part_that_no_trait_speaks_of_breaks_no_promise() -> None:
 def test_the_given_interface_reaches_the_strategy() -> None:
     interface = a_case(4).interface
     question = replace(ZERO, cases=lambda argument: sizes(3) if argument is interface else None)
-    assert one_row(subject(), question, interface=interface).planned == 3
+    assert one_row(subject(), question, place=interface).planned == 3
 
 
 def test_a_known_failure_is_expected_and_a_known_pass_is_not() -> None:

@@ -1,0 +1,160 @@
+"""The screen of a run in few lines: what is wrong, the most telling failure with its mesh, and what is kept.
+
+Of each formulation it shows what breaks a promise first, then what fails without one, then what fails as stated, and
+at last the families of what passes. `run_tables` has every row.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console, ConsoleOptions
+from rich.text import Text
+
+from contactverif.cli.console import STYLES, fold, line
+from contactverif.cli.counterexample_output import counterexample_text
+from contactverif.cli.run_tables import finding_of, headline, remark_of
+from contactverif.contract.counterexample import counterexamples
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import BROKEN_BY_FAILING, OMITTED, OPPOSITE_SIGN, Result, Row, Run
+from contactverif.run.telling import by_telling, most_telling, wrong_rows
+
+_MOST_ROWS = 12  # The rows of a part that have a line each.
+_LEAST_WORDS = 30  # Columns that are left for words beside a name, however long it is.
+_PARTS = {  # The results that are no mistake and have a line for each row, and the title above them.
+    Result.FAIL: "fails, and promises nothing",
+    Result.FAILS_AS_STATED: "fails as stated",
+    Result.UNDECIDED: "undecided",
+}
+_COUNTED = {
+    Result.PASS: "pass",
+    Result.FAILS_AS_STATED: "fail as stated",
+    Result.FAIL: "fail without a promise",
+    Result.UNDECIDED: "undecided",
+    Result.OMITTED: "not asked",
+    Result.NOT_APPLICABLE: "do not apply",
+    Result.NOT_PROVIDED: "lack a part",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RunScreen:
+    """The results of a run for a person, in at most 80 columns.
+
+    One formulation that keeps its promises takes at most 25 lines, and one with a mistake at most 60. Where several
+    are shown, those that keep their promises take a few lines each.
+    """
+
+    run: Run
+    report: Path | None = None  # The report from which a counterexample can be replayed.
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        width, names = options.max_width, self.run.formulations
+        yield Text(headline(self.run.provenance))
+        for name in names:
+            yield Text("")
+            yield from self._formulation(name, width, alone=len(names) == 1)
+        for plugin in self.run.not_loaded:
+            yield Text("")
+            yield fold(f"{plugin.formulation}: {Result.NOT_LOADED}: {plugin.reason}", width, "red", indent=0)
+        yield Text("")
+
+    def _formulation(self, name: str, width: int, *, alone: bool) -> Iterator[Text]:
+        rows = [row for row in self.run.rows if row.formulation == name]
+        wrong = wrong_rows(rows)
+        yield _title(name, rows, wrong, width)
+        if name in self.run.opposite_signs:
+            yield fold(OPPOSITE_SIGN, width, "bold red", indent=2)
+        if (row := most_telling(rows)) is not None:
+            yield self._with_mesh(row, width)
+            yield Text("")
+        yield from _part("also wrong", wrong[1:], width)
+        yield from _say_what_is_left_out(rows, width)
+        yield from _remarks(rows, width)
+        yield from _other_failures(rows, width, in_full=alone or bool(wrong))
+        yield from _families(rows, width)
+
+    def _with_mesh(self, row: Row, width: int) -> Text:
+        """Return a row that is wrong, with the mesh that shows it, if one does."""
+        for example in counterexamples(self.run).values():
+            if example.row is row and row.verdict in (Verdict.FAIL, Verdict.CRASHED):
+                return counterexample_text(example, self.report, width)
+        return fold(f"{row.property_id}: {row.result}: {remark_of(row)}", width, STYLES[row.result], indent=2)
+
+
+def _title(name: str, rows: Sequence[Row], wrong: Sequence[Row], width: int) -> Text:
+    """Return the line of a formulation: how many properties are wrong, or what the others come to."""
+    counts = Counter(row.result for row in rows)
+    words = [f"{len(wrong)} wrong"] if wrong else []
+    words += [f"{counts[result]} {text}" for result, text in _COUNTED.items() if counts[result]]
+    text = f"{name}: {', '.join(words)}" if words else name
+    return fold(text, width, "bold red" if wrong else "bold", indent=0)
+
+
+def _other_failures(rows: Sequence[Row], width: int, *, in_full: bool) -> Iterator[Text]:
+    """Yield the failures that break no promise, and what is undecided; in full with a line for each."""
+    for result, title in _PARTS.items():
+        part = by_telling(row for row in rows if row.result is result)
+        if in_full:
+            yield from _part(title, part, width)
+        elif part:
+            yield fold(f"{title}: {', '.join(row.property_id for row in part)}", width, indent=0)
+
+
+def _part(title: str, rows: Sequence[Row], width: int) -> Iterator[Text]:
+    """Yield a line for each row below a title; of many rows the last ones have their names alone."""
+    if not rows:
+        return
+    yield Text(f"{title}:", style="bold")
+    listed = rows if len(rows) <= _MOST_ROWS + 1 else rows[:_MOST_ROWS]
+    names = max(len(row.property_id) for row in listed)
+    for row in listed:
+        words = _words(row)
+        room = max(width - names - 4, _LEAST_WORDS)
+        text = line(f"  {row.property_id:{names}}  {words if len(words) <= room else words[: room - 1] + '…'}".rstrip())
+        text.stylize(STYLES.get(row.result, ""), 2, 2 + len(row.property_id))
+        yield text
+    if others := rows[len(listed) :]:
+        yield fold(f"and {len(others)} more: {', '.join(row.property_id for row in others)}", width, indent=2)
+
+
+def _remarks(rows: Sequence[Row], width: int) -> Iterator[Text]:
+    """Yield what a property says of a formulation that passes it: a doubt, or how stiff its springs are."""
+    for row in rows:
+        words = "; ".join(filter(None, (row.suspicion, finding_of(row)))) if row.result is Result.PASS else ""
+        if words:
+            yield fold(f"{row.property_id} passes, and says: {words}", width, "yellow", indent=0)
+
+
+def _words(row: Row) -> str:
+    """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none."""
+    number = row.closest.number if row.closest is not None else None
+    parts = [] if row.unexpected in ("", BROKEN_BY_FAILING) else [row.unexpected]
+    if row.verdict is Verdict.FAIL and not row.breach and number is not None:
+        parts.append(f"{number.quantity.name} {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}")
+    elif row.reason:
+        parts.append(row.reason)
+    return "; ".join([*parts, *([f"known: {row.known}"] if row.known else [])])
+
+
+def _families(rows: Sequence[Row], width: int) -> Iterator[Text]:
+    """Yield the families of the properties that pass: `patch 12 of 14`, or the property itself if it is alone."""
+    members: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.result not in (Result.NOT_APPLICABLE, Result.NOT_PROVIDED):
+            members.setdefault(row.info.family, []).append(row)
+    passing = {family: sum(row.result is Result.PASS for row in group) for family, group in members.items()}
+    words = [f"{family} {count} of {len(members[family])}" for family, count in passing.items() if count]
+    if words:
+        yield fold(f"passes: {', '.join(words)}", width, STYLES[Result.PASS], indent=0)
+
+
+def _say_what_is_left_out(rows: Sequence[Row], width: int) -> Iterator[Text]:
+    """Say how many properties were not asked because of what the first ones had shown, and how to ask them."""
+    rows = [row for row in rows if row.omitted]
+    if rows:
+        reason = rows[0].reason.removeprefix(OMITTED)
+        yield fold(f"{len(rows)} properties were not asked: {reason}. --keep-going asks them all.", width, indent=0)

@@ -1,0 +1,121 @@
+"""The order in which failures are shown: the most telling first.
+
+A property is telling if few others catch the wrong formulations that it catches. The order is that of the kill matrix
+in `reports/trust/kills.csv`, and a test compares both. Properties that solve bodies stand behind those that do not,
+because a reader can follow a few springs, and hardly a solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import Result, Row
+
+PATCH = "patch"  # The family of the patch tests.
+
+ORDER = (
+    "tangent.directional",
+    "purity",
+    "tangent.long",
+    "tangent.sparsity",
+    "projection.forces",
+    "projection.activity",
+    "accuracy.arc",
+    "unilateral",
+    "purity.long",
+    "projection.place",
+    "patch.flat.nodal",
+    "objectivity",
+    "nodal-push",
+    "mirror",
+    "renumbering",
+    "hard.touch",
+    "stability.translation",
+    "stability.local",
+    "patch.flat.normal",
+    "scaling",
+    "remote",
+    "patch.flat.single",
+    "projection.area",
+    "patch.flat.resultant",
+    "balance.moment",
+    "patch.flat.transmission",
+    "patch.tilted.resultant",
+    "locality.bend",
+    "continuity",
+    "balance.force",
+    "patch.flat.published",
+    "symmetric",
+    "hard.concave-corner",
+    "projection.segment",
+    "stability.sweep",
+    "hard.convex-kink",
+    "scale",
+    "hard.steep-slave",
+    "patch.tilted.nodal",
+    "hard.search",
+    "hard.deep",
+    "swap",
+    "hard.node-hit",
+    "hard.offset",
+    "hard.free-end",
+    "complementarity",
+    "newton.order",
+    "patch.curved",
+    "multipliers.rank",
+    "stability.inf-sup",
+    "patch.kinked",
+    "stability.locking",
+    "accuracy.hertz",
+    "accuracy.wavy-curved",
+    "accuracy.wavy",
+    "newton.attainable",
+    "newton.history",
+    "newton.units",
+    "stability.stiffness",
+    "patch.flat.normal.solve",
+    "hard.dead-zone",
+    "patch.flat.single.solve",
+    "patch.dead-zone",
+    "hard.short-segment",
+    "hard.stiff",
+    "hard.contrast",
+    "patch.flat.solve",
+    "hard.c",
+    "patch.variants",
+    "hard.zero-load",
+)
+_RANK = {property_id: rank for rank, property_id in enumerate(ORDER)}
+
+
+def wrong_rows(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows that make a run fail, the most telling first, but for those that were not asked."""
+    return by_telling(row for row in rows if row.unexpected and not row.omitted)
+
+
+def most_telling(rows: Iterable[Row]) -> Row | None:
+    """Return the row of a formulation whose counterexample a person wants to see; None if there is none.
+
+    Who promises nothing breaks no promise; then it is a patch test that fails.
+    """
+    rows = list(rows)
+    news = by_telling(row for row in rows if row.result is Result.FAIL and row.info.family == PATCH)
+    return next(iter([*wrong_rows(rows), *news]), None)
+
+
+def by_telling(rows: Iterable[Row]) -> list[Row]:
+    """Return rows, the most telling first: crashes, breaches, failures by `ORDER`, and what could not be judged.
+
+    A property of another author is shown before ours, since it was installed for a purpose.
+    """
+    return sorted(rows, key=_key)
+
+
+def _key(row: Row) -> tuple[bool, bool, bool, int]:
+    failed = row.verdict in (Verdict.FAIL, Verdict.CRASHED)
+    return row.verdict is not Verdict.CRASHED, not row.breach, not failed, _rank(row)
+
+
+def _rank(row: Row) -> int:
+    return _RANK.get(row.property_id, -1)
