@@ -17,7 +17,8 @@ PLACES, WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial
 class SmoothedNormals:
     """Springs at four Gauss points of each pair of segments that overlap in the field; a residual and nothing else.
 
-    A slave node at a corner of more than 90° has no mean normal: each of its segments keeps its own there.
+    A slave node at a corner of more than 90° has no mean normal: each of its segments keeps its own there. Where the
+    field folds, both roots fall together and lose digits, so none are promised.
     """
 
     traits = Traits(
@@ -27,7 +28,6 @@ class SmoothedNormals:
             conserves_force=True,
             conserves_moment=True,
             local=True,
-            translation_stable=True,
         ),
         rules=Rules(penalty="distributed", area="current"),
     )
@@ -51,6 +51,7 @@ class SmoothedNormals:
             n = n / np.sqrt(dot(n, n))[:, None]
             t, gap = self._shoot(a[number], along[number], s, n, x[master])
             visible = (places[number, :, 1] <= s[:, None]) & (s[:, None] <= places[number, :, 0])
+            visible |= (t >= 0) & (t <= 1)  # Where the field folds, a line hits what the field does not point at.
             depth = np.where(visible, np.abs(gap), np.inf)
             points = np.arange(len(number))
             counts = (gap[points, other] < 0) & (depth[points, other] <= depth.min(axis=1, initial=np.inf))
