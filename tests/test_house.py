@@ -61,8 +61,9 @@ ROOMS = {
     "meshes": Room(("contract", "isolation"), ("numpy", "meshio", "msgspec")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
+    "diagnosis": Room(("contract",), ("numpy",), QUIET),
     "run": Room(
-        ("contract", "problems", "strategies", "isolation"),
+        ("contract", "problems", "strategies", "isolation", "diagnosis"),
         ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec", "psutil"),
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.

@@ -14,6 +14,7 @@ from rich.text import Text
 from contactverif.cli.console import indent_below, plain_table
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.names import parse_name
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Run
@@ -111,20 +112,22 @@ def _ending(value: float, iterations: float) -> str:
 
 
 def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
-    """Return each number beside its tolerance, and how Newton ended; the reason where nothing was measured."""
+    """Return the numbers that fail, or all, beside their tolerances, and how Newton ended; else the reason."""
     measurement = outcome.measurement
     if measurement is None:
         return [outcome.reason]
     lines = [measurement.broken] if measurement.broken else []
-    if measurement.finding is not None:
-        lines.append(str(measurement.finding))
+    lines += [str(measurement.finding)] if measurement.finding is not None else []
     numbers = checked_numbers(info, measurement)
     wrong = [number for number in numbers if number.ratio > 1]
-    for number in wrong or numbers:
-        mark, quantity = "✗" if wrong else "✓", number.quantity
-        lines.append(f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}")
+    lines += [_checked_line(number, "✗" if wrong else "✓") for number in wrong or numbers]
     others = [_detail(name, value) for name, value in measurement.details.items() if not _is_ending(name)]
     return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])
+
+
+def _checked_line(number: CheckedNumber, mark: str) -> str:
+    quantity = number.quantity
+    return f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}"
 
 
 def _is_ending(detail: str) -> bool:

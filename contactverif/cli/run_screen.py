@@ -68,6 +68,8 @@ class RunScreen:
         yield _title(name, rows, wrong, width)
         if name in self.run.opposite_signs:
             yield fold(OPPOSITE_SIGN, width, "bold red", indent=2)
+        if name in self.run.diagnoses:
+            yield fold(f"diagnosis: {self.run.diagnoses[name]}", width, "bold", indent=2)
         if (row := most_telling(rows)) is not None:
             yield self._with_mesh(row, width)
             yield Text("")

@@ -315,6 +315,8 @@ class Run:
         Where the run comes from: versions, seed, profile, command, ….
     opposite_signs : tuple[str, ...]
         The formulations whose forces have the opposite sign, as `OPPOSITE_SIGN` says. Each makes the run fail.
+    diagnoses : Mapping[str, str]
+        {formulation that fails: what kind of mistake it makes}, where a rule knows it.
     """
 
     rows: tuple[Row, ...]
@@ -322,8 +324,11 @@ class Run:
     provided: Mapping[str, Mapping[str, bool]] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
     opposite_signs: tuple[str, ...] = ()
+    diagnoses: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        diagnoses = {name_line(name): one_line(text) for name, text in self.diagnoses.items()}
+        object.__setattr__(self, "diagnoses", diagnoses)
         provided = {name_line(name): parts for name, parts in self.provided.items()}
         provenance = {name_line(name): one_line(value, LONGEST_FACT) for name, value in self.provenance.items()}
         object.__setattr__(self, "provided", provided)

@@ -23,6 +23,7 @@ from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.diagnosis.diagnose import diagnose
 from contactverif.isolation.remote_formulation import places
 from contactverif.run import draw, judge
 from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
@@ -73,6 +74,7 @@ class RunJobs:
         for question in sorted(questions, key=_turn):
             self._groups.setdefault(sampling.group(question), []).append(question)
         self._opposite_signs: set[str] = set()
+        self._diagnoses: dict[str, str] = {}
         self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
 
     def work(self, scheduler: Scheduler) -> None:
@@ -86,8 +88,8 @@ class RunJobs:
                 scheduler.work(chain.from_iterable(self._parts_of_next()))
             self._stop_wrong()
         scheduler.work(self)
-        if self._shrink == "one":
-            scheduler.work(self._shrink_most_telling())
+        if self._share is None:
+            scheduler.work(self._explain_most_telling())
 
     def _stop_wrong(self) -> None:
         """Note the formulations of which the first properties have shown what may explain every failure to come."""
@@ -139,6 +141,7 @@ class RunJobs:
             not_loaded=not_loaded,
             provided=self.provided,
             opposite_signs=self.opposite_names,
+            diagnoses=self._diagnoses,
             provenance=provenance,
         )
 
@@ -316,17 +319,27 @@ class RunJobs:
         shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
         return self._shrink_row(row, goal) if shrinks else self._add_shrunk(row, goal.first, None)
 
-    def _shrink_most_telling(self) -> Iterator[Job]:
-        """Yield the job to shrink the failure of each formulation that a person wants to see first."""
-        for subject in self._subjects:
-            rows = {
-                id(row.row): row
-                for (name, _), row in self._rows.items()
-                if name == subject.name and isinstance(row, OpenRow)
-            }
-            row = most_telling(each.row for each in rows.values())
-            if row is not None and (goal := rows[id(row)].goal()) is not None:
-                yield from self._shrink_row(rows[id(row)], goal)
+    def _explain_most_telling(self) -> Iterator[Job]:
+        """Yield the jobs to diagnose, and to shrink, the most telling failure of each formulation."""
+        for row in filter(None, map(self._find_most_telling, self._subjects)):
+            name, property_id = row.subject.name, row.question.id
+            self._report(Progress(name, property_id, "diagnosis", 0, 1))
+            yield Job(diagnose, (row.subject, property_id), partial(self._add_diagnosis, name))
+            if self._shrink == "one" and (goal := row.goal()) is not None:
+                yield from self._shrink_row(row, goal)
+
+    def _find_most_telling(self, subject: Subject) -> OpenRow | None:
+        """Return the row of a formulation whose failure a person wants to see first; a crash explains itself."""
+        rows = {id(row.row): row for row in self._rows.values() if isinstance(row, OpenRow) and row.subject is subject}
+        telling = most_telling(row.row for row in rows.values())
+        explains_itself = telling is None or telling.verdict is not Verdict.FAIL or telling.breach
+        return None if explains_itself else rows[id(telling)]
+
+    def _add_diagnosis(self, name: str, text: str) -> Iterable[Job]:
+        """Add what is known of the mistake of a formulation."""
+        if text:
+            self._diagnoses[name] = text
+        return ()
 
     def _shrink_row(self, row: OpenRow, goal: Shrinking) -> Iterable[Job]:
         """Return the job to shrink what failed in a row; of a list of cases nothing is smaller."""

@@ -58,12 +58,12 @@ def test_its_report_says_what_is_not_provided(whole_project: Path, run_program: 
         assert str(summary.reason.sel(property="tangent.directional").item()) == "tangent: not provided"
 
 
-ONE = ("-p", "balance.force", "--examples", "2")
+FORCE = ("-p", "balance.force", "--examples", "2")
 
 
 def test_a_file_that_is_not_finished_is_a_row_that_did_not_load(run_program: Run, tmp_path: Path) -> None:
     install_mine(tmp_path / "site", mine_classes()["NodeToSegment"])
-    answer = run_program("contactverif", "verify", "mine-nodes", "mine-exact", "-v", *ONE)
+    answer = run_program("contactverif", "verify", "mine-nodes", "mine-exact", "-v", *FORCE)
     assert answer.returncode == 1
     assert rows(answer.stdout) == [("balance.force", "–", "pass")], "the others run"
     assert "not loaded" in answer.stdout

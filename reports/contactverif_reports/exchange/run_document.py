@@ -85,6 +85,7 @@ class RunDocument(msgspec.Struct, frozen=True, kw_only=True):
     rows: list[RowDocument]
     not_loaded: list[Missing]
     opposite_signs: list[str]  # The formulations whose forces have the opposite sign.
+    diagnoses: dict[str, str]  # {formulation that fails: what kind of mistake it makes}, where a rule knows it.
 
 
 def write_json(run: Run, path: str | os.PathLike[str]) -> None:
@@ -104,6 +105,7 @@ def document_of(run: Run) -> RunDocument:
         rows=[_row(row, examples) for row in run.rows],
         not_loaded=[Missing(name=item.formulation, reason=item.reason) for item in run.not_loaded],
         opposite_signs=list(run.opposite_signs),
+        diagnoses=dict(run.diagnoses),
     )
 
 

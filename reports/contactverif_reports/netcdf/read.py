@@ -130,6 +130,7 @@ class _Reader:
             not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
             provided=self._provided_parts(formulations),
             opposite_signs=self._opposite_signs(formulations),
+            diagnoses=self._diagnoses(formulations),
         )
         written = root_attributes(run)
         if self._consistent:
@@ -227,6 +228,11 @@ class _Reader:
             return ()
         opposite = self._summary["sign"].values == schema.SIGNS["opposite"]
         return tuple(name for name, turned in zip(formulations, opposite.tolist(), strict=True) if turned)
+
+    def _diagnoses(self, formulations: list[str]) -> dict[str, str]:
+        if "diagnosis" not in self._summary:  # Older reports have none.
+            return {}
+        return {name: text for name, text in zip(formulations, self._summary.words("diagnosis"), strict=True) if text}
 
 
 def _examples(groups: Groups) -> dict[tuple[str, str], tuple[Group, Case]]:

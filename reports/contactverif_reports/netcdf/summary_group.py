@@ -170,6 +170,12 @@ def _provided_parts(run: Run) -> Table:
             "sign of the forces",
             "opposite: the slave is pulled towards the master, and the run fails",
         ),
+        "diagnosis": words(
+            ["formulation"],
+            [run.diagnoses.get(name, "") for name in run.formulations],
+            "kind of mistake that a formulation makes which fails",
+            "empty where no rule knows it",
+        ),
     }
 
 

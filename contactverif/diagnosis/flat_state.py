@@ -1,0 +1,92 @@
+"""A flat interface of three segments on four, with the exact force of each piece on which two segments face each other.
+
+On one segment a side every place is an end and all ratios are the same. Here no node faces another, the slave ends
+inside the master, and no two segments are alike, so that each mistake has a pattern of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+
+SLAVE = np.array([0.0, 1.0, 2.25, 3.125])
+MASTER = np.array([3.625, 2.625, 1.5, 0.6875, -0.5])  # The master runs the other way.
+DEPTH = 2.0**-10  # So small that a slave that is tilted by it is as long as its projection, to 5e-7.
+PENALTY = 2.0**10
+_GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # Two points integrate cubic functions exactly.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlatState:
+    """A state of the flat interface with its exact forces, piece by piece.
+
+    Attributes
+    ----------
+    case : Case
+        The state. Its normal, out of the master, is y.
+    pieces : FloatArray, shape (n_pieces, n_nodes)
+        The size of the force by which the pressure on a piece pushes each node.
+    slave_segment, master_segment : IntArray, shape (n_pieces,)
+        The segments that face each other there.
+    """
+
+    case: Case
+    pieces: FloatArray
+    slave_segment: IntArray
+    master_segment: IntArray
+
+    @property
+    def exact(self) -> FloatArray:
+        """The exact size (n_nodes,) of the force on each node."""
+        exact: FloatArray = self.pieces.sum(axis=0)
+        return exact
+
+    @property
+    def n_slave_nodes(self) -> int:
+        """The number of slave nodes, which come first."""
+        return len(SLAVE)
+
+    def swap(self, *, master: bool) -> FloatArray:
+        """Return the forces (n_nodes,) if the two shape functions of each segment of a side are exchanged."""
+        forces, interface = self.exact.copy(), self.case.interface
+        surface = interface.master if master else interface.slave
+        of_pieces = self.master_segment if master else self.slave_segment
+        nodes = surface.segments.reshape(-1)
+        forces[np.unique(nodes)] = 0.0
+        for piece, segment in enumerate(of_pieces):
+            first, second = surface.segments[segment]
+            forces[first] += self.pieces[piece, second]
+            forces[second] += self.pieces[piece, first]
+        return forces
+
+
+def flat_state(slope: float = 0.0, depth: float = DEPTH) -> FlatState:
+    """Return the state whose penetration is `depth` (1 + slope x) at the place x along the slave."""
+    n_slave = len(SLAVE)
+    along = np.concatenate([SLAVE, MASTER])
+    points = np.column_stack([along, np.zeros(len(along))])
+    interface = Interface.from_chains(points[:n_slave], points[n_slave:])
+    z = points.copy()
+    z[:n_slave, 1] = -depth * (1 + slope * SLAVE)
+    case = Case(interface, z.reshape(-1), PENALTY, name="three on four")
+    ends = np.sort(along[(along >= SLAVE[0]) & (along <= SLAVE[-1])])
+    middles = (ends[1:] + ends[:-1]) / 2
+    slave_segment = np.searchsorted(SLAVE, middles) - 1
+    master_segment = len(MASTER) - 1 - np.searchsorted(MASTER[::-1], middles)
+    pieces = np.zeros((len(middles), len(along)))
+    for piece, (first, last) in enumerate(pairwise(ends)):
+        for x in (first + last) / 2 + _GAUSS * (last - first) / 2:
+            force = PENALTY * depth * (1 + slope * x) * (last - first) / 2
+            for nodes in (
+                interface.slave.segments[slave_segment[piece]],
+                interface.master.segments[master_segment[piece]],
+            ):
+                share = (x - along[nodes[0]]) / (along[nodes[1]] - along[nodes[0]])
+                pieces[piece, nodes] += force * np.array([1 - share, share])
+    return FlatState(case, pieces, slave_segment, master_segment)

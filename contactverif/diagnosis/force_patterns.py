@@ -1,0 +1,162 @@
+"""Tell in what pattern the forces of a formulation with springs are wrong on a flat interface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.contract.subject import Subject
+from contactverif.diagnosis.flat_state import DEPTH, PENALTY, FlatState, flat_state
+
+# Two sizes are the same within this share of the largest. A tilt of the state by DEPTH changes them by less, and so do
+# all roundings, even if forces are summed in single precision.
+SAME = 1e-4
+_MEANINGS = {  # {factor: what it may mean}
+    2.0: "two passes that each have the whole penalty, or a factor 2",
+    0.5: "a factor ½, such as a mean of two sides that is taken once too often",
+    -1.0: "the sign",
+}
+
+
+def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
+    """Return what is wrong with the forces on a flat interface; empty where they are right, or no rule knows them.
+
+    Not `in_full`, nothing is said of forces that merely are not the consistent ones: a formulation that does not
+    promise the patch test may have them.
+    """
+    rules, patch = subject.traits.rules, subject.traits.promises.patch
+    if rules.enforcement != "penalty" or rules.penalty == "nodal" or patch.flat is False:
+        return ""  # Other forces than the consistent ones are right there.
+    uniform, linear = flat_state(), flat_state(slope=1.0)
+    forces = _forces(subject, uniform)
+    return (
+        _uniform_pattern(uniform, forces, in_full=in_full)
+        or _along_the_surface(forces)
+        or _linear_pattern(linear, _forces(subject, linear)[:, 1])
+    )
+
+
+def _forces(subject: Subject, state: FlatState) -> FloatArray:
+    """Return the forces (n_nodes, 2) that push the surfaces apart: positive along y on both sides if all is right."""
+    formulation, case = subject.for_case(state.case), state.case
+    pairing = formulation.pair(case.interface, case.z)
+    forces: FloatArray = -formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
+    sides = np.where(np.arange(len(forces)) < state.n_slave_nodes, 1.0, -1.0)
+    return forces * sides[:, None]
+
+
+def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> str:
+    """Return the pattern of the forces of a uniform penetration; empty if they are right."""
+    pushes, exact, n = forces[:, 1], state.exact, state.n_slave_nodes
+    if not forces.any():
+        return "there is no force at all where the surfaces penetrate"
+    if _same(pushes, exact):
+        return ""
+    if text := (
+        _factor(pushes, exact)
+        or _node_pattern(pushes[:n], exact[:n])
+        or _segment_pattern("slave", state.pieces, state.slave_segment, pushes)
+        or _segment_pattern("master", state.pieces, state.master_segment, pushes)
+        or _exchange(state, pushes, master=True)
+    ):
+        return text
+    if _same(pushes[:n], np.full(n, PENALTY * DEPTH)):
+        return "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
+    return _side_pattern(state, pushes) if in_full else ""
+
+
+def _exchange(state: FlatState, pushes: FloatArray, *, master: bool) -> str:
+    """Return whether the forces are right but for the shape functions of a side, which are exchanged."""
+    nodes = slice(state.n_slave_nodes, None) if master else slice(state.n_slave_nodes)
+    if not _same(pushes[nodes], state.swap(master=master)[nodes]):
+        return ""
+    if master:
+        return "the two shape functions of each master segment are exchanged: ξ where 1 − ξ belongs"
+    return "the two shape functions of each slave segment are exchanged: a node has what belongs to its neighbour"
+
+
+def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
+    """Return on which side the forces are wrong, and whether their sum is."""
+    exact, n = state.exact, state.n_slave_nodes
+    slave_is_right, master_is_right = _same(pushes[:n], exact[:n]), _same(pushes[n:], exact[n:])
+    if slave_is_right:
+        return "the forces on the slave are right, those on the master are not" + _total(pushes[n:], exact[n:])
+    if master_is_right:
+        return "the forces on the master are right, those on the slave are not" + _total(pushes[:n], exact[:n])
+    return "the forces are wrong on both sides" + _total(pushes[:n], exact[:n])
+
+
+def _along_the_surface(forces: FloatArray) -> str:
+    """Return whether the forces have a part along a flat surface, on which all normals are the same."""
+    if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
+        return "the forces have a part along the surface, where both normals are the same"
+    return ""
+
+
+def _linear_pattern(state: FlatState, pushes: FloatArray) -> str:
+    """Return the pattern of the forces of a penetration that grows along the slave, if one is known."""
+    if _same(pushes, state.exact):
+        return ""
+    # Other rules of integration give other forces, and are not wrong.
+    return _exchange(state, pushes, master=False) or _exchange(state, pushes, master=True)
+
+
+def _node_pattern(pushes: FloatArray, exact: FloatArray) -> str:
+    """Return what factor the ends of the slave have, if all nodes between them are right."""
+    inner = _equal(pushes, exact)[1:-1].all()
+    ends = [node for node in (0, len(exact) - 1) if not _equal(pushes, exact)[node]]
+    if not inner or not ends:
+        return ""
+    factors = pushes[ends] / exact[ends]
+    words = " and ".join(f"{_times(factor)} at slave node {node}" for node, factor in zip(ends, factors, strict=True))
+    return f"only free ends are wrong: {words}"
+
+
+def _segment_pattern(side: str, pieces: FloatArray, of_pieces: IntArray, pushes: FloatArray) -> str:
+    """Return what factors the segments of a side have, if the forces are the sum of their parts with such factors."""
+    segments = np.unique(of_pieces)
+    parts = np.stack([pieces[of_pieces == segment].sum(axis=0) for segment in segments], axis=1)
+    factors = np.linalg.lstsq(parts, pushes, rcond=None)[0]
+    wrong = ~_equal(factors, np.ones(len(factors)))
+    if not _same(parts @ factors, pushes) or wrong.all():
+        return ""
+    missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
+    if len(missed) == wrong.sum():
+        return f"{_list(side, missed)} {'is' if len(missed) == 1 else 'are'} left out"
+    words = ", ".join(f"{side} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
+    return f"segments have forces of another size: {words} the exact one, all others right"
+
+
+def _factor(pushes: FloatArray, exact: FloatArray) -> str:
+    """Return the factor that all forces have, and what it may mean, if they have one."""
+    factor = float(pushes @ exact / (exact @ exact))
+    if not _same(pushes, factor * exact):
+        return ""
+    near = [words for known, words in _MEANINGS.items() if abs(factor - known) <= SAME * abs(known)]
+    return f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
+
+
+def _total(pushes: FloatArray, exact: FloatArray) -> str:
+    """Return whether the sum of the forces of a side is right."""
+    factor = float(pushes.sum() / exact.sum())
+    return "; their sum is right" if abs(factor - 1) <= SAME else f"; their sum is {_times(factor)} the exact one"
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.4g} times"
+
+
+def _list(side: str, segments: Sequence[int]) -> str:
+    return f"{side} segment{'s' * (len(segments) > 1)} {' and '.join(map(str, segments))}"
+
+
+def _equal(a: FloatArray, b: FloatArray) -> BoolArray:
+    """Return which numbers are the same, over the largest of the second list."""
+    result: BoolArray = np.abs(a - b) <= SAME * np.abs(b).max()
+    return result
+
+
+def _same(a: FloatArray, b: FloatArray) -> bool:
+    return bool(_equal(a, b).all())

@@ -1,0 +1,171 @@
+"""Tell which part of a tangent is wrong, on the flat interface and on a frozen pairing.
+
+The parts of a tangent differ in how they grow with the penetration g, and in the places where they stand, in each
+segment's own normal n and tangent t: the material part is as large for every g and stands in n–n; the parts of δξ, δn
+and of the length of a segment grow like g and stand in n–t or t–n.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray, dense
+from contactverif.contract.subject import Subject
+from contactverif.diagnosis.flat_state import flat_state
+
+DEPTHS = tuple(2.0**-power for power in (5, 6, 7, 8))
+# Central differences of a step of 2^-20 of forces that are smooth over 1 err by less, over the largest entry.
+SAME = 1e-6
+STEP = 2.0**-20
+_POWER = 0.25  # A part grows like g^k if the measured power is as near to k.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tangents:
+    """A tangent beside the derivative, for each depth; rows and columns (n_nodes, 2) are t and n."""
+
+    tangents: FloatArray  # (n_depths, n, n)
+    derivatives: FloatArray  # (n_depths, n, n)
+    n_slave: int  # The number of rows of the slave, which come first.
+
+    @property
+    def errors(self) -> FloatArray:
+        """The error of each entry."""
+        return self.tangents - self.derivatives
+
+    @property
+    def scale(self) -> float:
+        """The largest entry of the derivative."""
+        return float(np.abs(self.derivatives).max())
+
+
+def diagnose_tangent(subject: Subject) -> str:
+    """Return which part of the tangent is wrong; empty where it is right, or no rule knows the mistake."""
+    approximate = subject.traits.promises.tangent == "approximate"
+    if subject.traits.rules.enforcement != "penalty" or approximate or "tangent" not in subject.provides:
+        return ""
+    pair = _measure(subject)
+    if pair.scale == 0 or _is_small(pair.errors, pair.scale):
+        return ""
+    return _as_a_whole(pair) or _one_line(pair) or _one_part(pair)
+
+
+def _measure(subject: Subject) -> Tangents:
+    tangents, derivatives, n_slave = [], [], 0
+    for depth in DEPTHS:
+        state = flat_state(depth=depth)
+        case, formulation = state.case, subject.for_case(state.case)
+        pairing = formulation.pair(case.interface, case.z)
+        moves = STEP * np.eye(case.z.size)
+        residuals = formulation.residual(case.interface, pairing, np.concatenate([case.z + moves, case.z - moves]))
+        derivatives.append((residuals[: case.z.size] - residuals[case.z.size :]).T / (2 * STEP))
+        tangents.append(dense(formulation.tangent(case.interface, pairing, case.z)))
+        n_slave = 2 * state.n_slave_nodes
+    return Tangents(np.stack(tangents), np.stack(derivatives), n_slave)
+
+
+def _as_a_whole(pair: Tangents) -> str:
+    """Return what is wrong with all entries at once."""
+    tangents, derivatives = pair.tangents, pair.derivatives
+    if not tangents.any():
+        return "the tangent is zero"
+    if _is_small(tangents - derivatives.transpose(0, 2, 1), pair.scale):
+        return "the tangent is the transposed derivative"
+    factor = float((tangents * derivatives).sum() / (derivatives**2).sum())
+    if _is_small(tangents - factor * derivatives, pair.scale):
+        return f"the tangent has {'the opposite sign' if abs(factor + 1) < SAME else f'a factor {factor:.4g}'}"
+    if _is_small(tangents - (derivatives + derivatives.transpose(0, 2, 1)) / 2, pair.scale):
+        return "the tangent is the symmetric part of the derivative"
+    return ""
+
+
+def _one_line(pair: Tangents) -> str:
+    """Return the entry, the row or the column that alone is wrong."""
+    large: BoolArray = np.max(np.abs(pair.errors), axis=0) > SAME * pair.scale
+    if large.sum() == 1:
+        row, column = (int(place) for place in np.argwhere(large)[0])
+        return f"row {row} ({_unknown(row, pair)}), column {column} ({_unknown(column, pair)}) alone is wrong"
+    for name, lines, axis in (("column", np.any(large, axis=0), 2), ("row", np.any(large, axis=1), 1)):
+        (places,) = np.nonzero(lines)
+        if len(places) == 1:
+            place = int(places[0])
+            missing = not np.take(pair.tangents, place, axis=axis).any()
+            return (
+                f"{name} {place} ({_unknown(place, pair)}) is {'missing' if missing else 'wrong'}, all others are right"
+            )
+    return ""
+
+
+def _unknown(number: int, pair: Tangents) -> str:
+    node, axis = divmod(number, 2)
+    return f"{'xy'[axis]} of {'slave' if number < pair.n_slave else 'master'} node {node}"
+
+
+def _one_part(pair: Tangents) -> str:
+    """Return the part of the tangent that is wrong, if its size, its place and its growth are those of one part."""
+    axes = np.arange(pair.errors.shape[1]) % 2  # 0 along t (x), 1 along n (y).
+    blocks = {
+        rows + columns: np.ix_(range(len(DEPTHS)), axes == "tn".index(rows), axes == "tn".index(columns))
+        for rows in "tn"
+        for columns in "tn"
+    }
+    wrong = [name for name, block in blocks.items() if not _is_small(pair.errors[block], pair.scale)]
+    if len(wrong) != 1:
+        return _several(wrong) if wrong else ""
+    (name,) = wrong
+    errors, power = pair.errors[blocks[name]], _power_of_depth(pair.errors[blocks[name]])
+    part = _part_of(name, round(power), errors, pair) if abs(power - round(power)) < _POWER else ""
+    if not part:
+        return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"
+    return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"
+
+
+def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
+    """Return the part of a tangent that stands in a block with such errors, and grows with the penetration so."""
+    n = pair.n_slave // 2  # The rows, and the columns, of the slave in a block.
+    on_slave = {"rows": errors[:, :n], "columns": errors[:, :, :n]}
+    on_master = errors[:, :, n:]
+    match name, power:
+        case "nn", 0:
+            return "the material part, in n–n"
+        case "nt", 1 if _is_small(on_slave["rows"], pair.scale):
+            return "the part of δξ, in n–t on the master's rows"
+        case "nt", 1 if _is_small(on_master, pair.scale):
+            return "the part of the length of the slave's segments, in n–t on the slave's columns"
+        case "tn", 1:
+            owner = "master" if _is_small(on_slave["columns"], pair.scale) else "slave"
+            both = owner == "slave" and not _is_small(on_master, pair.scale)
+            return f"the part of δn, in t–n on the columns of {'both sides' if both else f'the {owner}'}"
+    return ""
+
+
+def _several(names: list[str]) -> str:
+    """Return the blocks that are wrong, where they are several."""
+    listed = " and ".join(f"{name[0]}–{name[1]}" for name in names)
+    return f"entries in {listed} are wrong (n along the normal, t along the surface)"
+
+
+def _power_of_depth(errors: FloatArray) -> float:
+    """Return the power of the penetration with which the largest error grows."""
+    sizes = np.abs(errors).max(axis=(1, 2))
+    return float(np.log2(sizes[0] / sizes[-1]) / (len(DEPTHS) - 1)) if sizes[-1] > 0 else np.inf
+
+
+def _change(tangents: FloatArray, derivatives: FloatArray, scale: float) -> str:
+    """Return what became of a part, in words."""
+    if not derivatives.any():
+        return "is there, and should not be"
+    wrong = np.abs(tangents - derivatives) > SAME * scale
+    tangents, derivatives = tangents[wrong], derivatives[wrong]
+    factor = float((tangents * derivatives).sum() / (derivatives**2).sum())
+    if not _is_small(tangents - factor * derivatives, scale):
+        return "is wrong"
+    if abs(factor) < 1e-3:
+        return "is missing"
+    return "has the opposite sign" if abs(factor + 1) < 1e-3 else f"has a factor {factor:.7g}"
+
+
+def _is_small(errors: FloatArray, scale: float) -> bool:
+    return bool((np.abs(errors) <= SAME * scale).all())

@@ -1,0 +1,80 @@
+"""Each mistake that a rule knows is named, and no right formulation hears anything."""
+
+import pytest
+from killing import properties
+from strangers import STRANGERS
+from subjects import load_subject
+from wrong import MUTANTS
+from wrong_springs import FORCES, TANGENTS, Right
+
+from contactverif.contract.result import Run
+from contactverif.contract.subject import Subject
+from contactverif.diagnosis.diagnose import diagnose
+from contactverif.diagnosis.flat_state import flat_state
+from contactverif.oracle import uniform_pressure_weights
+from contactverif.run.registry import standalone_names
+from contactverif.run.run import run
+
+TANGENT, PATCH = "tangent.directional", "patch.flat.transmission"
+# Mutants of the included formulations, each with the words that name its mistake.
+KNOWN = {
+    "pushes the wrong way": "the sign",
+    "penalty squared": "every node has 1024 times",
+    "pushes where the gap is open": "no force at all",
+    "Δn missing": "the part of δn, in t–n on the columns of the master, is missing",
+    "ΔS missing": "the part of δξ, in n–t on the master's rows",
+    "Δl_AB missing": "the part of the length of the slave's segments, in n–t on the slave's columns",
+    "tangent symmetrised": "the symmetric part of the derivative",
+    "small forces dropped": "look for an absolute length",
+    "shortest length allowed, absolute": "look for an absolute length",
+    "all signs of a mortar method turned round": "the sign",
+}
+
+
+def test_the_state_has_the_exact_forces() -> None:
+    state = flat_state()
+    along = state.case.positions[:, 0]
+    pressure = state.case.penalty * -state.case.positions[0, 1]
+    assert state.exact == pytest.approx(pressure * uniform_pressure_weights(state.case.interface, along))
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_a_mistake_in_the_forces_is_named(name: str) -> None:
+    make, words = FORCES[name]
+    assert words in diagnose(Subject(name, make), PATCH)
+
+
+@pytest.mark.parametrize("name", TANGENTS)
+def test_a_mistake_in_the_tangent_is_named(name: str) -> None:
+    make, words = TANGENTS[name]
+    assert words in diagnose(Subject(name, make), TANGENT)
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_mistake_in_an_included_formulation_is_named(name: str) -> None:
+    (mutant,) = [mutant for mutant in MUTANTS if mutant.name == name]
+    assert KNOWN[name] in diagnose(Subject(name, mutant.make), mutant.caught_by)
+
+
+@pytest.mark.parametrize("name", STRANGERS)
+def test_nothing_is_said_of_a_right_formulation_of_a_stranger(name: str) -> None:
+    subject = Subject(name, STRANGERS[name])
+    assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
+
+
+@pytest.mark.parametrize("name", standalone_names())
+def test_nothing_is_said_of_an_included_formulation(name: str) -> None:
+    subject = load_subject(name)
+    assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
+
+
+def judge_patch(make: type[Right]) -> Run:
+    questions = [question for question in properties() if question.id == PATCH]
+    return run([Subject("mine", make)], questions, examples=3, seed=1, shrink="none")
+
+
+def test_a_run_says_it_of_what_fails_alone() -> None:
+    make, words = FORCES["twice"]
+    assert isinstance(make, type)
+    assert words in judge_patch(make).diagnoses["mine"]
+    assert not judge_patch(Right).diagnoses
