@@ -54,7 +54,9 @@ class Check:
         [self.row] = result.rows
         row, opposite_sign = self.row, bool(result.opposite_signs)
         if row.unexpected or opposite_sign:
-            raise AssertionError(explain(row, command=self._command(), opposite_sign=opposite_sign))
+            diagnosis = result.diagnoses.get(row.formulation, "")
+            command = self._command()
+            raise AssertionError(explain(row, command=command, opposite_sign=opposite_sign, diagnosis=diagnosis))
         if row.verdict in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED):
             pytest.skip(row.reason)
         if row.verdict in (Verdict.FAIL, Verdict.CRASHED) and row.known:

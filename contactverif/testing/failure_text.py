@@ -8,11 +8,12 @@ from contactverif.contract.property import Outcome, PropertyInfo, Verdict, check
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 
 
-def explain(row: Row, *, command: str, opposite_sign: bool = False) -> str:
-    """Return why a row makes a run fail; that the forces have the opposite sign is said first."""
+def explain(row: Row, *, command: str, opposite_sign: bool = False, diagnosis: str = "") -> str:
+    """Return why a row makes a run fail; that the forces have the opposite sign is said first, then a diagnosis."""
     question = row.info
     lines = [f"{row.formulation}: {OPPOSITE_SIGN}"] if opposite_sign else []
     lines += [f"{row.formulation}, {question.id}: {row.unexpected}"] if row.unexpected else []
+    lines += [f"  Diagnosis: {diagnosis}"] if diagnosis else []
     lines.append(f"  The property: {question.summary}")
     if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
         lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
