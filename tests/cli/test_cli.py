@@ -288,8 +288,11 @@ def test_what_fails_as_promised_is_drawn_and_the_run_passes(ask: Ask) -> None:
     assert (promise, fails, as_, stated, judged) == ("fails", "fails", "as", "stated", "10/10")
     assert float(closest) > float(tolerance)
     assert rows(answer.out)["vts-ppt", "patch.flat.transmission"][:3] == ["passes", "pass", "10/10"]
-    first_lines = "nts, patch.flat.transmission: fails as stated, its witness, the case a1\n    ✗ error of a "
+    first_lines = (
+        "nts, patch.flat.transmission: fails as stated, its witness, the case a1\n    slave node 0 (free end): force "
+    )
     assert first_lines in answer.out
+    assert "\n    ✗ error of a nodal force: " in answer.out
     options = ("--examples", "10", "--seed", "1", "--shrink", "all", "--show", "all")
     shrunk = ask("verify", "nts", "-p", "patch.flat.transmission", *options)
     assert first_lines.replace("its witness, the case a1", "the smallest case found") in shrunk.out

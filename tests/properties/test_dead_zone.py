@@ -109,7 +109,7 @@ def test_the_scene_is_asked_nothing_that_is_promised_of_covered_interfaces() -> 
     result = run(
         [load_subject("vts-ppt")],
         [patch_dead_zone, patch_flat_solve, patch_variants],
-        scene=load_scene_case("dead-zone"),
+        place=load_scene_case("dead-zone"),
     )
     assert [row.verdict for row in result.rows] == [Verdict.FAIL, Verdict.NOT_APPLICABLE, Verdict.NOT_APPLICABLE]
     assert result.promises_kept

@@ -176,9 +176,8 @@ def test_cases_that_could_not_be_made_count_as_not_judged() -> None:
 def test_all_planned_cases_are_judged_before_one_is_shrunk() -> None:
     log: list[Progress] = []
     row = one_row(subject(from_size(3)), progress=log.append)
-    assert [step.phase for step in log] == sorted(
-        (step.phase for step in log), key=["first call (compiles)", "drawing", "judging", "shrinking"].index
-    )
+    phases = ("first call (compiles)", "drawing", "judging", "shrinking", "diagnosis")
+    assert [step.phase for step in log] == sorted((step.phase for step in log), key=phases.index)
     judging = [step for step in log if step.phase == "judging" and step.row is None]
     assert [(step.count, step.planned) for step in judging] == [(count, 40) for count in range(1, 41)]
     assert {(step.formulation, step.property_id) for step in judging} == {("mine", "patch.zero")}
@@ -368,7 +367,7 @@ def test_what_the_caller_knows_is_not_shrunk_and_what_nobody_stated_is() -> None
     assert (known.shrunk, segments(news.shrunk)) == (None, 5)
     assert known.first is next(outcome for outcome in known.outcomes if outcome.verdict is Verdict.FAIL)
     assert one_row(subject(from_size(5)), shrink="none").shrunk is None
-    with pytest.raises(MisuseError, match="shrink: found 'some'; needed new, all or none"):
+    with pytest.raises(MisuseError, match="shrink: found 'some'; needed one, new, all or none"):
         one_row(subject(), shrink="some")
 
 
