@@ -30,7 +30,7 @@ def test_nobody_who_is_right_is_accused() -> None:
 
 def test_no_stranger_who_is_right_is_accused() -> None:
     rows = stranger_rows()
-    assert {row["seed/formulation"] for row in rows} <= {f"{seed}/{name}" for seed in SEEDS for name in STRANGERS}
+    assert {row["seed/formulation"] for row in rows} == {f"{seed}/{name}" for seed in SEEDS for name in STRANGERS}
     assert not [row["accused"] for row in rows if row["accused"] or row["accusations"] != "0"]
 
 
