@@ -52,7 +52,7 @@ def test_rows_appear_on_standard_error_as_they_are_judged_and_those_with_bodies_
     properties = [word for name in ("patch.flat.solve", "purity", "balance.*") for word in ("-p", name)]
     answer = run_command("verify", "nts", *properties, "--examples", "2", "--seed", "1")
     rows = [line.partition(":")[0] for line in answer.stderr.splitlines()]
-    assert rows == [f"nts {name}" for name in ("purity", "balance.force", "balance.moment", "patch.flat.solve")]
+    assert rows == [f"nts {name}" for name in ("balance.force", "purity", "balance.moment", "patch.flat.solve")]
     assert "nts balance.force: pass, 2/2 judged\n" in answer.stderr
     assert "nts: 3 pass, 1 fail as stated\n" in answer.stdout
     assert "2/2 judged" not in answer.stdout
