@@ -38,8 +38,8 @@ from contactverif.run.telling import most_telling
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
-# The properties that are asked first: cheap ones, of which one fails for most mistakes. Balance is there soon. Purity has
-# the same cases, but starts a second process; its failure explains all that others would show.
+# The properties that are asked first: cheap ones, of which one fails for most mistakes. Balance is there soon. Purity
+# has the same cases, but starts a second process; its failure explains all that others would show.
 FIRST = ("balance.force", "purity", "unilateral", "scaling", "patch.flat.resultant", "tangent.sparsity")
 PURITY = "purity"
 
