@@ -19,21 +19,23 @@ from contactverif.cli.counterexample_output import counterexample_text
 from contactverif.cli.run_tables import finding_of, headline, remark_of
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import BROKEN_BY_FAILING, OMITTED, OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.result import BROKEN_BY_FAILING, NOT_JUDGED, OMITTED, OPPOSITE_SIGN, Result, Row, Run
 from contactverif.run.telling import by_telling, most_telling, wrong_rows
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
 _LEAST_WORDS = 30  # Columns that are left for words beside a name, however long it is.
-_PARTS = {  # The results that are no mistake and have a line for each row, and the title above them.
+_PARTS = {  # The results that show no mistake and have a line for each row, and the title above them.
     Result.FAIL: "fails, and promises nothing",
     Result.FAILS_AS_STATED: "fails as stated",
     Result.UNDECIDED: "undecided",
+    Result.NOT_JUDGED: "not judged",
 }
 _COUNTED = {
     Result.PASS: "pass",
     Result.FAILS_AS_STATED: "fail as stated",
     Result.FAIL: "fail without a promise",
     Result.UNDECIDED: "undecided",
+    Result.NOT_JUDGED: "not judged",
     Result.OMITTED: "not asked",
     Result.NOT_APPLICABLE: "do not apply",
     Result.NOT_PROVIDED: "lack a part",
@@ -97,7 +99,7 @@ def _title(name: str, rows: Sequence[Row], wrong: Sequence[Row], width: int) -> 
 
 
 def _other_failures(rows: Sequence[Row], width: int, *, in_full: bool) -> Iterator[Text]:
-    """Yield the failures that break no promise, and what is undecided; in full with a line for each."""
+    """Yield the failures that break no promise, and what was left open; in full with a line for each."""
     for result, title in _PARTS.items():
         part = by_telling(row for row in rows if row.result is result)
         if in_full:
@@ -134,7 +136,7 @@ def _remarks(rows: Sequence[Row], width: int) -> Iterator[Text]:
 def _words(row: Row) -> str:
     """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none."""
     number = row.closest.number if row.closest is not None else None
-    parts = [] if row.unexpected in ("", BROKEN_BY_FAILING) else [row.unexpected]
+    parts = [] if row.unexpected in ("", BROKEN_BY_FAILING, NOT_JUDGED) else [row.unexpected]
     if row.verdict is Verdict.FAIL and not row.breach and number is not None:
         parts.append(f"{number.quantity.name} {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}")
     elif row.reason:
@@ -143,7 +145,7 @@ def _words(row: Row) -> str:
 
 
 def _families(rows: Sequence[Row], width: int) -> Iterator[Text]:
-    """Yield the families of the properties that pass: `patch 12 of 14`, or the property itself if it is alone."""
+    """Yield the families of the properties that pass, such as `patch 12 of 14`."""
     members: dict[str, list[Row]] = {}
     for row in rows:
         if row.result not in (Result.NOT_APPLICABLE, Result.NOT_PROVIDED):

@@ -136,7 +136,7 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
     from contactverif.cli.counterexample_output import how_to_keep
     from contactverif.cli.run_tables import summary
 
-    pictures = _draw_pictures(result, plugins, folder)
+    _draw_pictures(result, plugins, folder)
     show_what_plugins_printed()
     annotate(result)
     if not screen.quiet:
@@ -145,7 +145,7 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
             show(f"{remark}.")
         say_how_many_are_unproven(result)
         if folder is not None:
-            show(f"pictures of {pictures} counterexamples: {folder.name}")
+            show(f"pictures: {folder.name}")
         end.files.announce()
         if REPORT not in end.files.names and not result.promises_kept and (advice := how_to_keep(result)):
             show(advice)
@@ -167,19 +167,17 @@ def show_run(result: Run, screen: ScreenOptions, report: Path | None) -> None:
             show_as_it_is(counterexample_text(example, report))
 
 
-def _draw_pictures(result: Run, plugins: Plugins, folder: PictureFolder | None) -> int:
-    """Draw a picture of each counterexample, if the user named a folder; return how many there are."""
+def _draw_pictures(result: Run, plugins: Plugins, folder: PictureFolder | None) -> None:
+    """Draw a picture of each counterexample, if the user named a folder."""
     if folder is None:
-        return 0
+        return
     from contactverif.cli.counterexample_output import draw_outcome, failing_examples
     from contactverif.contract.counterexample import case_id
 
-    examples = failing_examples(result)
-    for example in examples:
+    for example in failing_examples(result):
         subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
         name = f"{case_id(subject.name, question.id)}.png"
         draw_outcome(subject, question, example.outcome, folder.path / name, argument="--pictures")
-    return len(examples)
 
 
 def select_names(names: list[str], every: bool, limits: Limits | None = None) -> list[str]:

@@ -244,7 +244,7 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
 def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> VerifyJob:
     """Return the job that goes on with a run that was to write a report or page, and was stopped.
 
-    Beside `--resume` only a number of processes may be typed: all other options come from the journal.
+    Beside `--resume` only `--jobs` and `--keep-going` may be typed: all other options come from the journal.
     """
     from contactverif.run.journal import journal_folder
     from contactverif.run.run_plan import read_plan
@@ -259,7 +259,9 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
     options = options_of(plan, command, "--resume")
     others = [path for path in options.out if path.suffix.lower() != output.suffix.lower()]
     workers = typed.workers if typed.workers.jobs is not None else options.workers
-    job = new_job(replace(options, out=(output, *others), workers=workers), command=command)
+    keep_going = typed.keep_going or options.keep_going
+    options = replace(options, out=(output, *others), workers=workers, keep_going=keep_going)
+    job = new_job(options, command=command)
     return replace(job, sources=(folder,), resumes=True)
 
 
@@ -306,7 +308,7 @@ def _check_alone(typed: VerifyOptions) -> None:
     defaults = VerifyOptions()
     for name in (entry.name for entry in fields(VerifyOptions)):
         if name not in ("workers", "keep_going") and getattr(typed, name) != getattr(defaults, name):
-            needed = "--jobs at most: all other options come from the journal"
+            needed = "--jobs and --keep-going at most: all other options come from the journal"
             raise MisuseError("--resume", f"{name} beside it", needed)
 
 

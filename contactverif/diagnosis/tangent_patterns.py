@@ -116,7 +116,8 @@ def _one_part(pair: Tangents) -> str:
         return _several(wrong) if wrong else ""
     (name,) = wrong
     errors, power = pair.errors[blocks[name]], _power_of_depth(pair.errors[blocks[name]])
-    part = _part_of(name, round(power), errors, pair) if abs(power - round(power)) < _POWER else ""
+    nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
+    part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
         return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"
     return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"

@@ -90,8 +90,8 @@ _RANK = {property_id: rank for rank, property_id in enumerate(ORDER)}
 
 
 def wrong_rows(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows that make a run fail, the most telling first, but for those that were not asked."""
-    return by_telling(row for row in rows if row.unexpected and not row.omitted)
+    """Return the rows that make a run fail by what they found, the most telling first."""
+    return by_telling(row for row in rows if row.unexpected and row.verdict is not Verdict.NOT_JUDGED)
 
 
 def most_telling(rows: Iterable[Row]) -> Row | None:
@@ -105,7 +105,7 @@ def most_telling(rows: Iterable[Row]) -> Row | None:
 
 
 def by_telling(rows: Iterable[Row]) -> list[Row]:
-    """Return rows, the most telling first: crashes, breaches, failures by `ORDER`, and what could not be judged.
+    """Return rows, the most telling first: crashes, breaches of the contract, failures, and the rest, each by `ORDER`.
 
     A property of another author is shown before ours, since it was installed for a purpose.
     """

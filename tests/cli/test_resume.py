@@ -121,7 +121,7 @@ def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_pa
     begin_journal(journal_folder(tmp_path / "r.nc"), Plan(), [])
     answer = ask("verify", "nts", "--resume", tmp_path / "r.nc")
     assert answer.status == 2
-    assert "names beside it; needed --jobs at most" in answer.err
+    assert "names beside it; needed --jobs and --keep-going at most" in answer.err
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,14 @@ from typing import Any
 
 import pytest
 from asking import Ask, install_formulations
-from subjects import ResidualAlone
+from subjects import ResidualAlone, load_property
 
 import contactverif_nts
+from contactverif.cli.console import QuietConsole
+from contactverif.cli.run_screen import RunScreen
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import Row, Run
 from contactverif.contract.traits import PatchPromises, Promises, Traits
-from contactverif.run.registry import property_ids
 
 CHEAP = ("purity", "balance.*", "patch.flat.*", "hard.node-hit", "swap", "scale", "unilateral")
 OPTIONS = (*(word for name in CHEAP for word in ("-p", name)), "--examples", "4", "--seed", "1")
@@ -98,7 +101,10 @@ def test_what_is_left_out_has_one_line_that_says_why_and_how_to_ask_it(ask: Ask)
     assert "not asked" not in ask("verify", "remembering", "--keep-going", *OPTIONS).out
 
 
-def test_the_order_has_every_property_once() -> None:
-    from contactverif.run.telling import ORDER
-
-    assert sorted(ORDER) == sorted(property_ids())
+def test_what_could_not_be_judged_is_not_called_wrong() -> None:
+    question = load_property("purity")
+    row = Row("mine", question.info, Verdict.NOT_JUDGED, True, reason="stopped: 3 of 100 cases judged", planned=100)
+    console = QuietConsole(COLUMNS)
+    with console.capture() as capture:
+        console.print(RunScreen(Run((row,))))
+    assert "mine: 1 not judged\nnot judged:\n  purity  stopped: 3 of 100 cases judged\n" in capture.get()

@@ -149,6 +149,16 @@ class ColumnMissing(Right):
         return matrix
 
 
+class DeepTangentWrong(Right):
+    """The material part of the tangent is wrong in deep penetration alone, and so grows by no power of it."""
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        matrix = super().tangent(interface, pairing, z)
+        if z[1] < -(2.0**-6):
+            matrix[1::2, 1::2] *= 2
+        return matrix
+
+
 FORCES: Mapping[str, tuple[Callable[..., Any], str]] = {
     "opposite sign": (OppositeSign, "every node has -1 times the exact force: the sign"),
     "twice": (Twice, "every node has 2 times the exact force: two passes"),
@@ -164,5 +174,6 @@ FORCES: Mapping[str, tuple[Callable[..., Any], str]] = {
 TANGENTS: Mapping[str, tuple[Callable[..., Any], str]] = {
     "turned": (TangentTurned, "the tangent has the opposite sign"),
     "twice": (TangentTwice, "the tangent has a factor 2"),
+    "deep": (DeepTangentWrong, "entries in n–n are wrong"),
     "column": (ColumnMissing, "column 1 (y of slave node 0) is missing, all others are right"),
 }

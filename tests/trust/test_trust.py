@@ -2,7 +2,7 @@
 
 import pytest
 from option_names import all_variants
-from page import PAGE, campaign_counts, caught_alone, kill_rows, option_rows, page, size_of, stranger_rows
+from page import PAGE, campaign_counts, catchers, caught_alone, kill_rows, option_rows, page, size_of, stranger_rows
 from reasons import SHARED
 from stranger_cases import SEEDS
 from strangers import STRANGERS
@@ -11,10 +11,12 @@ from tables import FOLDER, read
 
 from contactverif.contract.property import NONE_UNDECIDED
 from contactverif.run.registry import property_ids
+from contactverif.run.telling import ORDER
 
 LEAST_CASES = 100_000
 # {wrong formulation: the segments below which it is right}. All others fail on few.
 LARGE = {"wrong above 100 segments": 101, "wrong with 50 master segments under two slave segments": 65}
+MEAN_MUTANTS = 10  # So many mutants of a mean property are added to those of each property.
 MOST_UNDECIDED, MOST_UNDECIDED_NEWTON = 0.02, 0.05
 COUNTS = campaign_counts()
 
@@ -53,6 +55,19 @@ def test_few_cases_of_right_formulations_are_undecided(name: str) -> None:
     assert share <= (MOST_UNDECIDED_NEWTON if name.startswith("newton.") else MOST_UNDECIDED)
     # A formulation is suspected above twice the share that the property states, so that share is not below this one.
     assert share <= load_property(name).usual_undecided or share <= NONE_UNDECIDED
+
+
+def test_failures_are_shown_in_the_order_of_the_kill_matrix() -> None:
+    """Telling is a property if few others catch its mutants; with few mutants it counts as one of the mean."""
+    ids, rows, _ = kill_rows()
+    caught = [catchers(row, ids) for row in rows]
+    mean = sum(len(names) ** 2 for names in caught) / sum(map(len, caught))
+
+    def key(name: str) -> tuple[bool, float]:
+        sizes = [len(names) for names in caught if name in names]
+        return load_property(name).bodies, (sum(sizes) + MEAN_MUTANTS * mean) / (len(sizes) + MEAN_MUTANTS)
+
+    assert list(ORDER) == sorted(property_ids(), key=key)
 
 
 def test_every_property_is_in_the_kill_matrix_and_catches_its_mutants() -> None:
