@@ -42,6 +42,7 @@ from contactverif.isolation.process import PluginProcess, Question, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
 _MOST_HANGS = 2  # After so many calls without an answer neither, in all of its processes.
+_AT_FIRST = 10  # The number of such calls that one counts for if its method never answered: it takes five times as long.
 _AT_IMPORT = 100  # The number of such calls that an import without an answer counts for.
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.
@@ -91,6 +92,8 @@ class Host:
         n_hangs = _hangs[self._key]
         if n_hangs >= _AT_IMPORT:
             return "no answer came while it was imported"
+        if n_hangs >= _AT_FIRST:
+            return "no answer came to the first call of a method"
         if n_hangs >= _MOST_HANGS:
             return "no answer came twice"
         return f"its process ended {self.n_ended} times" if self.n_ended >= _MOST_ENDS else ""
@@ -187,18 +190,19 @@ class Host:
         try:
             self._exchange(self._process, waiting, questions)
         except PluginError as error:
+            self._note_end(error, next((question.verb for question in questions if question.answer is None), ""))
             _answer_all(questions, error)
-            self._note_end(error, at_import=bool(questions) and questions[0].verb == "import")
         except BaseException:  # The process is ended, see `PluginProcess.ask`, and nobody is to blame.
             _answer_all(questions, PluginError("the question was interrupted", "not asked"))
             self._process = None
             raise
 
-    def _note_end(self, error: PluginError, *, at_import: bool) -> None:
-        """Note that the process has ended, and why."""
+    def _note_end(self, error: PluginError, verb: str) -> None:
+        """Note that the process has ended, why, and in which method."""
         self.n_ended += 1
         if error.cause == "hang":
-            _hangs[self._key] += _AT_IMPORT if at_import else 1
+            answered = verb in self._first_seconds
+            _hangs[self._key] += _AT_IMPORT if verb == "import" else 1 if answered else _AT_FIRST
         self.read_last_words()
         self._process = None
 

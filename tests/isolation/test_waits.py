@@ -130,10 +130,10 @@ def let_it_hang(monkeypatch: pytest.MonkeyPatch, when: Callable[[str], bool]) ->
     real = process.PluginProcess.ask
 
     def fake(self: process.PluginProcess, frame: bytes, questions: Sequence[process.Question], *seconds: Any) -> None:
-        if questions and when(questions[0].verb):
-            verbs.append(questions[0].verb)
+        if late := [question.verb for question in questions if when(question.verb)]:
+            verbs.append(late[0])
             self.end()
-            raise PluginError(f"{questions[0].verb}: no answer within 60 s", "hang", ended=True)
+            raise PluginError(f"{late[0]}: no answer within 60 s", "hang", ended=True)
         real(self, frame, questions, *seconds)
 
     monkeypatch.setattr(process.PluginProcess, "ask", fake)
@@ -142,6 +142,7 @@ def let_it_hang(monkeypatch: pytest.MonkeyPatch, when: Callable[[str], bool]) ->
 
 def test_two_calls_without_an_answer_are_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
     subject = load(hostile_few.PROGRAM, "Springs")
+    ask(subject)
     verbs = let_it_hang(monkeypatch, lambda verb: verb == "residual")
     rows = verify([subject], load_properties(["balance.force", "purity"]), examples=10, seed=1).rows
     assert verbs == ["residual", "residual"]
@@ -154,6 +155,8 @@ def test_two_calls_without_an_answer_are_the_last(monkeypatch: pytest.MonkeyPatc
 def test_both_processes_of_a_formulation_count_together(monkeypatch: pytest.MonkeyPatch) -> None:
     first = load(hostile_few.PROGRAM, "Springs")
     second = first.restart()
+    for subject in (first, second):
+        ask(subject)
     let_it_hang(monkeypatch, lambda verb: verb == "residual")
     causes = []
     for subject in (first, second, first, second):
@@ -161,6 +164,20 @@ def test_both_processes_of_a_formulation_count_together(monkeypatch: pytest.Monk
             ask(subject)
         causes.append(caught.value.cause)
     assert causes == ["hang", "hang", "not asked", "not asked"]
+
+
+def test_a_first_call_without_an_answer_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It waits five times as long as a later one, and a second such wait would tell nothing new."""
+    subject = load(hostile_few.PROGRAM, "Springs")
+    verbs = let_it_hang(monkeypatch, lambda verb: verb == "residual")
+    causes = []
+    for asked in (subject, subject.restart()):
+        with pytest.raises(PluginError) as caught:
+            ask(asked)
+        causes.append(caught.value.cause)
+    assert causes == ["hang", "not asked"]
+    assert str(caught.value).endswith("no answer came to the first call of a method")
+    assert verbs == ["residual"]
 
 
 def test_one_import_without_an_answer_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
