@@ -17,6 +17,7 @@ from contactverif.cli.shared_options import (
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
+    ScreenOptions,
     WorkerOptions,
     formulation_argument,
     formulation_option,
@@ -38,12 +39,16 @@ def compare(
     place: PlaceOptions,
     workers: WorkerOptions,
     isolation: IsolationOptions,
+    screen: ScreenOptions,
     resume: Annotated[
         Path | None,
         typer.Option(help="Go on with the comparison that was to write FILE and was stopped.", metavar="FILE"),
     ] = None,
 ) -> None:
     """Compare formulations with a reference, on the same cases; or two reports.
+
+    Few lines say which verdicts differ, the errors and the time; -v shows all
+    tables and the meshes on which they differ most.
 
     With --out, every outcome goes to the folder FILE.journal as soon as it is
     there, and --resume FILE goes on with a comparison that was stopped.
@@ -76,7 +81,7 @@ def compare(
     reference = _only_one("--against", against or [])
     reports = _reports_among(names or [])
     if reports:
-        _check_no_run_options(sampling, place, workers, against=reference, pictures=pictures, resume=resume)
+        _check_no_run_options(sampling, place, workers, screen, against=reference, pictures=pictures, resume=resume)
         nothing_worse = _compare_reports(reports, properties or [], out)
         raise typer.Exit(0 if nothing_worse else 1)
     options = VerifyOptions(
@@ -90,10 +95,10 @@ def compare(
         workers=workers,
         isolation=isolation,
     )
-    raise typer.Exit(_compare_formulations(options, resume))
+    raise typer.Exit(_compare_formulations(options, resume, screen))
 
 
-def _compare_formulations(typed: VerifyOptions, resume: Path | None) -> int:
+def _compare_formulations(typed: VerifyOptions, resume: Path | None, screen: ScreenOptions) -> int:
     """Compare formulations, the reference being the first name; return the exit status."""
     if resume is None and not any(typed.names[:1]):
         raise MisuseError("--against", "nothing", "the formulation to compare with, or two reports OLD.nc NEW.nc")
@@ -103,7 +108,7 @@ def _compare_formulations(typed: VerifyOptions, resume: Path | None) -> int:
         job = resumed_job(resume, typed, COMPARE)
     from contactverif.cli.formulation_comparison import compare_formulations
 
-    return compare_formulations(job)
+    return compare_formulations(job, screen)
 
 
 def _compare_reports(reports: Sequence[Path], globs: Sequence[str], out: Sequence[Path] | None) -> bool:
@@ -144,7 +149,8 @@ def _is_report(name: str) -> bool:
 def _check_no_run_options(*groups: Any, **options: Any) -> None:
     """Refuse the options of a run beside two reports, which have been judged already."""
     for group in groups:
-        options |= {field.name: getattr(group, field.name) for field in fields(group)}
+        values = {field.name: getattr(group, field.name) for field in fields(group)}
+        options |= {field.name: values[field.name] for field in fields(group) if values[field.name] != field.default}
     for option, value in options.items():
         if value not in (None, False):
             raise MisuseError(f"--{option}", "two reports beside it", "formulations: a report has been judged already")

@@ -1,4 +1,4 @@
-"""The comparison of formulations: one run on the same cases, then tables, meshes, a page and pictures."""
+"""The comparison of formulations: one run on the same cases, then the screen, meshes, a page and pictures."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from functools import partial
 from pathlib import Path
 
 from contactverif.cli.annotations import annotate
-from contactverif.cli.comparison_tables import MOST_MESHES, SideBySide, last_line, mesh_text
-from contactverif.cli.console import say, show, show_as_it_is
+from contactverif.cli.comparison_screen import ComparisonScreen
+from contactverif.cli.comparison_tables import SideBySide, last_line, mesh_text
+from contactverif.cli.console import show, show_as_it_is
 from contactverif.cli.counterexample_output import draw_outcome
 from contactverif.cli.output_files import PAGE, PictureFolder
 from contactverif.cli.progress import Bar
@@ -21,6 +22,7 @@ from contactverif.cli.run_endings import (
     watch_for_stops,
 )
 from contactverif.cli.run_files import run_writers
+from contactverif.cli.shared_options import ScreenOptions
 from contactverif.cli.verify_job import Plugins, VerifyJob
 from contactverif.contract.counterexample import case_id
 from contactverif.contract.errors import MisuseError
@@ -52,22 +54,27 @@ def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
     return reference, Plugins([reference, *(load_formulation(name, limits) for name in names)], properties)
 
 
-def compare_formulations(job: VerifyJob) -> int:
-    """Run all properties, show the tables and write the files; return the exit status."""
+def compare_formulations(job: VerifyJob, screen: ScreenOptions) -> int:
+    """Run all properties, show what was found and write the files; return the exit status."""
     with watch_for_stops(job), job.begin(partial(_load, job)) as ((reference, plugins), journal):
         with worker_pool(job.jobs) as executor, Bar() as bar:
             options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
         gap = partial(find_gap, study.run, plugins.subjects, plugins.questions, job.sampling)
         end = end_run(job, journal, gap, _writers(study, plugins), promises_kept=study.comparison.promises_kept)
-    show(SideBySide(study))
-    _show_meshes(study, plugins, job.pictures, on_a_page=PAGE in end.files.paths)
-    say_how_many_are_unproven(study.run)
+    if job.pictures is not None:
+        _draw_meshes(study, plugins, job.pictures)
     show_what_plugins_printed()
-    end.files.announce()
     annotate(study.run)
+    if not screen.quiet:
+        _show_study(study, screen)
+        say_how_many_are_unproven(study.run)
+        if job.pictures is not None:
+            show(f"pictures: {job.pictures.name}")
+        end.files.announce()
     show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))
-    say_where_plugins_ran(study.run.provenance)
+    if not screen.quiet:
+        say_where_plugins_ran(study.run.provenance)
     if not end.complete:
         say_how_to_go_on(job)
     return end.status
@@ -90,18 +97,20 @@ def _both(differing: Differing, study: Study, plugins: Plugins) -> tuple[Propert
     return plugins.question(differing.info.id), candidate, reference
 
 
-def _show_meshes(study: Study, plugins: Plugins, folder: PictureFolder | None, *, on_a_page: bool) -> None:
-    """Print the meshes that tell most, and draw all of them into the folder, if there is one."""
-    for place, differing in enumerate(study.differing):
-        if place < MOST_MESHES:
+def _show_study(study: Study, screen: ScreenOptions) -> None:
+    """Show what differs in few lines, or all tables; and the meshes on which they differ, if the user wants them."""
+    show(SideBySide(study) if screen.verbose else ComparisonScreen(study))
+    if screen.verbose or screen.show == "all":
+        for differing in study.differing:
             show_as_it_is(mesh_text(differing, study.comparison.reference))
-        if folder is not None:
-            for name in _draw_pictures(differing, *_both(differing, study, plugins), folder):
-                say(f"    picture: {folder.name / name}")
-    rest = study.differing[MOST_MESHES:]
-    if rest and folder is None and not on_a_page:
-        ids = ", ".join(differing.info.id for differing in rest)
-        show(f"\nThey also differ on {ids}: --out FILE.html or --pictures FOLDER draws those meshes.")
+    elif study.differing:
+        show("error: the worst over its tolerance. --show all: the meshes on which they differ; -v: all tables.")
+
+
+def _draw_meshes(study: Study, plugins: Plugins, folder: PictureFolder) -> None:
+    """Draw all meshes on which they differ into a folder."""
+    for differing in study.differing:
+        _draw_pictures(differing, *_both(differing, study, plugins), folder)
 
 
 def _page_drawing(differing: Differing, question: Property, candidate: Subject, reference: Subject) -> Drawing:
@@ -114,8 +123,8 @@ def _page_drawing(differing: Differing, question: Property, candidate: Subject, 
 
 def _draw_pictures(
     differing: Differing, question: Property, candidate: Subject, reference: Subject, folder: PictureFolder
-) -> list[str]:
-    """Draw the bodies as both solve them, or the case with the forces of each; return the files' names."""
+) -> None:
+    """Draw the bodies as both solve them, or the case with the forces of each."""
     if has_bodies(differing.case):
         from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
 
@@ -123,10 +132,7 @@ def _draw_pictures(
         name = f"{case_id(candidate.name, differing.info.id)}.png"
         if scene.solutions:
             draw_scene(scene, folder.path / name, title=f"{differing.info.id}, case {differing.number}")
-        return [name] if scene.solutions else []
-    names = []
+        return
     for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
         name = f"{case_id(subject.name, differing.info.id)}.png"
         draw_outcome(subject, question, outcome, folder.path / name, argument="--pictures")
-        names.append(name)
-    return names

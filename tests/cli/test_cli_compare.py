@@ -58,7 +58,7 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
-    answer = ask("vts-me", "--against", "vts-ppt", *QUICK)
+    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "-v")
     assert answer.status == 0  # vts-me says itself that it fails the patch test
     assert answer.err == ""
     assert re.search(r"vts-me against vts-ppt: profile dev: 12 random cases for each property, seed 1", answer.out)
@@ -69,6 +69,29 @@ def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
         r"patch.flat.transmission, case \d+\n    vts-me: fail, .* times its tolerance\n    vts-ppt: pass,", answer.out
     )
     assert answer.out.rstrip().endswith("Every promise of vts-me is kept.")
+
+
+def test_what_differs_takes_few_lines(ask: Ask) -> None:
+    """Verdicts that differ, errors of accuracy with one verdict, iterations and time: 25 lines of 80 columns at most."""
+    options = ("--examples", "3", "--seed", "1", "--isolation", "inline")
+    answer = ask("vts-me", "--against", "vts-ppt", *options, columns=80)
+    lines = answer.out.splitlines()
+    assert answer.status == 0
+    assert len(lines) <= 25
+    assert max(map(len, lines)) <= 80
+    assert re.search(r"vts-me against vts-ppt: the same verdict in \d\d of \d\d properties", answer.out)
+    assert re.search(r"\n  patch.flat.transmission +fails as stated +\S+ pass +\S+ *\n", answer.out)
+    assert re.search(r"\n  accuracy.arc +pass +\S+ pass +\S+ *\n", answer.out)
+    assert re.search(r"\n  \d+ more differ: ", answer.out)
+    assert re.search(r"\nNewton iterations: fewer in \d+ cases, the same in \d+, more in \d+\.\n", answer.out)
+    assert re.search(r"\nAn evaluation takes \d+ µs on 16 segments \(\S+ of vts-ppt\),", answer.out)
+    quiet = ask("vts-me", "--against", "vts-ppt", "-q", "-p", "balance.force", *options)
+    assert quiet.out == "Every promise of vts-me is kept.\n"
+
+
+def test_a_comparison_draws_all_meshes_on_which_formulations_differ(ask: Ask) -> None:
+    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--show", "all")
+    assert len(re.findall(r"^(\S+), case \d+$", answer.out, flags=re.MULTILINE)) == 2
 
 
 def test_every_file_that_is_named_is_written(ask: Ask, tmp_path: Path) -> None:
@@ -101,7 +124,7 @@ def test_a_broken_promise_of_a_candidate_is_status_1_and_of_the_reference_is_not
     answer = ask("vts-ppt", "--against", "vts-me", *options)
     assert answer.status == 1
     assert answer.out.rstrip().endswith("1 broken promise: vts-ppt balance.force (stated to fail, but passes).")
-    answer = ask("vts-me", "--against", "vts-ppt", *options)
+    answer = ask("vts-me", "--against", "vts-ppt", *options, "-v")
     assert answer.status == 0
     assert "BROKEN PROMISE" in answer.out
 
@@ -109,7 +132,7 @@ def test_a_broken_promise_of_a_candidate_is_status_1_and_of_the_reference_is_not
 def test_scenes_and_meshes_can_be_compared_on(ask: Ask) -> None:
     answer = ask("vts-me", "--against", "vts-ppt", "--scene", "c", "-p", "patch.flat.*", "--examples", "1")
     assert answer.status == 0
-    assert re.search(r"patch.flat.solve +pass +≠ fail", answer.out)
+    assert re.search(r"patch.flat.solve +fail.* pass ", answer.out)
     on_punch = ("--mesh", PUNCH, "--slave", "punch", "--master", "base", "-p", "balance.force", "--examples", "2")
     assert ask("nts", "--against", "vts-ppt-balanced", *on_punch, "--seed", "1").status == 0
 
@@ -148,7 +171,7 @@ def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
     tables = ask(reports / "old.nc", reports / "worse.nc", columns=80).out.partition("\nvts-ppt, patch")[0]
     assert "…" not in tables
     assert re.search(r"better +equal +worse +time", tables)
-    options = ("-p", "patch.flat.*", "--seed", "1", "--examples", "3")
+    options = ("-v", "-p", "patch.flat.*", "--seed", "1", "--examples", "3")
     tables = ask("vts-me", "mortar", "--against", "vts-ppt", *options, columns=80).out.partition("\npatch.flat.")[0]
     assert "…" not in tables
     assert re.search(r"median +worst +ratio +better +equal +worse *\n", tables)

@@ -171,9 +171,9 @@ def test_a_first_call_without_an_answer_is_the_last(monkeypatch: pytest.MonkeyPa
     subject = load(hostile_few.PROGRAM, "Springs")
     verbs = let_it_hang(monkeypatch, lambda verb: verb == "residual")
     causes = []
-    for asked in (subject, subject.restart()):
+    for copy in (subject, subject.restart()):
         with pytest.raises(PluginError) as caught:
-            ask(asked)
+            ask(copy)
         causes.append(caught.value.cause)
     assert causes == ["hang", "not asked"]
     assert str(caught.value).endswith("no answer came to the first call of a method")
