@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.scale_patterns import diagnose_scale
+from contactverif.diagnosis.state_patterns import diagnose_memory
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
-# The properties of which a failure says that answers cannot be relied on. Then a pattern in them means nothing.
-NO_ANSWERS = ("purity", "purity.long")
+OF_MEMORY = ("purity",)
 OF_TANGENTS = ("tangent.", "newton.")
 OF_DIGITS = ("stability.",)
 
 
-def diagnose(subject: Subject, property_id: str) -> str:
+def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> str:
     """Return what kind of mistake a formulation makes, in a sentence.
 
     Parameters
@@ -24,22 +26,29 @@ def diagnose(subject: Subject, property_id: str) -> str:
     subject : Subject
         A formulation that fails.
     property_id : str
-        The property whose failure is to be explained. For one of tangents the tangent is looked at, else the forces.
+        The property whose failure is to be explained. For one of tangents the tangent is looked at, for one of purity
+        what calls change, else the forces.
+    others : Sequence[str]
+        The other properties that fail. Where one is of forces, these are looked at first: a tangent of wrong forces
+        fits nothing.
 
     Returns
     -------
     str
         The sentence; empty if no rule knows the mistake, or the formulation has no answer where the rules ask.
     """
-    if property_id in NO_ANSWERS:
-        return ""
     try:
         with np.errstate(all="ignore"):
-            if property_id.startswith(OF_TANGENTS):  # Forces that are wrong have a tangent that fits them.
+            if property_id.startswith(OF_MEMORY):  # Other patterns mean nothing then.
+                return diagnose_memory(subject)
+            every = (property_id, *others)
+            if all(name.startswith(OF_TANGENTS) for name in every):
                 return diagnose_tangent(subject)
             in_full = property_id.startswith("patch.") or subject.traits.promises.patch.flat is True
             text = diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
-            return text or ("" if property_id.startswith(OF_DIGITS) else diagnose_scale(subject))
+            if not text and not property_id.startswith((*OF_DIGITS, *OF_TANGENTS)):
+                text = diagnose_scale(subject)
+            return text or (diagnose_tangent(subject) if property_id.startswith(OF_TANGENTS) else "")
     except ContractError:
         return ""

@@ -1,4 +1,4 @@
-"""A flat interface of three segments on four, with the exact force of each piece on which two segments face each other.
+"""Flat interfaces, with the exact force of each piece on which two segments face each other: three segments on four.
 
 On one segment a side every place is an end and all ratios are the same. Here no node faces another, the slave ends
 inside the master, and no two segments are alike, so that each mistake has a pattern of its own.
@@ -17,6 +17,9 @@ from contactverif.contract.interface import Interface
 
 SLAVE = np.array([0.0, 1.0, 2.25, 3.125])
 MASTER = np.array([3.625, 2.625, 1.5, 0.6875, -0.5])  # The master runs the other way.
+# Six segments on two, so that some have no node of the master; and one on four, which reaches over whole segments.
+FINE = np.array([0.0, 0.5, 1.0, 1.625, 2.0, 2.625, 3.125]), np.array([3.625, 1.25, -0.5])
+COARSE = np.array([0.0, 3.125]), MASTER
 DEPTH = 2.0**-10  # So small that a slave that is tilted by it is as long as its projection, to 5e-7.
 PENALTY = 2.0**10
 _GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # Two points integrate cubic functions exactly.
@@ -34,12 +37,15 @@ class FlatState:
         The size of the force by which the pressure on a piece pushes each node.
     slave_segment, master_segment : IntArray, shape (n_pieces,)
         The segments that face each other there.
+    n_slave_nodes : int
+        The number of slave nodes, which come first.
     """
 
     case: Case
     pieces: FloatArray
     slave_segment: IntArray
     master_segment: IntArray
+    n_slave_nodes: int
 
     @property
     def exact(self) -> FloatArray:
@@ -48,9 +54,10 @@ class FlatState:
         return exact
 
     @property
-    def n_slave_nodes(self) -> int:
-        """The number of slave nodes, which come first."""
-        return len(SLAVE)
+    def along(self) -> FloatArray:
+        """The places (n_nodes,) of the nodes along the interface."""
+        along: FloatArray = self.case.positions[:, 0]
+        return along
 
     def swap(self, *, master: bool) -> FloatArray:
         """Return the forces (n_nodes,) if the two shape functions of each segment of a side are exchanged."""
@@ -66,19 +73,21 @@ class FlatState:
         return forces
 
 
-def flat_state(slope: float = 0.0, depth: float = DEPTH) -> FlatState:
+def flat_state(
+    slope: float = 0.0, depth: float = DEPTH, places: tuple[FloatArray, FloatArray] = (SLAVE, MASTER)
+) -> FlatState:
     """Return the state whose penetration is `depth` (1 + slope x) at the place x along the slave."""
-    n_slave = len(SLAVE)
-    along = np.concatenate([SLAVE, MASTER])
+    slave, master = places
+    n_slave, along = len(slave), np.concatenate(places)
     points = np.column_stack([along, np.zeros(len(along))])
     interface = Interface.from_chains(points[:n_slave], points[n_slave:])
     z = points.copy()
-    z[:n_slave, 1] = -depth * (1 + slope * SLAVE)
-    case = Case(interface, z.reshape(-1), PENALTY, name="three on four")
-    ends = np.sort(along[(along >= SLAVE[0]) & (along <= SLAVE[-1])])
+    z[:n_slave, 1] = -depth * (1 + slope * slave)
+    case = Case(interface, z.reshape(-1), PENALTY, name="flat")
+    ends = np.unique(along[(along >= slave[0]) & (along <= slave[-1])])
     middles = (ends[1:] + ends[:-1]) / 2
-    slave_segment = np.searchsorted(SLAVE, middles) - 1
-    master_segment = len(MASTER) - 1 - np.searchsorted(MASTER[::-1], middles)
+    slave_segment = np.searchsorted(slave, middles) - 1
+    master_segment = len(master) - 1 - np.searchsorted(master[::-1], middles)
     pieces = np.zeros((len(middles), len(along)))
     for piece, (first, last) in enumerate(pairwise(ends)):
         for x in (first + last) / 2 + _GAUSS * (last - first) / 2:
@@ -89,4 +98,4 @@ def flat_state(slope: float = 0.0, depth: float = DEPTH) -> FlatState:
             ):
                 share = (x - along[nodes[0]]) / (along[nodes[1]] - along[nodes[0]])
                 pieces[piece, nodes] += force * np.array([1 - share, share])
-    return FlatState(case, pieces, slave_segment, master_segment)
+    return FlatState(case, pieces, slave_segment, master_segment, n_slave)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import DEPTH, PENALTY, FlatState, flat_state
+from contactverif.diagnosis.flat_state import COARSE, DEPTH, FINE, PENALTY, FlatState, flat_state
+from contactverif.diagnosis.piece_patterns import SAME, equal, of_pieces, same
 
-# Two sizes are the same within this share of the largest. A tilt of the state by DEPTH changes them by less, and so do
-# all roundings, even if forces are summed in single precision.
-SAME = 1e-4
+_TILT = 0.25  # The slope of a slave whose forces must balance, too.
 _MEANINGS = {  # {factor: what it may mean}
     2.0: "two passes that each have the whole penalty, or a factor 2",
     0.5: "a factor ½, such as a mean of two sides that is taken once too often",
@@ -35,7 +34,38 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
         _uniform_pattern(uniform, forces, in_full=in_full)
         or _along_the_surface(forces)
         or _linear_pattern(linear, _forces(subject, linear)[:, 1])
+        or _on_other_meshes(subject, in_full=in_full)
+        or (_directions(subject) if subject.traits.promises.conserves_force else "")
     )
+
+
+def _on_other_meshes(subject: Subject, *, in_full: bool) -> str:
+    """Return the pattern on a slave that is finer than its master, or coarser."""
+    for places, words in ((FINE, "finer"), (COARSE, "coarser")):
+        state = flat_state(places=places)
+        if text := _uniform_pattern(state, _forces(subject, state), in_full=in_full):
+            return f"on a slave that is {words} than its master: {text}"
+    return ""
+
+
+def _directions(subject: Subject) -> str:
+    """Return along which normals the forces of both sides are, where they do not balance on a tilted slave."""
+    state = flat_state(slope=_TILT, depth=1.0)
+    n, normals = state.n_slave_nodes, {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
+    forces = _forces(subject, state)
+    on_slave, on_master = forces[:n].sum(axis=0), forces[n:].sum(axis=0)
+    if same(on_slave, on_master):
+        return ""
+    found = [_name_direction(force, normals) for force in (on_slave, on_master)]
+    words = f"along {found[0]} normal on the slave, along {found[1]} normal on the master"
+    return f"the forces on the sides of a tilted slave do not balance: they are {words}"
+
+
+def _name_direction(force: FloatArray, normals: Mapping[str, FloatArray]) -> str:
+    """Return the name of the normal along which a force is."""
+    size = np.linalg.norm(force)
+    names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
+    return next(names, "another")
 
 
 def _forces(subject: Subject, state: FlatState) -> FloatArray:
@@ -52,17 +82,19 @@ def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> 
     pushes, exact, n = forces[:, 1], state.exact, state.n_slave_nodes
     if not forces.any():
         return "there is no force at all where the surfaces penetrate"
-    if _same(pushes, exact):
+    if same(pushes, exact):
         return ""
     if text := (
         _factor(pushes, exact)
         or _node_pattern(pushes[:n], exact[:n])
+        or _length_pattern(state, pushes)
         or _segment_pattern("slave", state.pieces, state.slave_segment, pushes)
         or _segment_pattern("master", state.pieces, state.master_segment, pushes)
         or _exchange(state, pushes, master=True)
+        or (of_pieces(state, pushes) if in_full else "")
     ):
         return text
-    if _same(pushes[:n], np.full(n, PENALTY * DEPTH)):
+    if same(pushes[:n], np.full(n, PENALTY * DEPTH)):
         return "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
     return _side_pattern(state, pushes) if in_full else ""
 
@@ -70,22 +102,41 @@ def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> 
 def _exchange(state: FlatState, pushes: FloatArray, *, master: bool) -> str:
     """Return whether the forces are right but for the shape functions of a side, which are exchanged."""
     nodes = slice(state.n_slave_nodes, None) if master else slice(state.n_slave_nodes)
-    if not _same(pushes[nodes], state.swap(master=master)[nodes]):
+    if not same(pushes[nodes], state.swap(master=master)[nodes]):
         return ""
     if master:
         return "the two shape functions of each master segment are exchanged: ξ where 1 − ξ belongs"
     return "the two shape functions of each slave segment are exchanged: a node has what belongs to its neighbour"
 
 
+def _length_pattern(state: FlatState, pushes: FloatArray) -> str:
+    """Return whether the parts of the slave's segments lack the length of their segment, or have it twice."""
+    factors = _factors(state.pieces, state.slave_segment, pushes)
+    if factors is None:
+        return ""
+    for power, words in ((-1, "is missing"), (1, "is counted twice")):
+        if len(factors) > 1 and same(factors, np.diff(state.along[: state.n_slave_nodes]) ** power):
+            return (
+                f"the length of a slave segment {words}: its force has {_times(factors[1])} the exact size on segment 1"
+            )
+    return ""
+
+
 def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
     """Return on which side the forces are wrong, and whether their sum is."""
     exact, n = state.exact, state.n_slave_nodes
-    slave_is_right, master_is_right = _same(pushes[:n], exact[:n]), _same(pushes[n:], exact[n:])
+    slave_is_right, master_is_right = same(pushes[:n], exact[:n]), same(pushes[n:], exact[n:])
     if slave_is_right:
         return "the forces on the slave are right, those on the master are not" + _total(pushes[n:], exact[n:])
     if master_is_right:
         return "the forces on the master are right, those on the slave are not" + _total(pushes[:n], exact[:n])
-    return "the forces are wrong on both sides" + _total(pushes[:n], exact[:n])
+    total, along = _total(pushes[:n], exact[:n]), state.along
+    sums = [
+        np.array([part.sum(), part @ places]) for part, places in ((pushes[:n], along[:n]), (pushes[n:], along[n:]))
+    ]
+    if same(*sums):  # What is integrated acts alike on both sides.
+        total += "; the sides balance, in moments too: look at the points of integration, their weights and their range"
+    return f"the forces are wrong on both sides{total}"
 
 
 def _along_the_surface(forces: FloatArray) -> str:
@@ -97,7 +148,7 @@ def _along_the_surface(forces: FloatArray) -> str:
 
 def _linear_pattern(state: FlatState, pushes: FloatArray) -> str:
     """Return the pattern of the forces of a penetration that grows along the slave, if one is known."""
-    if _same(pushes, state.exact):
+    if same(pushes, state.exact):
         return ""
     # Other rules of integration give other forces, and are not wrong.
     return _exchange(state, pushes, master=False) or _exchange(state, pushes, master=True)
@@ -105,8 +156,8 @@ def _linear_pattern(state: FlatState, pushes: FloatArray) -> str:
 
 def _node_pattern(pushes: FloatArray, exact: FloatArray) -> str:
     """Return what factor the ends of the slave have, if all nodes between them are right."""
-    inner = _equal(pushes, exact)[1:-1].all()
-    ends = [node for node in (0, len(exact) - 1) if not _equal(pushes, exact)[node]]
+    inner = equal(pushes, exact)[1:-1].all()
+    ends = [node for node in (0, len(exact) - 1) if not equal(pushes, exact)[node]]
     if not inner or not ends:
         return ""
     factors = pushes[ends] / exact[ends]
@@ -116,11 +167,8 @@ def _node_pattern(pushes: FloatArray, exact: FloatArray) -> str:
 
 def _segment_pattern(side: str, pieces: FloatArray, of_pieces: IntArray, pushes: FloatArray) -> str:
     """Return what factors the segments of a side have, if the forces are the sum of their parts with such factors."""
-    segments = np.unique(of_pieces)
-    parts = np.stack([pieces[of_pieces == segment].sum(axis=0) for segment in segments], axis=1)
-    factors = np.linalg.lstsq(parts, pushes, rcond=None)[0]
-    wrong = ~_equal(factors, np.ones(len(factors)))
-    if not _same(parts @ factors, pushes) or wrong.all():
+    segments, factors = np.unique(of_pieces), _factors(pieces, of_pieces, pushes)
+    if factors is None or (wrong := ~equal(factors, np.ones(len(factors)))).all():
         return ""
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
@@ -129,10 +177,17 @@ def _segment_pattern(side: str, pieces: FloatArray, of_pieces: IntArray, pushes:
     return f"segments have forces of another size: {words} the exact one, all others right"
 
 
+def _factors(pieces: FloatArray, of_pieces: IntArray, pushes: FloatArray) -> FloatArray | None:
+    """Return the factors (n_segments,) of the parts of the segments whose sum the forces are; None if they are none."""
+    parts = np.stack([pieces[of_pieces == segment].sum(axis=0) for segment in np.unique(of_pieces)], axis=1)
+    factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
+    return factors if same(parts @ factors, pushes) else None
+
+
 def _factor(pushes: FloatArray, exact: FloatArray) -> str:
     """Return the factor that all forces have, and what it may mean, if they have one."""
     factor = float(pushes @ exact / (exact @ exact))
-    if not _same(pushes, factor * exact):
+    if not same(pushes, factor * exact):
         return ""
     near = [words for known, words in _MEANINGS.items() if abs(factor - known) <= SAME * abs(known)]
     return f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
@@ -149,14 +204,4 @@ def _times(factor: float) -> str:
 
 
 def _list(side: str, segments: Sequence[int]) -> str:
-    return f"{side} segment{'s' * (len(segments) > 1)} {' and '.join(map(str, segments))}"
-
-
-def _equal(a: FloatArray, b: FloatArray) -> BoolArray:
-    """Return which numbers are the same, over the largest of the second list."""
-    result: BoolArray = np.abs(a - b) <= SAME * np.abs(b).max()
-    return result
-
-
-def _same(a: FloatArray, b: FloatArray) -> bool:
-    return bool(_equal(a, b).all())
+    return f"{side} segment{'s' * (len(segments) > 1)} {', '.join(map(str, segments))}"

@@ -21,8 +21,8 @@ def diagnose_scale(subject: Subject) -> str:
     for sign, word in ((-1, "smaller"), (1, "larger")):
         for power in POWERS[1:]:
             factor = 2.0 ** (sign * power)
-            change = np.abs(_forces(subject, factor) - reference).max()
-            if change > SAME * np.abs(reference).max():
+            forces = _forces(subject, factor)
+            if np.abs(forces - reference).max() > SAME * np.abs(reference).max():
                 sizes = f"gaps of {factor * DEPTH:.1e} on segments of about {factor:.1e}"
                 return f"forces do not scale with a mesh 2^{power} times {word} ({sizes}): look for an absolute length"
     return ""

@@ -7,18 +7,20 @@ and of the length of a segment grow like g and stand in n–t or t–n.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, dense
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import flat_state
+from contactverif.diagnosis.flat_state import FlatState, flat_state
 
 DEPTHS = tuple(2.0**-power for power in (5, 6, 7, 8))
 # Central differences of a step of 2^-20 of forces that are smooth over 1 err by less, over the largest entry.
 SAME = 1e-6
 STEP = 2.0**-20
+_PARTLY_APART = -0.625  # The slope of a penetration that ends at 1.6, inside a segment of either side.
 _POWER = 0.25  # A part grows like g^k if the measured power is as near to k.
 
 
@@ -46,16 +48,27 @@ def diagnose_tangent(subject: Subject) -> str:
     approximate = subject.traits.promises.tangent == "approximate"
     if subject.traits.rules.enforcement != "penalty" or approximate or "tangent" not in subject.provides:
         return ""
-    pair = _measure(subject)
-    if pair.scale == 0 or _is_small(pair.errors, pair.scale):
+    pair = _measure(subject, [flat_state(depth=depth) for depth in DEPTHS])
+    if pair.scale == 0:
         return ""
+    if _is_small(pair.errors, pair.scale):
+        return _where_apart(subject)
     return _as_a_whole(pair) or _one_line(pair) or _one_part(pair)
 
 
-def _measure(subject: Subject) -> Tangents:
+def _where_apart(subject: Subject) -> str:
+    """Return whether the tangent is wrong where a part of the slave is apart from the master, and in which rows."""
+    pair = _measure(subject, [flat_state(slope=_PARTLY_APART, depth=DEPTHS[0])])
+    if _is_small(pair.errors, pair.scale):
+        return ""
+    rows = np.flatnonzero(np.abs(pair.errors[0]).max(axis=1) > SAME * pair.scale)
+    nodes = ", ".join(dict.fromkeys(_unknown(int(row), pair)[5:] for row in rows))
+    return f"the tangent is wrong only where a part of the slave is apart from the master, and open: in rows of {nodes}"
+
+
+def _measure(subject: Subject, states: Sequence[FlatState]) -> Tangents:
     tangents, derivatives, n_slave = [], [], 0
-    for depth in DEPTHS:
-        state = flat_state(depth=depth)
+    for state in states:
         case, formulation = state.case, subject.for_case(state.case)
         pairing = formulation.pair(case.interface, case.z)
         moves = STEP * np.eye(case.z.size)
@@ -78,6 +91,10 @@ def _as_a_whole(pair: Tangents) -> str:
         return f"the tangent has {'the opposite sign' if abs(factor + 1) < SAME else f'a factor {factor:.4g}'}"
     if _is_small(tangents - (derivatives + derivatives.transpose(0, 2, 1)) / 2, pair.scale):
         return "the tangent is the symmetric part of the derivative"
+    for word, half in (("upper", np.triu(derivatives)), ("lower", np.tril(derivatives))):
+        mirror = half.transpose(0, 2, 1) * (1 - np.eye(half.shape[1]))
+        if _is_small(tangents - half - mirror, pair.scale):
+            return f"the tangent is the {word} triangle of the derivative, mirrored: it is not symmetric"
     return ""
 
 
@@ -111,11 +128,17 @@ def _one_part(pair: Tangents) -> str:
         for rows in "tn"
         for columns in "tn"
     }
-    wrong = [name for name, block in blocks.items() if not _is_small(pair.errors[block], pair.scale)]
+    powers = {
+        name: _power_of_depth(pair.errors[block])
+        for name, block in blocks.items()
+        if not _is_small(pair.errors[block], pair.scale)
+    }
+    # A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
+    wrong = [name for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER]
     if len(wrong) != 1:
         return _several(wrong) if wrong else ""
     (name,) = wrong
-    errors, power = pair.errors[blocks[name]], _power_of_depth(pair.errors[blocks[name]])
+    errors, power = pair.errors[blocks[name]], powers[name]
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
@@ -135,6 +158,8 @@ def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
             return "the part of δξ, in n–t on the master's rows"
         case "nt", 1 if _is_small(on_master, pair.scale):
             return "the part of the length of the slave's segments, in n–t on the slave's columns"
+        case "nt", 1:
+            return "the part of the places of points (δξ) or of the lengths between them, in n–t on rows of both sides"
         case "tn", 1:
             owner = "master" if _is_small(on_slave["columns"], pair.scale) else "slave"
             both = owner == "slave" and not _is_small(on_master, pair.scale)

@@ -42,7 +42,9 @@ from contactverif.isolation.process import PluginProcess, Question, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
 _MOST_HANGS = 2  # After so many calls without an answer neither, in all of its processes.
-_AT_FIRST = 10  # The number of such calls that one counts for if its method never answered: it takes five times as long.
+_AT_FIRST = (
+    10  # The number of such calls that one counts for if its method never answered: it takes five times as long.
+)
 _AT_IMPORT = 100  # The number of such calls that an import without an answer counts for.
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.

@@ -34,14 +34,13 @@ from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, Shrinking, judge_
 from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
-from contactverif.run.telling import most_telling
+from contactverif.run.telling import PURITY, most_telling, wrong_rows
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
 # The properties that are asked first: cheap ones, of which one fails for most mistakes. Balance is there soon. Purity
 # has the same cases, but starts a second process; its failure explains all that others would show.
 FIRST = ("balance.force", "purity", "unilateral", "scaling", "patch.flat.resultant", "tangent.sparsity")
-PURITY = "purity"
 
 
 class RunJobs:
@@ -85,7 +84,7 @@ class RunJobs:
         if not self._keep_going:
             self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
             # All jobs of these properties end before it is known who is asked more, so that it does not depend on time.
-            if any(question.id == PURITY for question in self._questions):
+            if any(question.id in PURITY for question in self._questions):
                 scheduler.work(chain.from_iterable(self._parts_of_next()))
             self._stop_wrong()
         scheduler.work(self)
@@ -101,7 +100,7 @@ class RunJobs:
                 self._stopped[name] = f"the plugin crashes in {property_id}"
             elif row.row.breach:
                 self._stopped[name] = f"the contract is broken in {property_id}"
-            elif property_id == PURITY and row.row.verdict is Verdict.FAIL:
+            elif property_id in PURITY and row.row.verdict is Verdict.FAIL:
                 self._stopped[name] = f"{property_id} fails"
 
     def first_calls(self) -> Iterator[Job]:
@@ -325,16 +324,21 @@ class RunJobs:
         for row in filter(None, map(self._find_most_telling, self._subjects)):
             name, property_id = row.subject.name, row.question.id
             self._report(Progress(name, property_id, "diagnosis", 0, 1))
-            yield Job(diagnose, (row.subject, property_id), partial(self._add_diagnosis, name))
+            others = [wrong.property_id for wrong in wrong_rows(each.row for each in self._rows_of(row.subject))]
+            yield Job(diagnose, (row.subject, property_id, others), partial(self._add_diagnosis, name))
             if self._shrink == "one" and (goal := row.goal()) is not None:
                 yield from self._shrink_row(row, goal)
 
     def _find_most_telling(self, subject: Subject) -> OpenRow | None:
-        """Return the row of a formulation whose failure a person wants to see first; a crash explains itself."""
-        rows = {id(row.row): row for row in self._rows.values() if isinstance(row, OpenRow) and row.subject is subject}
+        """Return the row of a formulation whose failure a person wants to see first; crashes explain themselves."""
+        rows = {id(row.row): row for row in self._rows_of(subject)}
         telling = most_telling(row.row for row in rows.values())
-        explains_itself = telling is None or telling.verdict is not Verdict.FAIL or telling.breach
-        return None if explains_itself else rows[id(telling)]
+        if telling is None or telling.verdict is not Verdict.FAIL:
+            return None
+        return None if telling.breach and telling.property_id not in PURITY else rows[id(telling)]
+
+    def _rows_of(self, subject: Subject) -> list[OpenRow]:
+        return [row for row in self._rows.values() if isinstance(row, OpenRow) and row.subject is subject]
 
     def _add_diagnosis(self, name: str, text: str) -> Iterable[Job]:
         """Add what is known of the mistake of a formulation."""

@@ -13,6 +13,7 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, Row
 
 PATCH = "patch"  # The family of the patch tests.
+PURITY = "purity", "purity.long"  # The properties of which a failure says that no other answer can be relied on.
 
 ORDER = (
     "tangent.directional",
@@ -105,16 +106,18 @@ def most_telling(rows: Iterable[Row]) -> Row | None:
 
 
 def by_telling(rows: Iterable[Row]) -> list[Row]:
-    """Return rows, the most telling first: crashes, breaches of the contract, failures, and the rest, each by `ORDER`.
+    """Return rows, the most telling first, each group by `ORDER`.
 
-    A property of another author is shown before ours, since it was installed for a purpose.
+    Crashes come first, then breaches of the contract, answers that depend on earlier calls, other failures, and the
+    rest. A property of another author is shown before ours, since it was installed for a purpose.
     """
     return sorted(rows, key=_key)
 
 
-def _key(row: Row) -> tuple[bool, bool, bool, int]:
+def _key(row: Row) -> tuple[bool, bool, bool, bool, int]:
     failed = row.verdict in (Verdict.FAIL, Verdict.CRASHED)
-    return row.verdict is not Verdict.CRASHED, not row.breach, not failed, _rank(row)
+    impure = failed and row.property_id in PURITY
+    return row.verdict is not Verdict.CRASHED, not row.breach, not impure, not failed, _rank(row)
 
 
 def _rank(row: Row) -> int:
