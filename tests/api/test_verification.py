@@ -109,7 +109,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "twice": (lambda: verify([Right, Right], FORCES), r"formulation: found Right 2 times; needed each of them once"),
     "no properties": (lambda: verify(Right, []), r"properties: found an empty list; needed an id or a pattern"),
-    "property name": (lambda: verify(Right, "miror"), r"property: found 'miror'; needed .* nearest: mirror"),
+    "property name": (lambda: verify(Right, "mirrors"), r"property: found 'mirrors'; needed .* nearest: mirror"),
     "no property": (lambda: verify(Right, [4]), r"properties: found 4; needed an id or a pattern"),  # type: ignore[list-item]
     "place": (lambda: verify("nts", FORCES, isolation="jail"), r"isolation: found 'jail'; needed box, landlock"),
 }
