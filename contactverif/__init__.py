@@ -14,6 +14,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contactverif.api.report import Report
+    from contactverif.api.verification import verify
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.cases import Cases
@@ -38,11 +40,12 @@ if TYPE_CHECKING:
     from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
     from contactverif.run.judge import judge_case
     from contactverif.run.registry import load_formulation, load_properties
-    from contactverif.run.run import run as verify
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "api.report": ("Report",),
+    "api.verification": ("verify",),
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.cases": ("Cases",),
@@ -62,13 +65,11 @@ _HOMES = {
     "meshes.mesh_file": ("read_interface",),
     "run.judge": ("judge_case",),
     "run.registry": ("load_formulation", "load_properties"),
-    "run.run": ("verify",),
     "problems.blocks": ("two_blocks",),
     "problems.catalogue": ("load_scene",),
     "problems.named_states": ("named_case",),
     "problems.shrink_fit": ("ShrinkFit", "shrink_fit"),
 }
-_NAMES_AT_HOME = {"verify": "run"}  # `contactverif.run` is a room, so the function has another name here.
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = [
@@ -96,6 +97,7 @@ __all__ = [
     "Property",
     "Quantity",
     "Rectangle",
+    "Report",
     "ResidualOnly",
     "Row",
     "Rules",
@@ -127,7 +129,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULE_OF[name]), _NAMES_AT_HOME.get(name, name))
+    return getattr(import_module(_MODULE_OF[name]), name)
 
 
 def __dir__() -> list[str]:

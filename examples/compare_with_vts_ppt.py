@@ -3,15 +3,11 @@
 On the command line this is `contactverif compare vts-me mortar --against vts-ppt`, with errors and times as well.
 """
 
-from contactverif import load_formulation, load_properties, verify
+from contactverif import verify
 
 names = ["vts-ppt", "vts-me", "mortar"]
-result = verify(
-    [load_formulation(name) for name in names],
-    load_properties(["patch.flat.transmission", "patch.dead-zone", "balance.*", "tangent.*"]),
-    examples=20,
-    seed=1,
-)
+properties = ["patch.flat.transmission", "patch.dead-zone", "balance.*", "tangent.*"]
+result = verify(names, properties, examples=20, seed=1)
 verdicts = {(row.formulation, row.property_id): str(row.verdict) for row in result.rows}
 property_ids = sorted({property_id for _, property_id in verdicts})
 

@@ -6,7 +6,7 @@ nodes, slave nodes first, and returns the nodal forces, internal minus external.
 
 import numpy as np
 
-from contactverif import Interface, Subject, load_properties, verify
+from contactverif import Interface, Subject, verify
 
 
 class NodeToSegment:
@@ -30,12 +30,11 @@ class NodeToSegment:
 # One slave segment of length 1 above one master segment of length 2, pressed 1/4 into it. The body is on the left of
 # each chain of nodes, so the two chains run in opposite directions.
 interface = Interface.from_chains(slave=[[0.5, -0.25], [1.5, -0.25]], master=[[2, 0], [0, 0]])
-subject = Subject("mine", NodeToSegment)
-formulation = subject.with_penalty(100.0)
+formulation = Subject("mine", NodeToSegment).with_penalty(100.0)
 forces = -formulation.residual(interface, None, interface.nodes.reshape(-1))
 print("forces that push the nodes:")
 print(forces.reshape(-1, 2))
 
 # The harness asks all of its properties; here are three of them.
-for row in verify([subject], load_properties(["balance.*", "patch.flat.transmission"]), examples=20, seed=1).rows:
+for row in verify(NodeToSegment, ["balance.*", "patch.flat.transmission"], examples=20, seed=1).rows:
     print(f"{row.property_id}: {row.verdict}")

@@ -6,10 +6,9 @@ that the formulation states itself, as here, is shrunk only if the script asks f
 
 import matplotlib.pyplot as plt
 
-from contactverif import load_formulation, load_properties, verify
+from contactverif import verify
 
-subjects, properties = [load_formulation("vts-me")], load_properties(["patch.flat.transmission"])
-result = verify(subjects, properties, examples=50, seed=1, shrink="all")
+result = verify("vts-me", "patch.flat.transmission", examples=50, seed=1, shrink="all")
 (row,) = result.rows
 case = row.shrunk.case
 nodes = case.positions

@@ -70,13 +70,14 @@ ROOMS = {
     "studies": Room(
         (*BELOW_RUN, "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis", "msgspec")
     ),
+    "api": Room((*BELOW_RUN, "isolation", "run", *REPORTS), ("msgspec", "pandas", "xarray", "matplotlib")),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
-        ("contactverif", *BELOW_RUN, "isolation", "run", "studies", *REPORTS, "paper"),
+        ("contactverif", *BELOW_RUN, "isolation", "run", "studies", "api", *REPORTS, "paper"),
         ("numpy", "hypothesis", "typer", "rich", "msgspec"),
     ),
     # What a script imports from `contactverif` itself.
-    "contactverif": Room((*BELOW_RUN, "run")),
+    "contactverif": Room((*BELOW_RUN, "run", "api")),
     # The three folders of extension points. The judge shares no code with the judged.
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),

@@ -30,7 +30,7 @@ PUBLIC = {
         *("Scene", "two_blocks", "shrink_fit", "ShrinkFit", "load_scene", "solve", "Trace", "End"),
         # Properties, and runs over them.
         *("Property", "Cases", "Quantity", "Measurement", "Finding", "Outcome", "Verdict", "Row", "Run"),
-        *("load_formulation", "load_properties", "evaluate_both", "judge_case", "verify"),
+        *("load_formulation", "load_properties", "evaluate_both", "judge_case", "verify", "Report"),
         # Errors.
         *("ContactverifError", "ContractError", "MisuseError"),
     },

@@ -41,7 +41,7 @@ def _failures(run: Run) -> Iterator[tuple[str, str, str]]:
 
 
 def _annotation(formulation: str, title: str, text: str) -> str:
-    from contactverif.cli.factory_places import factory_place
+    from contactverif.api.factory_places import factory_place
     from contactverif.contract.foreign_text import one_line
 
     place = factory_place(formulation)

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.api.run_files import PAGE, REPORT
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import MARKDOWN, PAGE, REPORT, OutputFiles, PictureFolder
+from contactverif.cli.output_files import MARKDOWN, OutputFiles, PictureFolder
 from contactverif.cli.run_endings import show_what_plugins_printed
 from contactverif.cli.shared_options import EveryFormulation, formulation_argument, output_option
 from contactverif.cli.verify_command import select_names

@@ -9,9 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
+from contactverif.api.run_files import PAGE, REPORT
+from contactverif.api.settings import read_settings
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import PAGE, REPORT, OutputFiles
-from contactverif.cli.settings import read_settings
+from contactverif.cli.output_files import OutputFiles
 from contactverif.cli.shared_options import (
     RESULT_FILES,
     PlaceOptions,

@@ -11,23 +11,17 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from contactverif.api.drawing import make_drawing
 from contactverif.cli.console import indent_below, plain_table
-from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.counterexample import Counterexample, failing_examples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.names import parse_name
-from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.property import Outcome, Property, PropertyInfo, checked_numbers
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
-from contactverif.run.judge import forces_on
 from contactverif.run.registry import formulation_names
-from contactverif_reports.draw import as_text, draw_case
-
-
-def failing_examples(run: Run) -> list[Counterexample]:
-    """Return the counterexamples of all rows that fail or crash."""
-    failures = (Verdict.FAIL, Verdict.CRASHED)
-    return [example for example in counterexamples(run).values() if example.row.verdict in failures]
+from contactverif_reports.draw import as_text
 
 
 def counterexample_text(example: Counterexample, report: Path | None, width: int = 10**4) -> Text:
@@ -65,11 +59,8 @@ def replay_table(example: Counterexample, formulation: str, outcome: Outcome) ->
 
 def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: Path, argument: str) -> None:
     """Draw the case of an outcome to a file."""
-    title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
-    forces = forces_on(outcome.case, subject)
-    exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None
     try:
-        draw_case(outcome.case, path, title=title, forces=forces, exact=exact)
+        make_drawing(subject, question, outcome).write(path)
     except MisuseError as error:
         raise MisuseError(argument, error.found, error.needed) from None
 

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from contactverif.api.run_files import PAGE, run_writers
 from contactverif.cli.annotations import annotate
 from contactverif.cli.comparison_screen import ComparisonScreen
 from contactverif.cli.comparison_tables import SideBySide, last_line, mesh_text
 from contactverif.cli.console import show, show_as_it_is
 from contactverif.cli.counterexample_output import draw_outcome
-from contactverif.cli.output_files import PAGE, PictureFolder
+from contactverif.cli.output_files import PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.run_endings import (
     end_run,
@@ -21,7 +22,6 @@ from contactverif.cli.run_endings import (
     show_what_plugins_printed,
     watch_for_stops,
 )
-from contactverif.cli.run_files import run_writers
 from contactverif.cli.shared_options import ScreenOptions
 from contactverif.cli.verify_job import Plugins, VerifyJob
 from contactverif.contract.counterexample import case_id

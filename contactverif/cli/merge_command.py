@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
+from contactverif.api.run_files import REPORT
 from contactverif.cli.audit_command import SHARE, Share, audit_report, check_share
 from contactverif.cli.campaign_command import CAMPAIGN
-from contactverif.cli.output_files import REPORT
 from contactverif.cli.shared_options import RESULT_FILES, SHRINK_HELP, ScreenOptions
 from contactverif.cli.verify_command import run_job
 from contactverif.cli.verify_job import new_job, options_of

@@ -9,14 +9,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from contactverif.api.run_files import JSON, JUNIT, PAGE, REPORT, SARIF, either
 from contactverif.contract.errors import MisuseError
 
-REPORT = ".nc"
-PAGE = ".html"
-JSON = ".json"
-JUNIT = ".xml"
-SARIF = ".sarif"
-RUN_FILES = (REPORT, PAGE, JSON, JUNIT, SARIF)
 PICTURES = (".png", ".svg")
 SOLVED_SCENE = ".vtu"
 MARKDOWN = ".md"
@@ -49,7 +44,7 @@ class OutputFiles:
         for name in names or ():
             suffix = name.suffix.lower()
             if suffix not in suffixes:
-                raise MisuseError("--out", f"{str(name)!r}", f"a name that ends in {_either(suffixes)}")
+                raise MisuseError("--out", f"{str(name)!r}", f"a name that ends in {either(suffixes)}")
             if suffix in by_suffix:
                 raise MisuseError("--out", f"{by_suffix[suffix]} and {name}", f"one file that ends in {suffix}")
             check_writable(name, "--out", f"FILE{suffix}")
@@ -92,9 +87,3 @@ class PictureFolder:
 
         made_folder(name, "--pictures")
         return cls(name, name.absolute())
-
-
-def _either(suffixes: Sequence[str]) -> str:
-    """Return the suffixes in words: `.png, .svg or .vtu`."""
-    *others, last = suffixes
-    return f"{', '.join(others)} or {last}" if others else last

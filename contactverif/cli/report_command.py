@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from contactverif.cli.output_files import REPORT, RUN_FILES, OutputFiles
-from contactverif.cli.run_files import run_writers
+from contactverif.api.run_files import REPORT, RUN_FILES, run_writers
+from contactverif.cli.output_files import OutputFiles
 from contactverif.cli.shared_options import ReportPath, ScreenOptions, output_option
 
 

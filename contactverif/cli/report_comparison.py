@@ -11,9 +11,10 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from contactverif.api.run_files import PAGE
 from contactverif.cli.comparison_tables import MOST_MESHES, NAME_WIDTH, number
 from contactverif.cli.console import add_groups, indent_below, plain_table, show, show_as_it_is
-from contactverif.cli.output_files import PAGE, OutputFiles
+from contactverif.cli.output_files import OutputFiles
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error

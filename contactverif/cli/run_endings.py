@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
-from contactverif.cli.isolation_options import Isolation, place_line
+from contactverif.api.plugin_places import Isolation
+from contactverif.cli.isolation_options import place_line
 from contactverif.cli.output_files import OutputFiles
 from contactverif.contract.errors import MisuseError
 

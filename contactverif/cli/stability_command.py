@@ -12,8 +12,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from contactverif.api.run_files import REPORT
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import MARKDOWN, PICTURES, REPORT, OutputFiles
+from contactverif.cli.output_files import MARKDOWN, PICTURES, OutputFiles
 from contactverif.cli.shared_options import EveryFormulation, FormulationNames, output_option
 from contactverif.cli.verify_command import select_names
 

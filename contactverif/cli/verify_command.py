@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contactverif.api.run_files import REPORT, run_writers
+from contactverif.api.settings import read_settings
 from contactverif.cli.annotations import annotate
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import REPORT, PictureFolder
+from contactverif.cli.output_files import PictureFolder
 from contactverif.cli.run_endings import (
     End,
     end_run,
@@ -23,8 +25,6 @@ from contactverif.cli.run_endings import (
     show_what_plugins_printed,
     watch_for_stops,
 )
-from contactverif.cli.run_files import run_writers
-from contactverif.cli.settings import read_settings
 from contactverif.cli.shared_options import (
     RESULT_FILES,
     FailureOptions,
@@ -157,9 +157,10 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
 def show_run(result: Run, screen: ScreenOptions, report: Path | None) -> None:
     """Show a run as the user wants it: its few telling lines, or every row, and counterexamples."""
     from contactverif.cli.console import show, show_as_it_is
-    from contactverif.cli.counterexample_output import counterexample_text, failing_examples
+    from contactverif.cli.counterexample_output import counterexample_text
     from contactverif.cli.run_screen import RunScreen
     from contactverif.cli.run_tables import RunTable
+    from contactverif.contract.counterexample import failing_examples
 
     show(RunTable(result) if screen.verbose else RunScreen(result, report))
     if screen.verbose or screen.show == "all":
@@ -171,8 +172,8 @@ def _draw_pictures(result: Run, plugins: Plugins, folder: PictureFolder | None) 
     """Draw a picture of each counterexample, if the user named a folder."""
     if folder is None:
         return
-    from contactverif.cli.counterexample_output import draw_outcome, failing_examples
-    from contactverif.contract.counterexample import case_id
+    from contactverif.cli.counterexample_output import draw_outcome
+    from contactverif.contract.counterexample import case_id, failing_examples
 
     for example in failing_examples(result):
         subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)

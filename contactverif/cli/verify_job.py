@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
-from contactverif.cli.isolation_options import Isolation, IsolationOptions
-from contactverif.cli.output_files import RUN_FILES, OutputFiles, PictureFolder
+from contactverif.api.plugin_places import Isolation
+from contactverif.api.run_files import RUN_FILES
+from contactverif.api.settings import Settings
+from contactverif.cli.isolation_options import IsolationOptions
+from contactverif.cli.output_files import OutputFiles, PictureFolder
 from contactverif.cli.run_endings import say_what_was_doubted
-from contactverif.cli.settings import Settings
 from contactverif.cli.shared_options import PlaceOptions, SamplingOptions, WorkerOptions
 from contactverif.contract.errors import MisuseError
 

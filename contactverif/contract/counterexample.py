@@ -80,6 +80,15 @@ class Counterexample:
         """The reason why the verdict is no pass."""
         return self.outcome.reason
 
+    @property
+    def words(self) -> list[str]:
+        """The failure in lines: what fails, the reason, and what is found and right at the worst place."""
+        measurement = self.outcome.measurement
+        finding = "" if measurement is None else str(measurement.finding or "")
+        finding = "" if finding in self.reason else finding  # Most reasons end with it.
+        title = f"{self.formulation}, {self.property_id}: {self.row.result}, {self.label}"
+        return [line for line in (title, self.reason, finding) if line]
+
     def replay_command(self, report: str) -> str:
         """Return the command that judges the case again."""
         return f"contactverif replay {shlex.quote(report)} --case {shlex.quote(self.id)}"
@@ -92,6 +101,12 @@ def counterexamples(run: Run) -> dict[str, Counterexample]:
         case_id(row.formulation, row.property_id, witness=outcome is row.witness) for row, outcome in entries
     )
     return {id_: Counterexample(id_, *entry) for id_, entry in zip(ids, entries, strict=True)}
+
+
+def failing_examples(run: Run) -> list[Counterexample]:
+    """Return the counterexamples of all rows that fail or crash, in the order of the run."""
+    failures = (Verdict.FAIL, Verdict.CRASHED)
+    return [example for example in counterexamples(run).values() if example.row.verdict in failures]
 
 
 def counterexample_of(row: Row) -> Outcome | None:

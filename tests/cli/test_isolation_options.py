@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.cli.isolation_options import Isolation, IsolationOptions, place_line
+from contactverif.api.plugin_places import Isolation
+from contactverif.cli.isolation_options import IsolationOptions, place_line
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation import box as boxes
 from contactverif.isolation import landlock, process

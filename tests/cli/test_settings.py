@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 from asking import Ask, asking
 
-from contactverif.cli.isolation_options import Isolation, IsolationOptions
-from contactverif.cli.settings import Settings, read_settings
+from contactverif.api.plugin_places import Isolation
+from contactverif.api.settings import Settings, read_settings
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.shared_options import SamplingOptions, WorkerOptions
 from contactverif.cli.verify_job import VerifyOptions
 from contactverif.contract.errors import MisuseError

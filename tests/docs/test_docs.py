@@ -123,6 +123,7 @@ PYTHON = {
     "how-to/own-mesh.md": r"patch\.flat\.transmission fail",
     "how-to/own-scene.md": r"converged after \d iterations\n(?s:.*)converged after 1\d iterations, rate 0\.1[1-4]",
     "how-to/read-a-report.md": r"balance\.force fail\n(?s:.*)patch\.flat\.transmission pass\n(?s:.*): 0?\.\d",
+    "how-to/verify-in-python.md": r"first failure: vts-me(?s:.*)force 0\.\d+, exact(?s:.*)fails as stated +pass",
     "how-to/write-a-property.md": r"",
     "how-to/write-a-problem.md": r"converged",
     "concepts/promises.md": r"",

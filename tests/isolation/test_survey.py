@@ -58,7 +58,8 @@ if pathlib.Path(tempfile.gettempdir(), "kernels", "forged").exists():
 }
 PROGRAM = """
 import sys
-from contactverif.cli.isolation_options import Isolation, IsolationOptions
+from contactverif.api.plugin_places import Isolation
+from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.isolation.host import end_all
 from contactverif.run.registry import load_formulations, standalone_names
 

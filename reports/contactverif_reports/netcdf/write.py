@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from contactverif.contract.result import Run
 from contactverif_reports.files import check_writable, whole
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = False) -> None:
@@ -16,3 +22,17 @@ def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = Fa
     check_writable(path)
     with whole(path) as part:
         write_tree(tree_of(run, with_named_cases=with_named_cases), part)
+
+
+def as_tree(run: Run) -> xr.DataTree:
+    """Return the report of a run as xarray reads it from a file, in memory."""
+    import xarray as xr
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "report.nc"
+        write(run, path)
+        with xr.open_datatree(path, engine="netcdf4") as tree:
+            for node in tree.subtree:
+                for variable in node.variables.values():
+                    variable.load()
+    return tree

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactverif.cli.output_files import JSON, JUNIT, PAGE, REPORT, SARIF
-
 if TYPE_CHECKING:
     from contactverif.contract.result import Run
+
+REPORT = ".nc"
+PAGE = ".html"
+JSON = ".json"
+JUNIT = ".xml"
+SARIF = ".sarif"
+RUN_FILES = (REPORT, PAGE, JSON, JUNIT, SARIF)
 
 
 def run_writers(run: Run, report: Path | None) -> dict[str, Callable[[Path], None]]:
@@ -37,9 +42,15 @@ def run_writers(run: Run, report: Path | None) -> dict[str, Callable[[Path], Non
         write_junit(run, path)
 
     def write_log(path: Path) -> None:
-        from contactverif.cli.factory_places import factory_place
+        from contactverif.api.factory_places import factory_place
         from contactverif_reports.exchange.sarif import write_sarif
 
         write_sarif(run, path, factory_place)
 
     return {REPORT: write_report, PAGE: write_html, JSON: write_document, JUNIT: write_suites, SARIF: write_log}
+
+
+def either(suffixes: Sequence[str]) -> str:
+    """Return the suffixes in words: `.png, .svg or .vtu`."""
+    *others, last = suffixes
+    return f"{', '.join(others)} or {last}" if others else last

@@ -1,0 +1,61 @@
+"""The picture of a judged case: computed forces beside exact ones, for a file or a notebook."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from contactverif.contract.property import Outcome, Property
+from contactverif.contract.subject import Subject
+from contactverif.run.judge import forces_on
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """The picture of a case. A notebook shows it.
+
+    Attributes
+    ----------
+    figure : Figure
+        The figure of matplotlib.
+    """
+
+    figure: Figure
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture to a file.
+
+        Parameters
+        ----------
+        path : str | os.PathLike[str]
+            The file, ``.png`` or ``.svg``; an older one is replaced.
+
+        Raises
+        ------
+        MisuseError
+            If the name has another suffix, or the file cannot be written.
+        """
+        from contactverif_reports.draw.case_figure import SUFFIXES, save
+        from contactverif_reports.files import checked_name
+
+        save(self.figure, checked_name(path, SUFFIXES))
+
+    def _repr_html_(self) -> str:
+        """Return the picture as SVG."""
+        from contactverif_reports.html.pages import svg_inline
+
+        return str(svg_inline(self.figure))
+
+
+def make_drawing(subject: Subject, question: Property, outcome: Outcome) -> Drawing:
+    """Return the picture of an outcome's case, with the forces of the formulation and, where known, the exact ones."""
+    from contactverif_reports.draw.case_figure import make_case_figure  # It brings matplotlib, which is slow.
+
+    title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
+    forces = forces_on(outcome.case, subject)
+    exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None
+    return Drawing(make_case_figure(outcome.case, title=title, forces=forces, exact=exact))

@@ -1,0 +1,227 @@
+"""A run as scripts and notebooks see it: short when it is printed, a table and a picture in a notebook, files.
+
+Rule: what takes long to import is imported where it is used.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contactverif.api.run_files import RUN_FILES, either, run_writers
+from contactverif.contract.counterexample import Counterexample, failing_examples
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.subject import Subject
+from contactverif.isolation.host import end_all
+from contactverif.isolation.remote_formulation import RemoteSubject
+from contactverif.run.telling import by_telling
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from contactverif.api.drawing import Drawing
+
+_MOST_FORMULATIONS = 6  # With more of them, only all rows together are counted.
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Failure(Counterexample):
+    """A case on which a formulation fails. A notebook shows its picture.
+
+    Attributes
+    ----------
+    subject : Subject
+        The formulation.
+    question : Property
+        The property.
+    """
+
+    subject: Subject
+    question: Property
+
+    def draw(self) -> Drawing:
+        """Draw the mesh, with the forces of the formulation beside the exact ones where they are known.
+
+        The formulation is asked once more for its forces on this case.
+
+        Returns
+        -------
+        Drawing
+            The picture: a notebook shows it, ``write("failure.svg")`` stores it, and ``figure`` is that of matplotlib.
+        """
+        from contactverif.api.drawing import make_drawing
+
+        try:
+            return make_drawing(self.subject, self.question, self.outcome)
+        finally:
+            if isinstance(self.subject, RemoteSubject):
+                end_all()
+
+    def __repr__(self) -> str:
+        return "\n    ".join(self.words)
+
+    def _repr_html_(self) -> str:
+        """Return the picture, whose title says what fails."""
+        return self.draw()._repr_html_()
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Report(Run):
+    """The results of `verify`: a `Run` that shows itself and writes itself.
+
+    ``print(report)`` gives a few lines. A notebook shows a table of what fails and the mesh of the first failure.
+
+    Attributes
+    ----------
+    subjects : Mapping[str, Subject]
+        The formulations by name.
+    questions : Mapping[str, Property]
+        The properties by id.
+
+    Examples
+    --------
+    >>> from contactverif import verify
+    >>> verify("vts-me", "patch.flat.transmission", examples=5, seed=1).promises_kept
+    True
+    """
+
+    subjects: Mapping[str, Subject] = field(default_factory=dict)
+    questions: Mapping[str, Property] = field(default_factory=dict)
+
+    @classmethod
+    def from_run(cls, run: Run, subjects: Iterable[object], questions: Iterable[object]) -> Report:
+        """Return the report of a run with its formulations and properties; what did not load plays no part.
+
+        Parameters
+        ----------
+        run : Run
+            The run.
+        subjects, questions : Iterable[object]
+            Its formulations and properties.
+
+        Returns
+        -------
+        Report
+            The report.
+        """
+        results = {entry.name: getattr(run, entry.name) for entry in fields(run)}
+        by_name = {item.name: item for item in subjects if isinstance(item, Subject)}
+        by_id = {item.id: item for item in questions if isinstance(item, Property)}
+        return cls(**results, subjects=by_name, questions=by_id)
+
+    @property
+    def failures(self) -> list[Failure]:
+        """The cases that fail, one for each row: broken promises first, failures as stated last, by telling.
+
+        A row that fails without a case (not judged, wrong traits) is in `table` alone.
+        """
+        examples = {id(example.row): example for example in failing_examples(self)}
+        return [
+            Failure(example.id, row, example.outcome, self.subjects[row.formulation], self.questions[row.property_id])
+            for row in _failing_rows(self)
+            if (example := examples.get(id(row))) is not None
+        ]
+
+    def table(self) -> pd.DataFrame:
+        """Return all rows as a table.
+
+        Returns
+        -------
+        pd.DataFrame
+            A line for each formulation and property, with the columns of the rows in the JSON file. ``quantity``,
+            ``value`` and ``tolerance`` are of the number that came closest to its tolerance.
+        """
+        import pandas as pd
+
+        from contactverif_reports.exchange.run_document import document_of
+
+        lines = []
+        for row in document_of(self).rows:
+            closest = row.closest
+            line = {name: getattr(row, name) for name in row.__struct_fields__}
+            del line["closest"], line["counterexample"]
+            line["quantity"] = closest.name if closest else ""
+            line["value"], line["tolerance"] = (closest.value, closest.tolerance) if closest else (None, None)
+            lines.append(line)
+        return pd.DataFrame(lines)
+
+    def to_xarray(self) -> xr.DataTree:
+        """Return the report as xarray reads it from the netCDF file.
+
+        Returns
+        -------
+        xr.DataTree
+            The groups, in memory: ``summary``, a group for each property such as ``patch/flat/transmission``, and the
+            counterexamples.
+        """
+        from contactverif_reports.netcdf.write import as_tree
+
+        return as_tree(self)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the report to a file, as the option ``--out`` does.
+
+        Parameters
+        ----------
+        path : str | os.PathLike[str]
+            The file; its suffix says what is written: ``.nc``, ``.html``, ``.json``, ``.xml`` (JUnit) or ``.sarif``.
+
+        Raises
+        ------
+        MisuseError
+            If the name has another suffix, or the file cannot be written.
+        """
+        from contactverif_reports.files import check_writable
+
+        target = Path(path)
+        suffix = target.suffix.lower()
+        if suffix not in RUN_FILES:
+            raise MisuseError("path", repr(os.fspath(path)), f"a name that ends in {either(RUN_FILES)}")
+        check_writable(target, "path", f"FILE{suffix}")
+        run_writers(self, None)[suffix](target)
+
+    def __repr__(self) -> str:
+        from contactverif_reports.html.report_page import headline
+
+        names = self.formulations
+        if len(names) <= _MOST_FORMULATIONS:
+            lines = [f"{name}: {_counts(list(self.rows_of(name)))}" for name in names]
+        else:
+            lines = [f"{len(names)} formulations: {_counts(self.rows)}"]
+        lines += _remarks(self)
+        lines += [f"first failure: {failure!r}" for failure in self.failures[:1]]
+        return "\n".join([*lines, headline(self)])
+
+    def _repr_html_(self) -> str:
+        """Return the table of what fails, and the mesh of the first failure."""
+        from contactverif_reports.html.notebook import run_view
+
+        rows, failures = _failing_rows(self), self.failures
+        return run_view(self, rows, _remarks(self), failures[0] if failures else None)
+
+
+def _counts(rows: Sequence[Row]) -> str:
+    """Return the numbers of rows with each result, in words."""
+    counts = Counter(row.result for row in rows)
+    return ", ".join(f"{counts[result]} {result}" for result in Result if counts[result]) or "nothing was checked"
+
+
+def _failing_rows(run: Run) -> list[Row]:
+    """Return the rows that fail: those that make the run fail first, those that fail as stated last."""
+    failures = (Verdict.FAIL, Verdict.CRASHED)
+    rows = [row for row in run.rows if (row.unexpected or row.verdict in failures) and not row.omitted]
+    return sorted(by_telling(rows), key=lambda row: (not row.unexpected, row.result is Result.FAILS_AS_STATED))
+
+
+def _remarks(run: Run) -> list[str]:
+    """Return the sentences about whole formulations: those that did not load, signs, diagnoses."""
+    remarks = [f"{item.formulation}: {Result.NOT_LOADED}: {item.reason}" for item in run.not_loaded]
+    remarks += [f"{name}: {OPPOSITE_SIGN}" for name in run.opposite_signs]
+    return remarks + [f"{name}: {words}" for name, words in run.diagnoses.items()]
