@@ -62,6 +62,8 @@ ROOMS = {
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "diagnosis": Room(("contract",), ("numpy",), QUIET),
+    # It also reads the files that its links name, as resources of the package.
+    "explanations": Room(("contract",), ("numpy",), QUIET),
     "run": Room(
         ("contract", "problems", "strategies", "isolation", "diagnosis"),
         ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec", "psutil"),
@@ -72,7 +74,7 @@ ROOMS = {
     ),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
-        ("contactverif", *BELOW_RUN, "isolation", "run", "studies", *REPORTS, "paper"),
+        ("contactverif", *BELOW_RUN, "explanations", "isolation", "run", "studies", *REPORTS, "paper"),
         ("numpy", "hypothesis", "typer", "rich", "msgspec"),
     ),
     # What a script imports from `contactverif` itself.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import textwrap
 from collections.abc import Mapping
 from itertools import chain
@@ -21,13 +22,15 @@ from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import forces_on
 from contactverif.run.registry import formulation_names
+from contactverif.run.telling import by_telling, wrong_rows
 from contactverif_reports.draw import as_text, draw_case
+
+_FAILURES = (Verdict.FAIL, Verdict.CRASHED)
 
 
 def failing_examples(run: Run) -> list[Counterexample]:
     """Return the counterexamples of all rows that fail or crash."""
-    failures = (Verdict.FAIL, Verdict.CRASHED)
-    return [example for example in counterexamples(run).values() if example.row.verdict in failures]
+    return [example for example in counterexamples(run).values() if example.row.verdict in _FAILURES]
 
 
 def counterexample_text(example: Counterexample, report: Path | None, width: int = 10**4) -> Text:
@@ -51,6 +54,17 @@ def how_to_keep(run: Run) -> str:
     """Say how the cases that fail are stored, so that they can be replayed; empty where there is none."""
     seed = run.provenance.get("seed")
     return f"to keep these cases: the same command with --seed {seed} --out FILE.nc" if failing_examples(run) else ""
+
+
+def how_to_explain(run: Run, report: Path | None) -> str:
+    """Return the line that explains the first row that fails, with its numbers if a report has them; else empty."""
+    failing = by_telling(row for row in run.rows if row.verdict in _FAILURES)
+    row = next(iter([*wrong_rows(failing), *failing]), None)
+    if row is None:
+        return ""
+    stored = report is not None and any(example.row is row for example in failing_examples(run))
+    option = f" --report {shlex.quote(str(report))}" if stored else ""
+    return f"to have a row explained: contactverif explain {row.property_id}{option}"
 
 
 def replay_table(example: Counterexample, formulation: str, outcome: Outcome) -> Table:
