@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from contactverif.contract.counterexample import Counterexample
     from contactverif.contract.result import Run
 
-_MOST_COLUMNS = 80  # Longer lines of running text are hard to read.
-
 
 def explain(
     *,
@@ -113,17 +111,15 @@ def _explain_property(
         say("")
         diagnosis = run.diagnoses.get(example.formulation, "") if run is not None else ""
         _show(case_text(example, diagnosis, solved=question.bodies))
-        show_as_it_is(Text(f"{as_text(example.case)}\n{example.replay_command(str(report))}"))
+        show_as_it_is(Text(f"\n{as_text(example.case)}\n{example.replay_command(str(report))}"))
     say("")
     # The formulations come last, because a reader need not wait until they are loaded.
     _show(stated_failures(question, load_formulations(isolation.limits())))
 
 
 def _show(markdown: str) -> None:
-    """Print Markdown in at most 80 columns."""
-    from rich.constrain import Constrain
-
+    """Print Markdown."""
     from contactverif.cli.console import show
     from contactverif.cli.terminal_markdown import TerminalMarkdown
 
-    show(Constrain(TerminalMarkdown(markdown), _MOST_COLUMNS))
+    show(TerminalMarkdown(markdown))
