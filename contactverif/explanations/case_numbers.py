@@ -123,15 +123,24 @@ def case_text(example: Counterexample, diagnosis: str = "", *, solved: bool) -> 
 
 def _number_line(number: CheckedNumber, numbers: Mapping[str, float]) -> str:
     """Return a number beside its tolerance, and the formula with the numbers of the case put in."""
-    quantity, formula, tolerance = number.quantity, number.quantity.tolerance, f"{number.tolerance:.3g}"
-    symbols = symbols_of(formula)
-    # Which distance Z stands for depends on the traits, which a report does not keep.
-    choices = [put_in(formula, {**numbers, "Z": numbers[name]}) for name in ("D", "X") if numbers]
-    # The numbers are said to make the tolerance only if they do: some formulas are about another state than the case's.
-    right = [filled for filled in choices if isclose(value_of(filled), number.tolerance, rel_tol=_DIGITS)]
-    if symbols and right:
-        tolerance = f"{formula} = {right[0]} = {tolerance}"
+    quantity, tolerance = number.quantity, f"{number.tolerance:.3g}"
+    symbols = symbols_of(quantity.tolerance)
+    known = [f"{symbol} = {numbers[symbol]:.3g}" for symbol in symbols if symbol in numbers and symbol != "g"]
+    if filled := _formula_that_fits(number, numbers):
+        tolerance = f"{quantity.tolerance} = {filled} = {tolerance}"
     elif symbols:
-        known = [f"{symbol} = {numbers[symbol]:.3g}" for symbol in symbols if symbol in numbers and symbol != "g"]
-        tolerance = f"{formula} = {tolerance}{', where the case has ' if known else ''}{', '.join(known)}"
+        tolerance = f"{quantity.tolerance} = {tolerance}{', where the case has ' if known else ''}{', '.join(known)}"
     return f"- **{plain(quantity.name)}:** {number.value:.3g}, must be {quantity.sense} {plain(tolerance)}."
+
+
+def _formula_that_fits(number: CheckedNumber, numbers: Mapping[str, float]) -> str:
+    """Return the formula with the numbers of the case put in if they make the tolerance, else an empty string.
+
+    Some formulas are about another state than the case's.
+    """
+    formula = number.quantity.tolerance
+    if not numbers or not symbols_of(formula):
+        return ""
+    # Which distance Z stands for depends on the traits, which a report does not keep.
+    choices = [put_in(formula, {**numbers, "Z": numbers[name]}) for name in ("D", "X")]
+    return next((text for text in choices if isclose(value_of(text), number.tolerance, rel_tol=_DIGITS)), "")
