@@ -62,6 +62,8 @@ ROOMS = {
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "diagnosis": Room(("contract",), ("numpy",), QUIET),
+    # It also reads the files that its links name, as resources of the package.
+    "explanations": Room(("contract",), ("numpy",), QUIET),
     "run": Room(
         ("contract", "problems", "strategies", "isolation", "diagnosis"),
         ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec", "psutil"),
@@ -73,7 +75,7 @@ ROOMS = {
     "api": Room((*BELOW_RUN, "isolation", "run", *REPORTS), ("msgspec", "pandas", "xarray", "matplotlib")),
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
-        ("contactverif", *BELOW_RUN, "isolation", "run", "studies", "api", *REPORTS, "paper"),
+        ("contactverif", *BELOW_RUN, "explanations", "isolation", "run", "studies", "api", *REPORTS, "paper"),
         ("numpy", "hypothesis", "typer", "rich", "msgspec"),
     ),
     # What a script imports from `contactverif` itself.

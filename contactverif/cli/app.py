@@ -21,6 +21,7 @@ from contactverif.cli.bench_command import bench
 from contactverif.cli.campaign_command import campaign
 from contactverif.cli.compare_command import compare
 from contactverif.cli.draw_command import draw
+from contactverif.cli.explain_command import explain
 from contactverif.cli.list_command import list_installed
 from contactverif.cli.merge_command import merge
 from contactverif.cli.paper_command import paper
@@ -45,6 +46,7 @@ app = typer.Typer(
 COMMANDS: dict[str, Callable[..., None]] = {
     "list": list_installed,
     "verify": verify,
+    "explain": explain,
     "campaign": campaign,
     "merge": merge,
     "compare": compare,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import textwrap
 from collections.abc import Mapping
 from itertools import chain
@@ -18,9 +19,10 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.names import parse_name
 from contactverif.contract.property import Outcome, Property, PropertyInfo, checked_numbers
-from contactverif.contract.result import Run
+from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.registry import formulation_names
+from contactverif.run.telling import by_telling, wrong_rows
 from contactverif_reports.draw import as_text
 
 
@@ -45,6 +47,18 @@ def how_to_keep(run: Run) -> str:
     """Say how the cases that fail are stored, so that they can be replayed; empty where there is none."""
     seed = run.provenance.get("seed")
     return f"to keep these cases: the same command with --seed {seed} --out FILE.nc" if failing_examples(run) else ""
+
+
+def how_to_explain(run: Run, report: Path | None) -> str:
+    """Return the line that explains the first row of the screen that fails, with its numbers if a report has them."""
+    failing = by_telling(row for row in run.rows if row.verdict in _FAILURES)
+    news = [row for row in failing if row.result is Result.FAIL]
+    row = next(iter([*wrong_rows(failing), *news, *failing]), None)
+    if row is None:
+        return ""
+    stored = report is not None and any(example.row is row for example in failing_examples(run))
+    option = f" --report {shlex.quote(str(report))}" if stored else ""
+    return f"to have a row explained: contactverif explain {row.property_id}{option}"
 
 
 def replay_table(example: Counterexample, formulation: str, outcome: Outcome) -> Table:

@@ -156,8 +156,8 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
 
 def show_run(result: Run, screen: ScreenOptions, report: Path | None) -> None:
     """Show a run as the user wants it: its few telling lines, or every row, and counterexamples."""
-    from contactverif.cli.console import show, show_as_it_is
-    from contactverif.cli.counterexample_output import counterexample_text
+    from contactverif.cli.console import say, show, show_as_it_is
+    from contactverif.cli.counterexample_output import counterexample_text, how_to_explain
     from contactverif.cli.run_screen import RunScreen
     from contactverif.cli.run_tables import RunTable
     from contactverif.contract.counterexample import failing_examples
@@ -166,6 +166,8 @@ def show_run(result: Run, screen: ScreenOptions, report: Path | None) -> None:
     if screen.verbose or screen.show == "all":
         for example in failing_examples(result):
             show_as_it_is(counterexample_text(example, report))
+    if advice := how_to_explain(result, report):
+        say(advice)
 
 
 def _draw_pictures(result: Run, plugins: Plugins, folder: PictureFolder | None) -> None:

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from page_text import plain, table
+from page_text import table
 from typer.models import ArgumentInfo, OptionInfo
 
 from contactverif.cli.app import app
+from contactverif.explanations.markdown import plain
 
 _METAVARS = {int: "INTEGER", float: "NUMBER", Path: "FILE", str: "TEXT"}
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from page_text import plain, table
+from page_text import table
 from repository_pages import relink
 
 from contactverif import Subject, Traits
+from contactverif.explanations.markdown import plain
 from contactverif.run.registry import load_formulations
 
 _COLUMNS = {

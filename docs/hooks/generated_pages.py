@@ -22,6 +22,7 @@ from property_pages import property_index, property_page
 from repository_pages import repository_pages, repository_pictures
 
 from contactverif import Property, load_properties
+from contactverif.run.registry import load_formulations
 
 ROOT = Path(__file__).parents[2]
 PROPERTY_FOLDER = "reference/properties/"
@@ -43,7 +44,8 @@ def installed_properties() -> list[Property]:
 def pages() -> dict[str, str]:
     """Return {path in the site: Markdown text} of all pages that are made."""
     properties = installed_properties()
-    texts = {f"{PROPERTY_FOLDER}{item.id}.md": property_page(item) for item in properties}
+    formulations = load_formulations()
+    texts = {f"{PROPERTY_FOLDER}{item.id}.md": property_page(item, formulations) for item in properties}
     texts[f"{PROPERTY_FOLDER}index.md"] = property_index(properties, ROOT)
     texts["reference/command-line.md"] = command_page()
     texts["reference/formulations.md"] = formulation_page(ROOT)

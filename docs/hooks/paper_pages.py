@@ -9,8 +9,10 @@ import re
 from pathlib import Path
 
 import xarray as xr
-from page_text import plain, sentence, table
+from page_text import table
 from repository_pages import relink
+
+from contactverif.explanations.markdown import plain, sentence
 
 FOLDER = Path("reports") / "paper"
 

@@ -140,7 +140,7 @@ def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where Newton's method finds no solution on one of the meshes.
 
-    References: K. L. Johnson, Contact Mechanics (1985), Chapter 13.
+    **Source.** K. L. Johnson, Contact Mechanics (1985), Chapter 13.
     """
     return measure_convergence(WAVY_STUDIES, case, subject)
 

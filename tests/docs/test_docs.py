@@ -180,7 +180,7 @@ def test_the_page_of_every_property_says_what_is_asked(monkeypatch: pytest.Monke
     monkeypatch.syspath_prepend(str(DOCS / "hooks"))
     from property_pages import property_page
 
-    pages_of = {question.id: property_page(question) for question in contactverif.load_properties()}
+    pages_of = {question.id: property_page(question, ()) for question in contactverif.load_properties()}
     assert pages_of.keys() == set(property_ids())
     titles = ("**Question.**", "**Why it matters.**", "**How it is judged.**", "**Undecided.**")
     assert not [name for name, text in pages_of.items() if any(title not in text for title in titles)]

@@ -1,0 +1,144 @@
+"""The text that explains a property: what it asks, why, what it measures, and against which tolerance."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
+
+from contactverif.contract.measurement import Quantity
+from contactverif.contract.property import Property
+from contactverif.contract.traits import Traits
+from contactverif.explanations.case_numbers import symbols_of
+from contactverif.explanations.known_failures import known_failures
+from contactverif.explanations.markdown import plain, sentence
+from contactverif.explanations.terms import symbol_meanings
+
+_VALUES = {
+    "flat": (True,),
+    "normal": (True,),
+    "single": (True,),
+    "overhang": (True,),
+    "tangent": ("exact",),
+    "symmetric": (True,),
+    "conserves_force": (True,),
+    "conserves_moment": (True,),
+    "continuity": ("C0",),
+    "area": ("current", "reference"),
+    "penalty": ("distributed", "nodal"),
+    "enforcement": ("multiplier",),
+    "kinked": (True,),
+    "converges": (True,),
+    "inf_sup": (True,),
+    "locks": (False,),
+    "integrates_linear_gap": (True,),
+    "force_along": ("master normal", "slave normal"),
+    "local": (True,),
+    "unbiased": (True,),
+    "nodes_push": (True,),
+    "translation_stable": (True,),
+    "independent_multipliers": (True,),
+    "published_forces": ({"a1": "1 2 1; 2 2"},),
+}
+
+
+def promised_by(question: Property) -> str:
+    """Return in words which traits promise that the property passes; each small set of traits is tried."""
+    if question.promise(Traits()):
+        return "every formulation, whatever its traits say"
+    names = Traits().by_name().keys()
+    singles = [(name, value) for name, values in _VALUES.items() if name in names for value in values]
+    for sets in (zip(singles), combinations(singles, 2)):
+        hits = [dict(hit) for hit in sets if len(dict(hit)) == len(hit) and _promises(question, hit)]
+        if hits:
+            return " or ".join(map(_words_of_traits, hits))
+    return "no trait"
+
+
+def _words_of_traits(values: Mapping[str, object]) -> str:
+    return " with ".join(f"`{name}={values[name]!r}`" for name in sorted(values))
+
+
+def _promises(question: Property, values: Iterable[tuple[str, object]]) -> bool:
+    return bool(question.promise(Traits().revise(**dict(values))))
+
+
+def property_text(question: Property) -> str:
+    """Return in Markdown all that is known of a property without the formulations that are installed."""
+    cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
+    needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
+    facts = [
+        ("Cases", cases),
+        ("Parts of the plugin that it needs", needs),
+        ("Promised by", promised_by(question)),
+    ]
+    text = [
+        f"# {question.id}\n",
+        sentence(plain(question.summary)) + "\n",
+        *_answers(question),
+        "\n".join(f"- **{title}:** {words}" for title, words in facts) + "\n",
+        "## Measured numbers\n",
+        _tolerances(question.quantities),
+        _reasons(question.quantities),
+        _symbols(question.quantities),
+    ]
+    if question.series:
+        names = ", ".join(f"{plain(name)} ({unit})" for name, unit in question.series.items())
+        text.append(f"The report also keeps, for each iterate: {names}.\n")
+    return "\n".join(filter(None, [*text, known_failures(question)]))
+
+
+def _answers(question: Property) -> list[str]:
+    """Return the paragraphs about question, reason, judgement, undecided cases and source."""
+    answers = []
+    for paragraph in question.question.split("\n\n"):
+        title, body = re.fullmatch(r"(?:\*\*([^*]+)\.\*\* )?(.*)", paragraph, re.DOTALL).groups()  # type: ignore[union-attr]
+        answers.append((f"**{title}.** " if title else "") + plain(body) + "\n")
+    if not any(answer.startswith("**Source.**") for answer in answers):
+        answers.append("**Source.** No publication is named; the requirement follows from mechanics.\n")
+    return answers
+
+
+def _tolerances(quantities: Sequence[Quantity]) -> str:
+    """Return the list of quantities with their tolerances; what several share stands once."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for quantity in quantities:
+        sign = "≤" if quantity.sense == "at most" else "≥"
+        groups.setdefault((f"{sign} {quantity.tolerance}", quantity.unit), []).append(quantity.name)
+    lines = [
+        f"- **{plain('; '.join(names))}** {plain(tolerance)} ({_unit(unit)})"
+        for (tolerance, unit), names in groups.items()
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _reasons(quantities: Sequence[Quantity]) -> str:
+    """Return the list of the reasons of tolerances: first those that all quantities share."""
+    owners: dict[str, list[str]] = {}
+    for quantity in quantities:
+        for clause in _clauses(quantity.reason):
+            owners.setdefault(clause, []).append(quantity.name)
+    everywhere = [clause for clause, names in owners.items() if len(names) == len(quantities)]
+    lines = [f"- {sentence(plain(clause))}" for clause in everywhere]
+    lines += [
+        f"- *{plain(', '.join(names))}:* {sentence(plain(clause))}"
+        for clause, names in owners.items()
+        if clause not in everywhere
+    ]
+    return "\n".join(["Why these tolerances:\n", *lines]) + "\n"
+
+
+def _symbols(quantities: Sequence[Quantity]) -> str:
+    """Return the list of the symbols in tolerances with their meanings; empty if there is none."""
+    symbols = dict.fromkeys(symbol for quantity in quantities for symbol in symbols_of(quantity.tolerance))
+    lines = [f"- {symbol}: {plain(symbol_meanings()[symbol])}" for symbol in symbols]
+    return "\n".join(["The symbols:\n", *lines]) + "\n" if lines else ""
+
+
+def _clauses(reason: str) -> list[str]:
+    """Return the sentences of a reason, or its parts between semicolons."""
+    return [clause.strip(" .") for clause in re.split(r";|\.(?= )", reason) if clause.strip(" .")]
+
+
+def _unit(unit: str) -> str:
+    return "ratio" if unit == "1" else unit

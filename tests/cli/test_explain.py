@@ -1,0 +1,134 @@
+"""The command `explain`: every property and every term in 80 columns, as on the site, with the numbers of a case."""
+
+import re
+from pathlib import Path
+
+import pytest
+from asking import Ask, check_mistake
+from rich.cells import cell_len
+from subjects import load_property
+
+from contactverif.cli.console import QuietConsole
+from contactverif.cli.run_tables import _COLUMNS
+from contactverif.cli.terminal_markdown import TerminalMarkdown
+from contactverif.contract.result import Result
+from contactverif.explanations.known_failures import planted_mistakes, smallest_mesh, stated_failures
+from contactverif.explanations.terms import symbol_meanings, term_text, term_texts
+from contactverif.run import registry
+from contactverif.run.registry import load_formulations, property_ids
+
+COLUMNS = 80
+INSTALLED = load_formulations()
+HOOKS = Path(__file__).parents[2] / "docs" / "hooks"
+PARTS = ("Question.", "Why it matters.", "How it is judged.", "Undecided.", "Source.", "Promised by:", "Usual causes:")
+WORDS = ("promise", "witness", "kink", "undecided", "idle", "locking", "patch test", "trait", "residual", "NTS")
+
+
+@pytest.fixture(autouse=True)
+def load_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "load_formulations", lambda limits: INSTALLED)
+
+
+def words(text: str) -> list[str]:
+    return re.sub("[•]", "", text).split()
+
+
+def in_terminal(markdown: str) -> str:
+    console = QuietConsole(COLUMNS)
+    with console.capture() as capture:
+        console.print(TerminalMarkdown(markdown))
+    return capture.get()
+
+
+@pytest.fixture
+def page_of(monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
+    monkeypatch.syspath_prepend(str(HOOKS))
+    from property_pages import property_page
+
+    return property_page
+
+
+@pytest.mark.parametrize("name", property_ids())
+def test_a_property_explains_itself_in_80_columns_as_its_page_does(name: str, ask: Ask, page_of) -> None:  # type: ignore[no-untyped-def]
+    answer = ask("explain", name)  # Text is folded at 80 columns in a wider terminal, too.
+    assert (answer.status, answer.err) == (0, "")
+    assert max(map(cell_len, answer.out.splitlines())) <= COLUMNS
+    flat = " ".join(words(answer.out))
+    assert [part for part in PARTS if part not in flat] == []
+    page = page_of(load_property(name), INSTALLED).partition("\n## See also\n")[0]
+    page = re.sub(r"\[([\w/-]+)\]\((?:\.\./)+[\w/-]+\.md\)", r"`docs/\1.md`", page)
+    assert words(in_terminal(page)) == words(answer.out)
+
+
+@pytest.mark.parametrize("name", [*WORDS, *_COLUMNS, *(str(result) for result in Result), *symbol_meanings()])
+def test_a_word_of_the_screen_is_a_term(name: str, ask: Ask) -> None:
+    answer = ask("explain", name, columns=COLUMNS)
+    assert answer.status == 0
+    assert words(answer.out) == words(in_terminal(term_text(name)))
+    assert len(words(answer.out)) > 5
+
+
+def test_every_term_has_a_text_in_80_columns_that_ends_like_a_sentence() -> None:
+    for name, text in term_texts().items():
+        lines = in_terminal(text).rstrip().splitlines()
+        assert max(map(cell_len, lines)) <= COLUMNS
+        assert lines[-1].rstrip().endswith("."), name
+        assert "](" not in "".join(lines), name
+
+
+def test_without_a_name_the_terms_are_listed(ask: Ask) -> None:
+    out = ask("explain", columns=COLUMNS).out
+    assert all(word in out.lower() for word in ("witness", "kink", "idle", "ε̂"))
+
+
+def test_the_failures_that_are_known_come_from_traits_and_from_the_tables_of_planted_mistakes() -> None:
+    assert not [name for name in property_ids() if not planted_mistakes(name)]
+    assert "penalty squared" in planted_mistakes("patch.flat.transmission")
+    assert smallest_mesh("balance.force").startswith("1 slave segment on 1 of the master, for the mistake “")
+    assert smallest_mesh("scale") == ""
+    assert "`vts-me` (`c-prime`)" in stated_failures(load_property("patch.flat.transmission"), INSTALLED)
+    assert "No installed" in stated_failures(load_property("purity"), INSTALLED)
+
+
+@pytest.fixture
+def report(ask: Ask, tmp_path: Path) -> Path:
+    path = tmp_path / "nts.nc"
+    ask("verify", "nts", "-p", "patch.flat.transmission", "-p", "swap", "--seed", "1", "--examples", "3", "--out", path)
+    return path
+
+
+def test_the_numbers_of_a_case_stand_in_the_tolerance(report: Path, ask: Ask) -> None:
+    answer = ask("explain", "patch.flat.transmission", "--report", report, columns=COLUMNS)
+    flat = " ".join(words(answer.out))
+    assert "0.25, must be at most u(8X/|g| + 4N) = 1.11e-16·(8·4/|0.0625| + 4·3) = 5.82e-14. " in flat
+    assert "The worst place: slave node 0" in flat
+    assert "slave ●─────2─────●" in flat
+    assert f"contactverif replay {report} --case nts.patch.flat.transmission.witness" in answer.out
+    by_case = ask("explain", "--report", report, "--case", "nts.patch.flat.transmission.witness", columns=COLUMNS)
+    assert by_case == answer
+
+
+def test_the_screen_of_a_run_says_how_to_have_a_row_explained(report: Path, ask: Ask) -> None:
+    out = ask("report", report, columns=COLUMNS).out
+    (line,) = [line for line in out.splitlines() if "contactverif explain" in line]
+    assert line == f"to have a row explained: contactverif explain patch.flat.transmission --report {report}"
+    assert ask(*line.partition("contactverif ")[2].split()).status == 0
+    assert "contactverif explain" not in ask("verify", "nts", "-p", "purity", "--examples", "2", "--seed", "1").out
+
+
+def test_a_mistake_is_answered_with_what_is_needed(report: Path, ask: Ask) -> None:
+    nearest = "needed a name that exists; the nearest:"
+    failing = r"needed one of which \S+ has a counterexample: .*swap.*"
+    for arguments, message in (
+        (["witnes"], rf"NAME: found 'witnes'; {nearest} witness"),
+        (["patch.flat.noda"], rf"NAME: found 'patch.flat.noda'; {nearest} patch.flat.nodal.*"),
+        (["swap", "--case", "nts.swap"], r"--report: found nothing; needed the report that has the case 'nts.swap'"),
+        (["purity", "--report", report], rf"NAME: found 'purity'; {failing}"),
+        (["--report", report], rf"NAME: found nothing; {failing}"),
+        (["swap", "--report", report, "--case", "nts.swa"], r"--case: found 'nts.swa'; needed an id like nts.swap.*"),
+        (
+            ["kink", "--report", report, "--case", "nts.swap.witness"],
+            r"NAME: found 'kink'; needed swap, the .*",
+        ),
+    ):
+        check_mistake(ask("explain", *arguments), message)
