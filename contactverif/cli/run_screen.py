@@ -182,7 +182,7 @@ def _say_what_the_place_lacks(rows: Sequence[Row], width: int) -> Iterator[Text]
         if row.reason.startswith(NOT_HERE):
             lacking.setdefault(row.reason.removeprefix(NOT_HERE), []).append(row)
     if lacking:
-        yield Text(f"{NOT_HERE.rstrip()}:", style="bold")
+        yield Text("not asked here, needs:", style="bold")
     for needs, group in lacking.items():
         yield fold(f"{needs}: {', '.join(_fold_families(group))}", width, indent=2)
 
