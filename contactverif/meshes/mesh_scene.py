@@ -22,8 +22,8 @@ from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Surface
+from contactverif.contract.ways import ONE_SIDED, mean_normal, ways_to_master
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.ways import ONE_SIDED, mean_normal, ways_to_master
 from contactverif.meshes.mesh_file import (
     MeshSides,
     check_facing,

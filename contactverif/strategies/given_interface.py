@@ -9,7 +9,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif.mechanics.ways import ways_to_master
+from contactverif.contract.ways import ways_to_master
 from contactverif.strategies.parts import OFFSETS, depth_units, depths, penalties, seeds, shifts
 
 LEAST_LENGTH = 0.25  # A slave segment that is bent onto the master keeps this share of its length, seen along itself.

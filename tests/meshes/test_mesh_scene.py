@@ -23,7 +23,7 @@ from contactverif import (
     solve,
 )
 from contactverif.contract.result import NOT_HERE
-from contactverif.mechanics.ways import ways_to_master
+from contactverif.contract.ways import ways_to_master
 from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support
 from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
