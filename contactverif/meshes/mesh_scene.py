@@ -10,7 +10,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import chain
 from math import isfinite
 from pathlib import Path
 
@@ -92,6 +91,7 @@ def read_scene(
     parts = _parts(sides)
     _set_materials(sides, parts, materials or {})
     _set_supports(sides, parts, supports or {})
+    _hold_others(parts)
     scene = _scene(parts)
     check_facing(scene.interface)
     if not any(part.imposed.any() for part in parts):
@@ -220,14 +220,18 @@ def _set_materials(sides: MeshSides, parts: list[_Part], materials: Mapping[str,
         if not bodies:
             actual = f"{name!r}, no member of which belongs to an elastic body"
             raise MisuseError("--material", actual, "a group with members in the body of slave or master")
-        if not (0 < young < np.inf and -1 < poisson < 0.5):
-            needed = "Young's modulus E > 0 and Poisson's ratio −1 < ν < 0.5"
-            raise MisuseError("--material", f"E = {young:g}, ν = {poisson:g} of {name!r}", needed)
+        _check_material(name, young, poisson)
         for part in bodies:
             if part.material_of and part.material != (young, poisson):
                 actual = f"two materials of one body, those of {part.material_of!r} and {name!r}"
                 raise MisuseError("--material", actual, "one for each body, whose cells share nodes")
             part.material, part.material_of = (young, poisson), name
+
+
+def _check_material(name: str, young: float, poisson: float) -> None:
+    if not (0 < young < np.inf and -1 < poisson < 0.5):
+        needed = "Young's modulus E > 0 and Poisson's ratio −1 < ν < 0.5"
+        raise MisuseError("--material", f"E = {young:g}, ν = {poisson:g} of {name!r}", needed)
 
 
 def _set_supports(sides: MeshSides, parts: list[_Part], supports: Mapping[str, Support]) -> None:
@@ -244,8 +248,12 @@ def _set_supports(sides: MeshSides, parts: list[_Part], supports: Mapping[str, S
                     part.fixed[nodes, component] = True
                     # A rigid body moves as a whole.
                     part.imposed[nodes if len(part.cells) else slice(None), component] = value
-    for part in parts:
-        if not part.has_supports and len(part.cells):
+
+
+def _hold_others(parts: list[_Part]) -> None:
+    """Hold the elastic bodies about whose supports the user says nothing."""
+    for part in (part for part in parts if len(part.cells)):
+        if not part.has_supports:
             part.fixed[_far_nodes(part)] = True
 
 
@@ -270,10 +278,10 @@ def _push_slaves(parts: list[_Part], scene: Scene) -> None:
     seen = np.isfinite(ways)
     slaves = [part for part in parts if part.side == "slave"]
     # Around a ring there is no direction; an interference fit is in contact without one.
-    if not seen.any() or not all(part.normal.any() for part in slaves) or any(part.has_supports for part in slaves):
+    if not seen.any() or not all(part.normal.any() and not part.has_supports for part in slaves):
         return
     direction = directions[0]
-    pushed = next((part for part in chain(slaves, parts) if len(part.cells)), slaves[0])
+    pushed = max(parts, key=lambda part: (len(part.cells) > 0, part.side == "slave"))  # A slave, if it is elastic.
     height = float(np.ptp(pushed.nodes @ direction))
     closed = float(np.quantile(ways[seen], CLOSED)) + LEAST_DEPTH * height
     way = min(closed, float(ways[seen].min()) + DEEPEST * height)

@@ -259,10 +259,14 @@ def open_row(
     if stopped:
         return replace(row, verdict=Verdict.NOT_JUDGED, reason=f"{OMITTED}{stopped}")
     # The formulation fails on some scene, not on every one, and where it reports what shows it.
-    on_scene = question.bodies and sampling.scene is not None
-    if promise is False and (on_scene or question.shown_by - subject.provides):
+    if promise is False and (_is_on_scene(question, sampling) or question.shown_by - subject.provides):
         row = replace(row, promise=None)
     return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None))
+
+
+def _is_on_scene(question: Property, sampling: Sampling) -> bool:
+    """Return whether a property is asked on the scene of the run alone."""
+    return question.bodies and sampling.scene is not None
 
 
 def _needs_of(question: Property, sampling: Sampling) -> str:
