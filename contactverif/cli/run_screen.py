@@ -19,10 +19,20 @@ from contactverif.cli.counterexample_output import counterexample_text
 from contactverif.cli.run_tables import finding_of, headline, remark_of
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import BROKEN_BY_FAILING, NOT_JUDGED, OMITTED, OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.result import (
+    BROKEN_BY_FAILING,
+    NOT_HERE,
+    NOT_JUDGED,
+    OMITTED,
+    OPPOSITE_SIGN,
+    Result,
+    Row,
+    Run,
+)
 from contactverif.run.telling import by_telling, most_telling, wrong_rows
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
+_MOST_IDS = 4  # The ids of a family that are listed in a sentence.
 _LEAST_WORDS = 30  # Columns that are left for words beside a name, however long it is.
 _PARTS = {  # The results that show no mistake and have a line for each row, and the title above them.
     Result.FAIL: "fails, and promises nothing",
@@ -80,6 +90,7 @@ class RunScreen:
         yield from _remarks(rows, width)
         yield from _other_failures(rows, width, in_full=alone or bool(wrong))
         yield from _families(rows, width)
+        yield from _say_what_the_place_lacks(rows, width)
 
     def _with_mesh(self, row: Row, width: int) -> Text:
         """Return a row that is wrong, with the mesh that shows it, if one does."""
@@ -162,3 +173,24 @@ def _say_what_is_left_out(rows: Sequence[Row], width: int) -> Iterator[Text]:
     if rows:
         reason = rows[0].reason.removeprefix(OMITTED)
         yield fold(f"{len(rows)} properties were not asked: {reason}. --keep-going asks them all.", width, indent=0)
+
+
+def _say_what_the_place_lacks(rows: Sequence[Row], width: int) -> Iterator[Text]:
+    """Say what the mesh or the scene of the run lacks, and which properties were not asked for this reason."""
+    lacking: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.reason.startswith(NOT_HERE):
+            lacking.setdefault(row.reason.removeprefix(NOT_HERE), []).append(row)
+    if lacking:
+        yield Text("not asked here, needs:", style="bold")
+    for needs, group in lacking.items():
+        yield fold(f"{needs}: {', '.join(_fold_families(group))}", width, indent=2)
+
+
+def _fold_families(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the ids of rows, and of a family with many of them the number."""
+    families: dict[str, list[str]] = {}
+    for row in rows:
+        families.setdefault(row.info.family, []).append(row.property_id)
+    for family, ids in families.items():
+        yield from [f"{len(ids)} of {family}"] if len(ids) > _MOST_IDS else ids

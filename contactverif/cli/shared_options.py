@@ -157,39 +157,88 @@ class PlaceOptions:
     """The mesh of the user or the scene on which the properties are checked, instead of random interfaces."""
 
     mesh: Annotated[
-        Path | None, typer.Option(help="Check on the interface of this mesh file, with random states.", metavar="FILE")
+        Path | None,
+        typer.Option(help="Check on the interface of this mesh file, and on the bodies of its cells.", metavar="FILE"),
     ] = None
     slave: Annotated[str | None, typer.Option(help="Physical group of the mesh's slave lines.", metavar="TAG")] = None
     master: Annotated[str | None, typer.Option(help="Physical group of the mesh's master lines.", metavar="TAG")] = None
     flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's lines.")] = False
+    material: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Material of the body of a group of the mesh. (default: 1,0.3) Repeatable.", metavar="TAG=E,ν"
+        ),
+    ] = None
+    support: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Displacement imposed on a group of the mesh, each a number or free. (default: bodies are held far "
+            "from the contact, and the slave is pushed) Repeatable.",
+            metavar="TAG=X,Y",
+        ),
+    ] = None
     scene: Annotated[
         str | None, typer.Option(help="Check on this scene: c or c:refine=2,penalty=1e4.", metavar="NAME[:OPTIONS]")
     ] = None
+    scene_file: Annotated[
+        str | None,
+        typer.Option(
+            help="Check on the scene that this function returns. The file runs in a process of its own.",
+            metavar="FILE.py:FUNCTION",
+        ),
+    ] = None
 
     def read(self) -> Interface | Case | None:
-        """Return the interface of the mesh, or the scene; None for random ones."""
-        return self.make_scene() or self.read_interface()
+        """Return the scene or the interface of the mesh, or the scene with a name; None for random ones."""
+        return self.make_scene() or self.read_mesh()
 
-    def read_interface(self) -> Interface | None:
-        """Return the interface of the mesh, None without a mesh."""
+    def read_mesh(self) -> Interface | Case | None:
+        """Return the scene of the mesh's bodies, or its interface if it makes no scene; None without a mesh.
+
+        What the scene is, or why there is none, goes to standard error.
+        """
         if self.mesh is None:
-            for option, value in (("--slave", self.slave), ("--master", self.master), ("--flip", self.flip or None)):
-                if value is not None:
-                    raise MisuseError("--mesh", f"none, but {option}", "--mesh FILE, which the tags belong to")
+            for option in ("slave", "master", "flip", "material", "support"):
+                if getattr(self, option):
+                    raise MisuseError("--mesh", f"none, but --{option}", "--mesh FILE, which the tags belong to")
             return None
         if self.slave is None or self.master is None:
             missing = "--slave" if self.slave is None else "--master"
             raise MisuseError(missing, "nothing", f"{missing} TAG, a physical group of line elements of {self.mesh}")
         from contactverif.meshes.mesh_file import read_interface
 
-        return read_interface(self.mesh, slave=self.slave, master=self.master, flip=self.flip)
+        try:
+            return self._read_bodies(self.mesh, self.slave, self.master)
+        except MisuseError as error:
+            if self.material or self.support:
+                raise
+            interface = read_interface(self.mesh, slave=self.slave, master=self.master, flip=self.flip)
+            typer.echo(f"contactverif: no bodies are solved: {error}", err=True)
+            return interface
+
+    def _read_bodies(self, mesh: Path, slave: str, master: str) -> Case:
+        """Return the scene of the mesh's bodies, and print a line for each of them."""
+        from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support, read_scene
+
+        materials = dict(map(parse_material, self.material or ()))
+        supports = dict(map(parse_support, self.support or ()))
+        scene = read_scene(mesh, slave=slave, master=master, flip=self.flip, materials=materials, supports=supports)
+        for line in describe_bodies(scene):
+            typer.echo(f"contactverif: {line}", err=True)
+        return scene.case()
 
     def make_scene(self) -> Case | None:
         """Return the case of the scene, None without a scene."""
+        places = {"--scene": self.scene, "--scene-file": self.scene_file, "--mesh": self.mesh}
+        typed = [(option, value) for option, value in places.items() if value is not None]
+        if len(typed) > 1:
+            raise MisuseError(typed[0][0], f"{typed[0][1]} and {typed[1][0]} {typed[1][1]}", "one of the two")
+        if self.scene_file is not None:
+            from contactverif.meshes.scene_file import load_scene_file
+
+            return load_scene_file(self.scene_file).case()
         if self.scene is None:
             return None
-        if self.mesh is not None:
-            raise MisuseError("--scene", f"{self.scene} and --mesh {self.mesh}", "one of the two")
         from contactverif.problems.catalogue import load_scene
 
         return load_scene(self.scene).case()

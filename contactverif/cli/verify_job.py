@@ -269,9 +269,14 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
 
 def versions_of(options: VerifyOptions) -> dict[str, str]:
     """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
-    from contactverif.run.provenance import code_digests, collect_versions
+    from contactverif.run.provenance import CODE, code_digests, collect_versions
 
-    return collect_versions() | code_digests(options.names, options.properties)
+    versions = collect_versions() | code_digests(options.names, options.properties)
+    if options.place.scene_file is not None:
+        from contactverif.meshes.scene_file import digest_scene_file
+
+        versions[f"{CODE}scene file"] = digest_scene_file(options.place.scene_file)
+    return versions
 
 
 def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
@@ -286,16 +291,23 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
         options = msgspec.convert(plan.options, VerifyOptions, dec_hook=_to_path)
     except (msgspec.ValidationError, TypeError) as error:
         raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
+    options = _from_folder(options, plan.folder)
     check_versions(plan.versions, versions_of(options), argument)
     # A box or Landlock may not be had here, and the results are the same without.
     if options.isolation.isolation in (Isolation.BOX, Isolation.LANDLOCK):
         options = replace(options, isolation=replace(options.isolation, isolation=None))
-    if os.getcwd() == plan.folder:
+    return options
+
+
+def _from_folder(options: VerifyOptions, folder: str) -> VerifyOptions:
+    """Return the options of a run in a folder, with names of files as they are from here."""
+    if os.getcwd() == folder:
         return options
-    base = Path(plan.folder)
+    base = Path(folder)
     mesh = options.place.mesh and base / options.place.mesh
+    scene_file = options.place.scene_file and str(base / options.place.scene_file)
     pictures = options.pictures and base / options.pictures
-    place = replace(options.place, mesh=mesh)
+    place = replace(options.place, mesh=mesh, scene_file=scene_file)
     return replace(options, out=tuple(base / path for path in options.out), pictures=pictures, place=place)
 
 

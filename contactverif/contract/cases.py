@@ -14,6 +14,9 @@ from contactverif.contract.case import Case
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
+OWN_MESHES = "own meshes with a known answer"
+
+
 def return_none(place: Any) -> None:
     """Return None: there are no cases on an interface or a scene."""
 
@@ -33,11 +36,15 @@ class Cases:
         Whether they are a list, of which all are judged, whatever the number of examples.
     on_place : Callable[[Any], Any]
         Makes the cases on an interface or a scene, in place of the list.
+    needs : str
+        What an interface or a scene must be so that there are cases on it: "a flat interface". A run says it where
+        there are none.
     """
 
     make: Callable[..., Any]
     is_list: bool = False
     on_place: Callable[[Any], Any] = return_none
+    needs: str = OWN_MESHES
 
     @classmethod
     def random(cls, make: Callable[..., Any]) -> Cases:
@@ -49,7 +56,7 @@ class Cases:
             Takes None, an interface or a scene, and returns a hypothesis strategy of `Case`, or None. Properties for
             which the same function makes the cases are judged on the same ones, if it has a name (`random_source`).
         """
-        return cls(make)
+        return cls(make, needs=needs_of_place(make))
 
     @classmethod
     def by_kind(cls, make: Callable[..., Mapping[str, Any] | Any]) -> Cases:
@@ -60,10 +67,15 @@ class Cases:
         make : Callable[..., Mapping[str, Any] | Any]
             As in `random`, but it returns {kind: strategy}.
         """
-        return cls(make)
+        return cls(make, needs=needs_of_place(make))
 
     @classmethod
-    def from_list(cls, make: Callable[[], tuple[Case, ...]], on_place: Callable[[Any], Any] = return_none) -> Cases:
+    def from_list(
+        cls,
+        make: Callable[[], tuple[Case, ...]],
+        on_place: Callable[[Any], Any] = return_none,
+        needs: str = OWN_MESHES,
+    ) -> Cases:
         """Return a list of cases, each with a name of its own; tables and reports call it by that name.
 
         Parameters
@@ -72,8 +84,10 @@ class Cases:
             Returns the list.
         on_place : Callable[[Any], Any]
             Takes an interface or a scene, and returns a strategy, or None if there are no cases.
+        needs : str
+            What an interface or a scene must be so that there are cases.
         """
-        return cls(make, is_list=True, on_place=on_place)
+        return cls(make, is_list=True, on_place=on_place, needs=needs)
 
     @property
     def random_source(self) -> str:
@@ -87,8 +101,8 @@ class Cases:
         return self.make() if place is None else self.on_place(place)
 
 
-def random_source(name: str) -> Callable[[_Function], _Function]:
-    """Return a decorator that stores a name at a function that makes cases.
+def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function]:
+    """Return a decorator that stores a name at a function that makes cases, and what it needs of an interface.
 
     Properties with this function are judged on the same cases. A function without a stored name has the id of its
     property instead.
@@ -97,10 +111,13 @@ def random_source(name: str) -> Callable[[_Function], _Function]:
     ----------
     name : str
         A name that no other function has.
+    needs : str
+        What an interface or a scene must be so that the function makes cases on it: "a flat interface".
     """
 
     def store(function: _Function) -> _Function:
         function.__dict__["random_source"] = name
+        function.__dict__["needs"] = needs
         return function
 
     return store
@@ -109,3 +126,8 @@ def random_source(name: str) -> Callable[[_Function], _Function]:
 def name_of_source(function: Callable[..., Any]) -> str:
     """Return the stored name of a function, or an empty string."""
     return str(getattr(function, "random_source", ""))
+
+
+def needs_of_place(function: Callable[..., Any]) -> str:
+    """Return the stored words about what a function that makes cases needs of an interface or a scene."""
+    return str(getattr(function, "needs", "") or OWN_MESHES)

@@ -34,6 +34,7 @@ BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"
 OMITTED = "not asked: "  # The beginning of the reason of a row that another row made pointless.
 WRONG_TRAITS = "wrong traits"
+NOT_HERE = "needs "  # The beginning of the reason of a row without cases on the place of the run.
 OF_TRAITS = "traits: "  # The beginning of the reason of a row whose traits name no witness that can be judged.
 OPPOSITE_SIGN = (
     "your forces have the opposite sign: contact must push the slave along the master's outward normal; "

@@ -1,1 +1,1 @@
-"""Reading a user's mesh file. Rule for the next editor: meshio is known here alone, besides the reports."""
+"""Reading mesh files and scene files of a user. Rule for the next editor: only this room and reports know meshio."""

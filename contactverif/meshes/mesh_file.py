@@ -9,6 +9,7 @@ and is said in terms of the options of the command line.
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -56,28 +57,45 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
 
         interface = read_interface("punch.msh", slave="punch", master="base")
     """
+    sides = read_sides(path, slave=slave, master=master, flip=flip)
+    interface = _renumber(sides.points, sides.slave, sides.master)
+    check_facing(interface)
+    sys.stderr.write(sides.mesh.warnings)
+    return interface
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshSides:
+    """A mesh with the lines of slave and master, each line with its body on the left."""
+
+    mesh: PlainMesh
+    points: FloatArray  # (n_points, 2) Positions.
+    groups: dict[str, Group]
+    slave: IntArray  # (n_lines, 2) Numbers of points, as in `master`.
+    master: IntArray
+
+
+def read_sides(path: str | Path, *, slave: str, master: str, flip: bool) -> MeshSides:
+    """Read the lines of two groups, oriented; the arguments and errors are those of `read_interface`."""
     if slave == master:
         raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
     names = (("--slave", slave), ("--master", master))
     mesh = read_mesh(path)
     points = _planar(mesh)
     groups = _groups(mesh)
-    sides = [(argument, _lines(mesh, groups, argument, name)) for argument, name in names]
-    shared = np.intersect1d(sides[0][1], sides[1][1])
+    named = [(argument, _lines(mesh, groups, argument, name)) for argument, name in names]
+    shared = np.intersect1d(named[0][1], named[1][1])
     if len(shared):
-        actual = f"a node of the slave surface too, at {_describe_place(points, shared[0])}"
+        actual = f"a node of the slave surface too, at {describe_place(points, shared[0])}"
         raise MisuseError("--master", actual, "surfaces without a common node")
     inside = _directed_edges(mesh, points)
-    oriented = [_orient(argument, lines, inside, points) for argument, lines in sides]
+    oriented = [_orient(argument, lines, inside, points) for argument, lines in named]
     if flip:
         every = all(by_cells.all() for _, by_cells in oriented)
         oriented = [
             (np.where((every | ~by_cells)[:, None], lines[:, ::-1], lines), by_cells) for lines, by_cells in oriented
         ]
-    interface = _renumber(points, *(lines for lines, _ in oriented))
-    check_facing(interface)
-    sys.stderr.write(mesh.warnings)
-    return interface
+    return MeshSides(mesh, points, groups, oriented[0][0], oriented[1][0])
 
 
 def check_facing(interface: Interface) -> None:
@@ -170,7 +188,7 @@ def _include(groups: dict[str, Group], name: str, group: Group) -> None:
 def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
     """Return the nodes (n_lines, 2) of the lines of a group, in the order of the file."""
     if name not in groups:
-        raise _unknown_group_error(mesh, groups, argument, name)
+        raise unknown_group_error(mesh, groups, argument, name)
     group = groups[name]
     kinds = _kinds(mesh, group)
     higher = [kind for kind in kinds if kind != "line" and kind.startswith(("line", "VTK_LAGRANGE_CURVE"))]
@@ -195,7 +213,7 @@ def _kinds(mesh: PlainMesh, group: Group) -> list[str]:
     return sorted({block.type for block, members in zip(mesh.cells, group, strict=True) if members.any()})
 
 
-def _unknown_group_error(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> MisuseError:
+def unknown_group_error(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> MisuseError:
     """Return the error for a group that the file does not have; it names near groups and lists all."""
     listed = ", ".join(f"{each!r} ({', '.join(_kinds(mesh, group)) or 'empty'})" for each, group in groups.items())
     by_case = {each.casefold(): each for each in groups}
@@ -204,16 +222,20 @@ def _unknown_group_error(mesh: PlainMesh, groups: dict[str, Group], argument: st
     return MisuseError(argument, f"{name!r}, which is no group of the file", needed if listed else "groups in the file")
 
 
+def corners_of_cells(mesh: PlainMesh) -> list[IntArray]:
+    """Return the corners (n_cells, n_corners) of the cells of each block of 2-D cells, in the order of the file."""
+    blocks = [block for block in mesh.cells if block.dim == 2]
+    # Corners come first, nodes on edges last.
+    return [
+        block.data[:, : 3 if "triangle" in block.type.lower() else 4 if "quad" in block.type.lower() else None]
+        for block in blocks
+    ]
+
+
 def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
     """Return the edges of the 2-D cells, each as first node × n_points + second node, its cell on the left."""
     edges = [np.empty(0, dtype=np.int64)]
-    for block in mesh.cells:
-        if block.dim != 2:
-            continue
-        kind = block.type.lower()
-        # Corners come first, nodes on edges last.
-        n_corners = 3 if "triangle" in kind else 4 if "quad" in kind else None
-        corners = block.data[:, :n_corners]
+    for corners in corners_of_cells(mesh):
         x, y = np.moveaxis(points[corners] - points[corners[:, :1]], -1, 0)  # (n_cells, n_corners) each
         twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
         corners = np.where(twice_area[:, None] < 0, corners[:, ::-1], corners)[twice_area != 0]
@@ -229,7 +251,7 @@ def _orient(argument: str, lines: IntArray, inside: IntArray, points: FloatArray
     touching = _lines_at_nodes(argument, lines, points)
     left, right = (np.isin(ends[:, 0] * len(points) + ends[:, 1], inside) for ends in (lines, lines[:, ::-1]))
     if (left & right).any():
-        actual = f"a line with cells on both sides, at {_describe_place(points, lines[left & right][0, 0])}"
+        actual = f"a line with cells on both sides, at {describe_place(points, lines[left & right][0, 0])}"
         raise MisuseError(argument, actual, "lines on the boundary of a body")
     reverse, by_cells = np.zeros(len(lines), dtype=bool), np.zeros(len(lines), dtype=bool)
     visited: set[int] = set()
@@ -239,7 +261,7 @@ def _orient(argument: str, lines: IntArray, inside: IntArray, points: FloatArray
         chain = _follow_chain(lines, touching, first, reverse, visited)
         body_left, body_right = (np.where(reverse, a, b)[chain] for a, b in ((right, left), (left, right)))
         if body_left.any() and body_right.any():
-            place = _describe_place(points, lines[chain][body_right][0, 0])
+            place = describe_place(points, lines[chain][body_right][0, 0])
             raise MisuseError(
                 argument, f"a chain that changes the side of its body, at {place}", "a body on one side of a chain"
             )
@@ -257,7 +279,7 @@ def _lines_at_nodes(argument: str, lines: IntArray, points: FloatArray) -> dict[
             touching.setdefault(node, []).append(index)
     for node, several in touching.items():
         if len(several) > 2:
-            actual = f"{len(several)} lines that meet at {_describe_place(points, node)}"
+            actual = f"{len(several)} lines that meet at {describe_place(points, node)}"
             raise MisuseError(argument, actual, "chains: at most two lines at a node")
     if len(np.unique(np.sort(lines, axis=1), axis=0)) < len(lines):
         raise MisuseError(argument, "the same line twice", "each line once")
@@ -295,5 +317,6 @@ def _renumber(points: FloatArray, slave: IntArray, master: IntArray) -> Interfac
         raise MisuseError(option, error.found, error.needed) from error
 
 
-def _describe_place(points: FloatArray, node: int) -> str:
+def describe_place(points: FloatArray, node: int) -> str:
+    """Return the position of a node in words."""
     return f"({points[node, 0]:g}, {points[node, 1]:g})"

@@ -15,10 +15,11 @@ from itertools import chain, product
 from math import sqrt
 
 from contactverif.contract.case import Case
+from contactverif.contract.cases import needs_of_place
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.result import OF_TRAITS, OMITTED, NotLoaded, Row, Run
+from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.isolation.remote_formulation import count_ends
 from contactverif.problems.named_states import named_case
@@ -254,13 +255,25 @@ def open_row(
             row, verdict=Verdict.NOT_PROVIDED, promise=promise if missing & STATED_PARTS else None, reason=reason
         )
     if source is None:
-        return replace(row, verdict=Verdict.NOT_APPLICABLE, reason="this interface or scene has no such cases")
+        return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=f"{NOT_HERE}{_needs_of(question, sampling)}")
     if stopped:
         return replace(row, verdict=Verdict.NOT_JUDGED, reason=f"{OMITTED}{stopped}")
     # The formulation fails on some scene, not on every one, and where it reports what shows it.
-    if promise is False and (sampling.scene is not None or question.shown_by - subject.provides):
+    if promise is False and (_is_on_scene(question, sampling) or question.shown_by - subject.provides):
         row = replace(row, promise=None)
     return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None))
+
+
+def _is_on_scene(question: Property, sampling: Sampling) -> bool:
+    """Return whether a property is asked on the scene of the run alone."""
+    return question.bodies and sampling.scene is not None
+
+
+def _needs_of(question: Property, sampling: Sampling) -> str:
+    """Return what the place of a run lacks for the cases of a property."""
+    if question.bodies and sampling.scene is None:
+        return "elastic bodies"
+    return needs_of_place(question.cases)
 
 
 def _with_witness(row: OpenRow) -> OpenRow | Row:

@@ -38,7 +38,12 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
 def place_words(options: Mapping[str, Any]) -> str:
     """Return options {name: value} as they are typed, without those that are not there."""
-    return " ".join(f"--{name}" if value is True else f"--{name} {value}" for name, value in options.items() if value)
+    words = []
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        values = value if isinstance(value, list | tuple) else [value] if value else []
+        words += [option if entry is True else f"{option} {entry}" for entry in values]
+    return " ".join(words)
 
 
 def is_provable(options: Mapping[str, Any]) -> bool:

@@ -26,6 +26,8 @@ from contactverif.strategies.panels import Panel, assemble_panels, shortest
 
 Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
 
+FLAT = "a straight slave over a parallel master"
+OF_CLASS = "a flat mesh whose nodes meet"
 MOST_MASTER_SEGMENTS = 100  # The most master segments in one chain.
 _DEPTHS = st.integers(1, 8)  # quarters
 _SLIDES = st.sampled_from([0, 0, 0, 1, 2, 5])  # The distance that the slave has slid from its reference.
@@ -41,7 +43,7 @@ _FURTHEST = 3  # The largest length by which the master goes beyond the slave, i
 def flat_cases(interface: None = None) -> SearchStrategy[Case]: ...
 @overload
 def flat_cases(interface: Interface | None) -> SearchStrategy[Case] | None: ...
-@random_source("contactverif.strategies.flat.flat_cases")
+@random_source("contactverif.strategies.flat.flat_cases", needs=FLAT)
 def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration; every slave point projects inside the master.
 
@@ -107,7 +109,7 @@ def _panel(slave_x: FloatArray, master_x: FloatArray, penetration: float, slide:
     return Panel(_line(slave_x, -penetration), _line(master_x[::-1]), _line(slave_x + slide))
 
 
-@random_source("contactverif.strategies.class_meshes.normal_cases")
+@random_source("contactverif.strategies.class_meshes.normal_cases", needs=OF_CLASS)
 def normal_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration whose inner master nodes all lie on slave nodes.
 
@@ -116,7 +118,7 @@ def normal_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
     return _cases(interface, midpoints=False)
 
 
-@random_source("contactverif.strategies.class_meshes.single_cases")
+@random_source("contactverif.strategies.class_meshes.single_cases", needs=OF_CLASS)
 def single_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration whose inner master nodes lie on slave nodes or in the middle of segments.
 
@@ -125,7 +127,7 @@ def single_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
     return _cases(interface, midpoints=True)
 
 
-@random_source("contactverif.strategies.class_meshes.overhung_cases")
+@random_source("contactverif.strategies.class_meshes.overhung_cases", needs=OF_CLASS)
 def overhung_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases as `single_cases` does, on meshes whose master goes beyond the slave by half a segment or more.
 

@@ -9,8 +9,10 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.ways import ways_to_master
 from contactverif.strategies.parts import OFFSETS, depth_units, depths, penalties, seeds, shifts
 
+LEAST_LENGTH = 0.25  # A slave segment that is bent onto the master keeps this share of its length, seen along itself.
 _QUARTERS = st.integers(1, 8)
 _ON = st.integers(0, 7)  # 0 is no offset
 _MODES = st.lists(st.integers(-8, 8), min_size=1, max_size=6)  # amplitudes of waves, in eighths
@@ -74,13 +76,17 @@ def _forward(surface: Surface, along: FloatArray, way: int, roundoff: float) -> 
     return bool((way * steps > roundoff).all())
 
 
-@st.composite
-def states(draw: DrawFn, interface: Interface, smooth: bool) -> Case:
-    """Draw a state of the interface.
+def states(interface: Interface, smooth: bool) -> SearchStrategy[Case]:
+    """Return random states of the interface.
 
-    All nodes move in waves, the slave is pushed as a whole until its deepest node penetrates, and a coprime offset is
-    added.
+    The slave is bent onto the master, so that most of its nodes touch whatever the gap of the mesh is. Then all nodes
+    move in waves, the slave is pushed as a whole until its deepest node penetrates, and a coprime offset is added.
     """
+    return _states(interface, close_gaps(interface), smooth)
+
+
+@st.composite
+def _states(draw: DrawFn, interface: Interface, closed: FloatArray, smooth: bool) -> Case:
     quarters, unit = draw(depths()), draw(depth_units())
     slave_waves, master_waves = draw(_MODES), draw(_MODES)
     penalty, seed = draw(penalties()), draw(seeds())
@@ -88,7 +94,7 @@ def states(draw: DrawFn, interface: Interface, smooth: bool) -> Case:
     offsets = draw(OFFSETS) if offset_on else [0]
     n_slave, shortest = interface.n_slave_nodes, _shortest_segment(interface)
     depth = quarters[0] / 4 * unit * shortest
-    positions = interface.nodes.copy()
+    positions = closed.copy()
     for waves, part in ((slave_waves, slice(0, n_slave)), (master_waves, slice(n_slave, None))):
         positions[part] += depth / 4 * _waves(interface.nodes[part], waves)
     positions[:n_slave] += shifts(offsets, n_slave) / 2 * min(depth, shortest)
@@ -109,6 +115,25 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
     for k, amplitude in enumerate(amplitudes):
         displacement[:, (k + 1 + axis) % 2] += amplitude / 8 * np.cos(k * np.pi * place + k)
     return displacement
+
+
+def close_gaps(interface: Interface) -> FloatArray:
+    """Return positions (n_nodes, 2) in which each slave node that sees the master lies on it.
+
+    Any other slave node moves as
+    the nearest node that sees the master. Where this would shorten a slave segment to less than
+    `LEAST_LENGTH` of its length or turn it too far, the slave stays as it is.
+    """
+    nodes, n_slave = interface.nodes, interface.n_slave_nodes
+    ways, normals = ways_to_master(interface)
+    facing = np.flatnonzero(np.isfinite(ways))
+    closed = nodes.copy()
+    if len(facing):
+        nearest = [facing[np.argmin(np.hypot(*(nodes[facing] - node).T))] for node in nodes[:n_slave]]
+        closed[:n_slave] += ways[nearest, None] * normals[nearest]
+    before, after = (np.diff(positions[interface.slave.segments], axis=1)[:, 0] for positions in (nodes, closed))
+    kept = np.einsum("ij,ij->i", before, after) >= LEAST_LENGTH * np.einsum("ij,ij->i", before, before)
+    return closed if kept.all() else nodes.copy()
 
 
 def _push(interface: Interface, positions: FloatArray, depth: float) -> FloatArray:

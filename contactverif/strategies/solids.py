@@ -25,6 +25,7 @@ from contactverif.problems.blocks import is_uniform, overhangs, two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.strategies.parts import Motion, ends_of, lengths, motions, repeat_cyclically, seeds
 
+UNIFORM = "a known uniform pressure"
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
 INCLINATIONS = (1.0, 17.3, 45.0, 90.0, 179.0)
 POSITIONS = 200  # The number of positions of a punch that slides over one master segment.
@@ -54,7 +55,7 @@ def _widths() -> SearchStrategy[list[float]]:
     return st.one_of(plain, plain, plain, plain, wide)
 
 
-@random_source("contactverif.strategies.solids.block_cases")
+@random_source("contactverif.strategies.solids.block_cases", needs=UNIFORM)
 def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
 
@@ -63,7 +64,7 @@ def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     return _two_blocks() if scene is None else _uniform(scene, overhang=False)
 
 
-@random_source("contactverif.strategies.solids.variant_cases")
+@random_source("contactverif.strategies.solids.variant_cases", needs=UNIFORM)
 def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return the patch test's variants: each case has the parameter "variant", an index into VARIANTS.
 
@@ -72,7 +73,7 @@ def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     return _variants() if scene is None else _uniform(scene, overhang=False)
 
 
-@random_source("contactverif.strategies.solids.dead_zone_cases")
+@random_source("contactverif.strategies.solids.dead_zone_cases", needs="a known pressure and an overhang")
 def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return a random block that overhangs its master inside a slave segment, on one side or both.
 

@@ -16,7 +16,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
-from contactverif.strategies.solids import block_cases, dead_zone_cases, variant_cases
+from contactverif.strategies.solids import UNIFORM, block_cases, dead_zone_cases, variant_cases
 from contactverif_properties.patch_flat import promise_normal, promise_single
 from contactverif_properties.shared import solved_patch
 
@@ -64,7 +64,7 @@ def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -
         fits = states is not None and is_of_class(scene.interface, scene.parameters["along"], midpoints=midpoints)
         return states if fits else None
 
-    return Cases.from_list(make, on_place=on_scene)
+    return Cases.from_list(make, on_place=on_scene, needs=UNIFORM)
 
 
 _define = partial(Property.define, family="patch", bodies=True, exact=solved_patch.forces_to_draw)

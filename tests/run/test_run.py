@@ -423,7 +423,11 @@ def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, verd
     [
         (replace(ZERO, applicable=lambda traits: "no such thing"), Verdict.NOT_APPLICABLE, "no such thing"),
         (replace(ZERO, needs=frozenset({"tangent", "pair"})), Verdict.NOT_PROVIDED, "pair, tangent: not provided"),
-        (replace(ZERO, cases=lambda _: None), Verdict.NOT_APPLICABLE, "this interface or scene has no such cases"),
+        (
+            replace(ZERO, cases=lambda _: None),
+            Verdict.NOT_APPLICABLE,
+            "needs own meshes with a known answer",
+        ),
     ],
 )
 def test_what_cannot_be_asked_is_a_row_without_cases(question: Property, verdict: Verdict, reason: str) -> None:
