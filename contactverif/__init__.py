@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contactverif.autodiff.jax_formulation import from_energy, from_residual
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.cases import Cases
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "autodiff.jax_formulation": ("from_energy", "from_residual"),
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.cases": ("Cases",),
@@ -110,6 +112,8 @@ __all__ = [
     "block",
     "body_from_mesh",
     "evaluate_both",
+    "from_energy",
+    "from_residual",
     "judge_case",
     "load_formulation",
     "load_properties",
