@@ -23,6 +23,7 @@ from contactverif.cli.compare_command import compare
 from contactverif.cli.draw_command import draw
 from contactverif.cli.list_command import list_installed
 from contactverif.cli.merge_command import merge
+from contactverif.cli.new_command import new
 from contactverif.cli.paper_command import paper
 from contactverif.cli.queries_command import queries
 from contactverif.cli.replay_command import replay
@@ -56,6 +57,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "bench": bench,
     "paper": paper,
     "scenes": scenes,
+    "new": new,
     "queries": queries,
     "score": score,
 }
