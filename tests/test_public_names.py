@@ -31,6 +31,8 @@ PUBLIC = {
         # Properties, and runs over them.
         *("Property", "Cases", "Quantity", "Measurement", "Finding", "Outcome", "Verdict", "Row", "Run"),
         *("load_formulation", "load_properties", "evaluate_both", "judge_case", "verify", "Report"),
+        # Formulations from functions of JAX.
+        *("from_energy", "from_residual"),
         # Errors.
         *("ContactverifError", "ContractError", "MisuseError"),
     },
@@ -39,6 +41,7 @@ PUBLIC = {
 NAMES = [(module, name) for module, names in PUBLIC.items() for name in sorted(names)]
 # Packages that take long to import, of which `import contactverif` needs none.
 HEAVY = {"numpy", "scipy", "numba", "skfem", "hypothesis", "xarray", "netCDF4", "matplotlib", "meshio", "typer", "rich"}
+HEAVY |= {"jax"}
 
 
 @pytest.mark.parametrize("module", PUBLIC)

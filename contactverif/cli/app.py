@@ -24,6 +24,7 @@ from contactverif.cli.draw_command import draw
 from contactverif.cli.explain_command import explain
 from contactverif.cli.list_command import list_installed
 from contactverif.cli.merge_command import merge
+from contactverif.cli.new_command import new
 from contactverif.cli.paper_command import paper
 from contactverif.cli.queries_command import queries
 from contactverif.cli.replay_command import replay
@@ -58,6 +59,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "bench": bench,
     "paper": paper,
     "scenes": scenes,
+    "new": new,
     "queries": queries,
     "score": score,
 }

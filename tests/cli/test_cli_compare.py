@@ -72,7 +72,7 @@ def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
 
 
 def test_what_differs_takes_few_lines(ask: Ask) -> None:
-    """Verdicts that differ, errors of accuracy with one verdict, iterations and time: 25 lines of 80 columns at most."""
+    """Verdicts that differ, errors of accuracy, iterations and time take 25 lines of 80 columns at most."""
     options = ("--examples", "3", "--seed", "1", "--isolation", "inline")
     answer = ask("vts-me", "--against", "vts-ppt", *options, columns=80)
     lines = answer.out.splitlines()

@@ -110,10 +110,15 @@ def mine_classes() -> dict[str, str]:
     return classes((MINE / "mine.py").read_text(encoding="utf-8"))
 
 
+def install_project(folder: Path, settings: Path) -> None:
+    """Write what `pip install` leaves in a folder of the project with this pyproject.toml, besides its modules."""
+    project = tomllib.loads(settings.read_text(encoding="utf-8"))["project"]
+    _install(folder, project["name"], project["version"], project["entry-points"])
+
+
 def install_mine(folder: Path, source: str) -> None:
     """Write what `pip install` leaves in a folder of a project whose mine.py has this source."""
-    project = tomllib.loads((MINE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    _install(folder, project["name"], project["version"], project["entry-points"])
+    install_project(folder, MINE / "pyproject.toml")
     (folder / "mine.py").write_text(source, encoding="utf-8")
 
 

@@ -120,6 +120,7 @@ def test_the_first_command_is_made_of_what_is_there() -> None:
 
 # The pages whose Python runs as it stands, and what it prints.
 PYTHON = {
+    "how-to/jax.md": r"balance\.force pass\nbalance\.moment pass\n(?s:.*)symmetric pass\n(?s:.*)directional pass",
     "how-to/own-mesh.md": r"patch\.flat\.transmission fail",
     "how-to/own-scene.md": r"converged after \d iterations\n(?s:.*)converged after 1\d iterations, rate 0\.1[1-4]",
     "how-to/read-a-report.md": r"balance\.force fail\n(?s:.*)patch\.flat\.transmission pass\n(?s:.*): 0?\.\d",

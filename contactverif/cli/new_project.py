@@ -1,0 +1,113 @@
+"""The files of a new plugin project, from the templates beside this file.
+
+Rule: a project appears whole or not at all, under a name that nothing else has.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import keyword
+import os
+import re
+import tempfile
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from contactverif.contract.errors import MisuseError
+from contactverif.run.registry import formulation_names
+
+_NAME = re.compile(r"[A-Za-z]([A-Za-z0-9._-]*[A-Za-z0-9])?")  # A distribution's name that begins like a module's.
+_LONGEST = 60  # Characters. File systems take names of 255 bytes, and the screen of a run has 80 columns.
+_NEEDED = f"a name of letters, digits, '-', '_' and '.', at most {_LONGEST}; first a letter, last a letter or digit"
+_TEMPLATES = {
+    "pyproject.toml": "pyproject.toml",
+    "{module}.py": "formulation.py",
+    "test_{module}.py": "test_formulation.py",
+    "README.md": "README.md",
+    "tox.ini": "tox.ini",
+    ".gitignore": "gitignore",
+    ".github/workflows/tests.yml": "workflow.yml",
+}
+
+
+def make_project(name: str, *, jax: bool) -> list[str]:
+    """Write a project into a new folder of that name; return the names of its files."""
+    module = _module_of(name)
+    names = [name, f"{name}-energy"] if jax else [name]
+    _check_is_free(name, names, module)
+    texts = _render(name, names, module, jax=jax)
+    with tempfile.TemporaryDirectory(prefix=".contactverif-new-", dir=".") as folder:
+        project = Path(folder, name)
+        for file, text in texts.items():
+            path = project / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        project.rename(name)
+    return list(texts)
+
+
+def _module_of(name: str) -> str:
+    """Return the name of the module of a project."""
+    if not _NAME.fullmatch(name) or len(name) > _LONGEST:
+        raise MisuseError("NAME", repr(name), _NEEDED)
+    module = re.sub(r"[-.]+", "_", name).lower()
+    if keyword.iskeyword(module):
+        raise MisuseError("NAME", f"{name!r}, a word of Python", "a name that a module can have")
+    return module
+
+
+def _check_is_free(name: str, names: list[str], module: str) -> None:
+    """Refuse a name that a folder, a formulation, a distribution or a module has."""
+    if os.path.lexists(name):
+        raise MisuseError("NAME", f"{name!r}, which exists in this folder", "the name of a new folder")
+    if registered := sorted(set(names) & set(formulation_names())):
+        raise MisuseError("NAME", f"{name!r}, but a formulation {registered[0]} is registered", "a name that is free")
+    if _distribution(name) is not None:
+        raise MisuseError("NAME", f"{name!r}, a package that is installed", "a name that is free")
+    if importlib.util.find_spec(module) is not None:
+        raise MisuseError("NAME", f"{name!r}, but Python has a module {module}", "a name that is free")
+
+
+def _distribution(name: str) -> Distribution | None:
+    try:
+        return distribution(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _render(name: str, names: list[str], module: str, *, jax: bool) -> dict[str, str]:
+    """Return {file: text} of a project."""
+    templates = Environment(
+        loader=PackageLoader("contactverif.cli", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # The files are no pages of HTML.
+    )
+    requirement, shared_requirement = _requirements()
+    words = {"name": name, "names": " ".join(names), "module": module, "jax": jax}
+    words |= {"requirement": requirement, "shared_requirement": shared_requirement}
+    texts = {}
+    for file, template in _TEMPLATES.items():
+        source = f"jax_{template}" if jax and template == "formulation.py" else template
+        texts[file.format(module=module)] = templates.get_template(f"{source}.jinja").render(words)
+    return texts
+
+
+def _requirements() -> tuple[str, str]:
+    """Return what installs this contactverif once more: on this machine, and on any other.
+
+    What pip installed from a folder is a folder on this machine, and a release elsewhere.
+    """
+    release = "contactverif[box]"
+    installed = _distribution("contactverif")
+    source = json.loads((installed and installed.read_text("direct_url.json")) or "{}")
+    if "vcs_info" in source:
+        commit = source["vcs_info"]["commit_id"]
+        address = f"{release} @ {source['vcs_info']['vcs']}+{source['url']}@{commit}"
+        return address, address
+    return f"{release} @ {source['url']}" if source else release, release

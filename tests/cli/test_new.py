@@ -1,0 +1,144 @@
+"""The command `new`: the files that it makes, and the names that it refuses.
+
+`tests/docs/test_new_project.py` runs a project.
+"""
+
+import errno
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from asking import Ask, check_mistake
+
+from contactverif.cli import new_project
+
+Make = Callable[..., Path]
+FREE = "needed a name that is free"
+
+
+@pytest.fixture
+def make(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
+    """Return a function that makes a project in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def make_project(name: str, *options: str) -> Path:
+        answer = ask("new", name, *options)
+        assert (answer.status, answer.err) == (0, "")
+        assert answer.out.endswith(f"next: cd {name} && pip install -e . && pytest && contactverif verify {name}\n")
+        return tmp_path / name
+
+    return make_project
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("name", "module"), [("mine", "mine"), ("My-NTS.2", "my_nts_2")])
+def test_a_project_has_the_files_of_its_name(make: Make, name: str, module: str, tmp_path: Path) -> None:
+    project = make(name)
+    files = {path.relative_to(project).as_posix() for path in project.rglob("*") if path.is_file()}
+    modules = {f"{module}.py", f"test_{module}.py"}
+    assert files == modules | {"pyproject.toml", "README.md", "tox.ini", ".gitignore", ".github/workflows/tests.yml"}
+    settings = read_toml(project / "pyproject.toml")
+    assert settings["project"]["name"] == name
+    assert settings["project"]["entry-points"]["contactverif.formulations"] == {name: f"{module}:SegmentToSegment"}
+    assert list(tmp_path.iterdir()) == [project]
+    assert not [path for path in files if "{{" in (project / path).read_text() and "yml" not in path]
+
+
+def test_a_project_of_jax_needs_the_extra(make: Make) -> None:
+    assert "contactverif[jax]" in read_toml(make("mine", "--jax") / "pyproject.toml")["project"]["dependencies"]
+
+
+def test_tox_and_the_workflow_run_the_tests_and_verify(make: Make) -> None:
+    project = make("mine", "--jax")
+    workflow = yaml.safe_load((project / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8"))
+    (job,) = workflow["jobs"].values()
+    assert job["env"] == {"CONTACTVERIF": "contactverif[box]"}
+    commands = [step["run"] for step in job["steps"] if "run" in step]
+    assert commands[-2:] == ['python -m pip install "tox>=4.18"', "python -m tox"]
+    assert all(re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]) for step in job["steps"] if "uses" in step)
+    tox = (project / "tox.ini").read_text(encoding="utf-8")
+    assert "contactverif verify mine mine-energy --out mine.nc --out mine.html" in tox
+
+
+@pytest.mark.parametrize(
+    ("source", "requirements"),
+    [
+        (None, ("contactverif[box]", "contactverif[box]")),
+        (
+            '{"url": "file:///a/clone", "dir_info": {}}',
+            ("contactverif[box] @ file:///a/clone", "contactverif[box]"),
+        ),
+        (
+            '{"url": "https://example.org/c", "vcs_info": {"vcs": "git", "commit_id": "1f"}}',
+            ("contactverif[box] @ git+https://example.org/c@1f",) * 2,
+        ),
+    ],
+)
+def test_contactverif_comes_from_where_it_is_installed(
+    make: Make, source: str | None, requirements: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Installed:
+        def read_text(self, file: str) -> str | None:
+            return source
+
+    lookup = new_project._distribution
+    monkeypatch.setattr(
+        new_project, "_distribution", lambda name: Installed() if name == "contactverif" else lookup(name)
+    )
+    project = make("mine")
+    assert f"deps = {{env:CONTACTVERIF:{requirements[0]}}}\n" in (project / "tox.ini").read_text()
+    assert f"      CONTACTVERIF: {requirements[1]}\n" in (project / ".github" / "workflows" / "tests.yml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("two words", r"NAME: found 'two words'; needed a name of letters, digits.*"),
+        ("a/b", r"NAME: found 'a/b'; needed a name of letters.*"),
+        ("../mine", r"NAME: found '../mine'; needed a name of letters.*"),
+        ("mine-", r"NAME: found 'mine-'; needed a name of letters.*"),
+        ("1mine", r"NAME: found '1mine'; needed .* first a letter.*"),
+        ("mïne", r"NAME: found 'mïne'; needed a name of letters.*"),
+        ("m" * 61, r"NAME: found 'm+'; needed .*at most 60; .*"),
+        ("class", r"NAME: found 'class', a word of Python; needed a name that a module can have"),
+        ("vts-ppt", f"NAME: found 'vts-ppt', but a formulation vts-ppt is registered; {FREE}"),
+        ("Scikit-FEM", f"NAME: found 'Scikit-FEM', a package that is installed; {FREE}"),
+        ("random", f"NAME: found 'random', but Python has a module random; {FREE}"),
+    ],
+)
+def test_a_name_that_cannot_be_is_refused(
+    ask: Ask, name: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    check_mistake(ask("new", name), message)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_exists_is_left_as_it_is(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").symlink_to("nowhere")
+    check_mistake(
+        ask("new", "mine"), "NAME: found 'mine', which exists in this folder; needed the name of a new folder"
+    )
+    assert [path.is_symlink() for path in tmp_path.iterdir()] == [True]
+
+
+def test_nothing_is_left_where_the_disk_is_full(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write = Path.write_text
+
+    def write_until_full(path: Path, text: str, **options: Any) -> int:
+        if path.name == "tox.ini":
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        return write(path, text, **options)
+
+    monkeypatch.setattr(Path, "write_text", write_until_full)
+    check_mistake(ask("new", "mine"), r".*tox\.ini: No space left on device")
+    assert not list(tmp_path.iterdir())
