@@ -56,6 +56,8 @@ class Command:
         The number of processes that judge; each may lose one case.
     share : float
         The share of the kills that hit this command.
+    read : Callable[[Path], object]
+        Reads a file of its results, and raises if it is broken.
     compare : Callable[[Path, Path], list[str]]
         Returns the differences of two folders, one of them from a run that was never killed.
     """
@@ -113,7 +115,9 @@ COMMANDS = {
         ("bench", "nts-ar", "--scene", "wavy", "--quick", "--repeats", "1", "--out", "report.nc"),
         share=0.1, read=_read_data, compare=_same_bench,
     ),
-    "paper": Command(("paper", "--out", "paper", "--jobs", "2"), jobs=2, share=0.1, read=_read_data, compare=_same_files),
+    "paper": Command(
+        ("paper", "--out", "paper", "--jobs", "2"), jobs=2, share=0.1, read=_read_data, compare=_same_files
+    ),
     "campaign": Command(_SHARDED, _SHARDED, ("merge", "shards", "--out", "report.nc"), share=0.2),
 }  # fmt: skip
 
