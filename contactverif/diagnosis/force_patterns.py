@@ -56,8 +56,8 @@ def _directions(subject: Subject) -> str:
     on_slave, on_master = forces[:n].sum(axis=0), forces[n:].sum(axis=0)
     if same(on_slave, on_master):
         return ""
-    found = [_name_direction(force, normals) for force in (on_slave, on_master)]
-    words = f"along {found[0]} normal on the slave, along {found[1]} normal on the master"
+    along = [_name_direction(force, normals) for force in (on_slave, on_master)]
+    words = f"along {along[0]} normal on the slave, along {along[1]} normal on the master"
     return f"the forces on the sides of a tilted slave do not balance: they are {words}"
 
 
@@ -84,19 +84,27 @@ def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> 
         return "there is no force at all where the surfaces penetrate"
     if same(pushes, exact):
         return ""
-    if text := (
+    text = (
         _factor(pushes, exact)
         or _node_pattern(pushes[:n], exact[:n])
         or _length_pattern(state, pushes)
         or _segment_pattern("slave", state.pieces, state.slave_segment, pushes)
         or _segment_pattern("master", state.pieces, state.master_segment, pushes)
         or _exchange(state, pushes, master=True)
-        or (of_pieces(state, pushes) if in_full else "")
-    ):
-        return text
-    if same(pushes[:n], np.full(n, PENALTY * DEPTH)):
-        return "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
-    return _side_pattern(state, pushes) if in_full else ""
+    )
+    return text or (_pattern_in_full(state, pushes) if in_full else _whole_springs(pushes[:n]))
+
+
+def _pattern_in_full(state: FlatState, pushes: FloatArray) -> str:
+    """Return the pattern of forces that are wrong because they are not the consistent ones."""
+    return of_pieces(state, pushes) or _whole_springs(pushes[: state.n_slave_nodes]) or _side_pattern(state, pushes)
+
+
+def _whole_springs(pushes: FloatArray) -> str:
+    """Return whether each slave node has a spring without a length."""
+    if not same(pushes, np.full(len(pushes), PENALTY * DEPTH)):
+        return ""
+    return "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
 
 
 def _exchange(state: FlatState, pushes: FloatArray, *, master: bool) -> str:

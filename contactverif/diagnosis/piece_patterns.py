@@ -25,7 +25,7 @@ def of_pieces(state: FlatState, pushes: FloatArray) -> str:
 
 def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
     """Return which pieces are left out, or whether a length of the master is counted, if the pieces have factors."""
-    factors = np.linalg.lstsq(state.pieces.T, pushes, rcond=None)[0]
+    factors = np.asarray(np.linalg.lstsq(state.pieces.T, pushes, rcond=None)[0], dtype=np.float64)
     if not same(state.pieces.T @ factors, pushes):
         return ""
     of_slave = np.diff(state.along[: state.n_slave_nodes])[state.slave_segment]

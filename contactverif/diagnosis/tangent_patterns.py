@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from contactverif.contract.arrays import BoolArray, FloatArray, dense
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, dense
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.flat_state import FlatState, flat_state
 
@@ -122,28 +123,29 @@ def _unknown(number: int, pair: Tangents) -> str:
 
 def _one_part(pair: Tangents) -> str:
     """Return the part of the tangent that is wrong, if its size, its place and its growth are those of one part."""
-    axes = np.arange(pair.errors.shape[1]) % 2  # 0 along t (x), 1 along n (y).
-    blocks = {
-        rows + columns: np.ix_(range(len(DEPTHS)), axes == "tn".index(rows), axes == "tn".index(columns))
-        for rows in "tn"
-        for columns in "tn"
+    blocks = _blocks(pair)
+    large = {
+        name: pair.errors[block] for name, block in blocks.items() if not _is_small(pair.errors[block], pair.scale)
     }
-    powers = {
-        name: _power_of_depth(pair.errors[block])
-        for name, block in blocks.items()
-        if not _is_small(pair.errors[block], pair.scale)
-    }
+    powers = {name: _power_of_depth(errors) for name, errors in large.items()}
     # A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
     wrong = [name for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER]
     if len(wrong) != 1:
         return _several(wrong) if wrong else ""
     (name,) = wrong
-    errors, power = pair.errors[blocks[name]], powers[name]
+    errors, power = large[name], powers[name]
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
         return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"
     return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"
+
+
+def _blocks(pair: Tangents) -> dict[str, tuple[IntArray, ...]]:
+    """Return the rows and columns of the blocks t–t, t–n, n–t and n–n, for all depths."""
+    numbers = {axis: np.arange("tn".index(axis), pair.errors.shape[1], 2) for axis in "tn"}  # t is x, and n is y.
+    names = product("tn", repeat=2)
+    return {rows + columns: np.ix_(np.arange(len(DEPTHS)), numbers[rows], numbers[columns]) for rows, columns in names}
 
 
 def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:

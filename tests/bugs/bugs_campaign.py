@@ -43,7 +43,7 @@ this page. Seconds are those of a machine with two cores on which a loop of ten 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command printed, and when."""
+    """The words that a command printed, and the seconds when."""
 
     name: str
     summary: str  # What is wrong with the formulation, in a line.
@@ -57,12 +57,12 @@ class Answer:
     @property
     def diagnosis(self) -> str:
         """The sentence of the diagnosis; empty without one."""
-        found = re.search(r"^  diagnosis: (.*(?:\n  \S.*)*)", self.screen, flags=re.MULTILINE)
-        return " ".join(found[1].split()) if found else ""
+        sentence = re.search(r"^  diagnosis: (.*(?:\n  \S.*)*)", self.screen, flags=re.MULTILINE)
+        return " ".join(sentence[1].split()) if sentence else ""
 
     @property
     def named(self) -> bool:
-        """Whether the diagnosis, or what is printed beside the mesh, names place and kind of the mistake."""
+        """True if the diagnosis, or else the screen, names place and kind of the mistake."""
         return bool(re.search(self.words, self.diagnosis or " ".join(self.screen.split())))
 
     @property

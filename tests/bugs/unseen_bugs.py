@@ -96,20 +96,20 @@ class NodeOnSlave(Springs):
         a, b, c, d = np.moveaxis(x[nodes], 1, 0)
         along = b - a
         s_c, s_d = (((node - a) * along).sum(1) / (along * along).sum(1) for node in (c, d))
-        found = ((s_c >= 0) & (s_c < 1)) | ((s_d >= 0) & (s_d < 1))
-        return i[found], nodes[found]
+        is_near = ((s_c >= 0) & (s_c < 1)) | ((s_d >= 0) & (s_d < 1))
+        return i[is_near], nodes[is_near]
 
 
 class PairsKept(Springs):
     """The search runs at the first call for a mesh, and later calls take its pairs wherever the nodes have gone."""
 
-    found: Any = None
+    first_pairs: Any = None
 
     def pairs(self, interface: Any, x: Any) -> tuple[Any, Any]:
         mesh = interface.slave.segments.tolist(), interface.master.segments.tolist()
-        if self.found is None or self.found[0] != mesh:
-            self.found = mesh, super().pairs(interface, x)
-        return self.found[1]  # type: ignore[no-any-return]
+        if self.first_pairs is None or self.first_pairs[0] != mesh:
+            self.first_pairs = mesh, super().pairs(interface, x)
+        return self.first_pairs[1]  # type: ignore[no-any-return]
 
 
 class NeverZero(Parts):
