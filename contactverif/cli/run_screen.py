@@ -32,6 +32,7 @@ from contactverif.contract.result import (
 from contactverif.run.telling import by_telling, most_telling, wrong_rows
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
+_MOST_WRONG = 8  # The same of those that are wrong beside the most telling one.
 _MOST_IDS = 4  # The ids of a family that are listed in a sentence.
 _LEAST_WORDS = 30  # Columns that are left for words beside a name, however long it is.
 _PARTS = {  # The results that show no mistake and have a line for each row, and the title above them.
@@ -85,10 +86,10 @@ class RunScreen:
         if (row := most_telling(rows)) is not None:
             yield self._with_mesh(row, width)
             yield Text("")
-        yield from _part("also wrong", wrong[1:], width)
+        yield from _part("also wrong", wrong[1:], width, _MOST_WRONG)
         yield from _say_what_is_left_out(rows, width)
         yield from _remarks(rows, width)
-        yield from _other_failures(rows, width, in_full=alone or bool(wrong))
+        yield from _other_failures(rows, width, in_full=alone and not wrong)
         yield from _families(rows, width)
         yield from _say_what_the_place_lacks(rows, width)
 
@@ -119,12 +120,12 @@ def _other_failures(rows: Sequence[Row], width: int, *, in_full: bool) -> Iterat
             yield fold(f"{title}: {', '.join(row.property_id for row in part)}", width, indent=0)
 
 
-def _part(title: str, rows: Sequence[Row], width: int) -> Iterator[Text]:
+def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -> Iterator[Text]:
     """Yield a line for each row below a title; of many rows the last ones have their names alone."""
     if not rows:
         return
     yield Text(f"{title}:", style="bold")
-    listed = rows if len(rows) <= _MOST_ROWS + 1 else rows[:_MOST_ROWS]
+    listed = rows if len(rows) <= most + 1 else rows[:most]
     names = max(len(row.property_id) for row in listed)
     for row in listed:
         words = _words(row)

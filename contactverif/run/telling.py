@@ -1,8 +1,8 @@
 """The order in which failures are shown: the most telling first.
 
 A property is telling if few others catch the wrong formulations that it catches. The order is that of the kill matrix
-in `reports/trust/kills.csv`, and a test compares both. Properties that solve bodies stand behind those that do not,
-because a reader can follow a few springs, and hardly a solution.
+in `reports/trust/kills.csv`, and a test compares both. Properties that solve bodies, or integrate along arcs, stand
+behind the others, because a reader can follow a few springs, and hardly a solution.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ ORDER = (
     "tangent.sparsity",
     "projection.forces",
     "projection.activity",
-    "accuracy.arc",
     "unilateral",
     "purity.long",
     "projection.place",
@@ -61,6 +60,7 @@ ORDER = (
     "hard.node-hit",
     "hard.offset",
     "hard.free-end",
+    "accuracy.arc",
     "complementarity",
     "newton.order",
     "patch.curved",

@@ -56,7 +56,10 @@ class Springs:
         places = (x[None] - x[slave[:, 0], None]) @ along[:, :, None] / (along**2).sum(1)[:, None, None]
         first, second = (np.clip(places[:, master[:, end], 0], 0, 1) for end in (0, 1))
         i, j = self.facing(first - second)  # The master runs the other way.
-        return i, np.hstack([slave[i], master[j]])
+        lengths = [np.linalg.norm(x[ends[:, 1]] - x[ends[:, 0]], axis=1).max() for ends in (slave, master)]
+        apart = x[slave[i]].mean(axis=1) - x[master[j]].mean(axis=1)
+        near = np.linalg.norm(apart, axis=1) < 2 * sum(lengths)  # What is further away belongs to another body.
+        return i[near], np.hstack([slave[i], master[j]])[near]
 
     def forces(self, x: Any, slave_segment: Any, n_segments: int) -> Any:
         """Return the forces (n_pairs, 4, 2) on the nodes of pairs at positions of that shape."""
