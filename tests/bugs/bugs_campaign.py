@@ -29,8 +29,8 @@ _PAGE = """# Twenty-eight mistakes, as the screen tells them
 Each formulation below was written with NumPy as a user would write it, has one mistake, and was judged by
 `contactverif verify NAME --seed 1` with all else as it is by default. Twelve mistakes were known to the authors of the
 rules of [diagnosis](../../docs/concepts/diagnosis.md). Two times eight were written by somebody who had not seen the
-rules. When they were asked for the first time, all sixteen were caught and none was called by a wrong name, but place
-and kind were named of one of the first eight and of one of the second. Rules for the others were added then, so the
+rules. When they were asked for the first time, all sixteen were caught, but place and kind were named of one of the
+first eight and of one of the second, and one was called by a wrong name. Rules for the others were added then, so the
 counts below are no measure of what is said of a mistake that nobody has thought of. `tests/bugs/bugs_campaign.py` wrote
 this page. Seconds are those of a machine with two cores on which a loop of ten million turns in Python takes
 {loop:.2g} s.
