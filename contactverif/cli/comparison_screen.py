@@ -76,13 +76,13 @@ class ComparisonScreen:
         """Yield the time of an evaluation, and its ratio to that of the reference."""
         reference = self.study.comparison.reference
         totals = {(cost.formulation, cost.n_segments): cost.total for cost in self.study.costs}
-        words = [
-            f"{1e6 * seconds:.0f} µs on {n} segments ({seconds / totals[reference, n]:.2g})"
-            for (other, n), seconds in totals.items()
-            if other == name and isfinite(seconds)
-        ]
+        words, of_reference = [], f" of {reference}"
+        for (other, n), seconds in totals.items():
+            if other == name and isfinite(seconds):
+                ratio = seconds / totals[reference, n]  # NaN where the reference could not be timed.
+                words.append(f"{1e6 * seconds:.0f} µs on {n} segments ({number(ratio)}{of_reference})")
+                of_reference = ""
         if words:
-            words[0] = words[0].replace(")", f" of {reference})")
             yield fold(f"An evaluation takes {', '.join(words)}.", width, indent=0)
 
 

@@ -35,9 +35,9 @@ from contactverif.meshes.mesh_file import (
 YOUNG, POISSON = 1.0, 0.3  # The material of a body that the user says nothing about.
 STIFFNESS = 1.0  # The distributed stiffness ε̂ h / E of a scene, soft enough for Newton's method on bent surfaces.
 AWAY = 0.7  # A boundary looks away from the contact if the cosine between its normal and the opposite one is larger.
-# The supports of the slave push it until `CLOSED` of its nodes would touch, but into the master by at most `DEEPEST`
-# of its height, since linear elasticity is meant for small strains.
-CLOSED, LEAST_DEPTH, DEEPEST = 0.8, 0.01, 0.02
+CLOSED = 0.8  # The supports push the slave until this share of its nodes would touch.
+LEAST_DEPTH = 0.01  # They push it further by this share of its height, so that pressures are not zero.
+DEEPEST = 0.02  # No node is pushed deeper than this share of the height: linear elasticity is meant for small strains.
 
 Material = tuple[float, float]
 Support = tuple[float | None, float | None]
@@ -306,10 +306,10 @@ def _scene(parts: list[_Part]) -> Scene:
 def parse_material(text: str) -> tuple[str, Material]:
     """Return the group and the material of GROUP=E,ν."""
     needed = "GROUP=E,ν such as base=1000,0.3"
-    name, numbers = _parse(text, "--material", needed)
-    if None in numbers:
+    name, (young, poisson) = _parse(text, "--material", needed)
+    if young is None or poisson is None:
         raise MisuseError("--material", repr(text), needed)
-    return name, numbers  # type: ignore[return-value]
+    return name, (young, poisson)
 
 
 def parse_support(text: str) -> tuple[str, Support]:

@@ -72,6 +72,7 @@ def test_forces_and_tangent_are_those_of_the_springs(formulation: CheckedFormula
     interface, z = states(n_segments)
     pairing = formulation.own_pairing(interface, z)
     answer = formulation.residual(interface, pairing, z)
+    # Numbers about 1, rounded in another order; the tangent is compared with differences, which err by 1e-16/h and h².
     np.testing.assert_allclose(answer, expected_forces(interface, z), rtol=1e-14, atol=1e-14)
     tangent = formulation.tangent(interface, pairing, z).toarray()
     h = 2.0**-17
