@@ -18,6 +18,7 @@ _NEEDED = {
     "isolation": "box, landlock, process or inline",
     "jobs": "a whole number",
     "open": "a list of paths",
+    "memory": "true or false",
 }
 
 
@@ -31,6 +32,7 @@ class Settings:
     isolation: Literal["box", "landlock", "process", "inline"] | None = None
     jobs: int | None = None
     open: tuple[str, ...] = ()  # What a plugin in a box may use and write.
+    memory: bool = True  # Failures are kept for the next run.
 
 
 def read_settings() -> Settings:

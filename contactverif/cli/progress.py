@@ -66,7 +66,9 @@ class Bar:
         self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.count, step.planned)
 
     def _show_row(self, row: Row) -> None:
-        words = f"{row.formulation} {row.property_id}: ", row.result, f", {row.judged}/{row.planned} judged"
+        # A row without planned cases is that of a failure of an earlier run.
+        judged = f", {row.judged}/{row.planned} judged" if row.planned else " again"
+        words = f"{row.formulation} {row.property_id}: ", row.result, judged
         reason = f": {row.reason}" if row.reason else ""
         line = Text.assemble(words[0], (words[1], STYLES.get(row.result, PLAIN_STYLE)), words[2] + reason)
         try:

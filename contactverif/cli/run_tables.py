@@ -80,6 +80,8 @@ class RunTable:
 
 def headline(provenance: Mapping[str, str]) -> str:
     """Say how many cases there are, and where they come from."""
+    if "asked" in provenance:
+        return f"asked: {provenance['asked']}"
     profile, examples, seed = (provenance.get(name) for name in ("profile", "examples", "seed"))
     if profile is None:
         return "named cases alone, no random ones"

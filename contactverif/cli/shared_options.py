@@ -40,6 +40,8 @@ KEEP_GOING_HELP = (
     "Ask all properties, even if the first show an opposite sign, a crash, a breach of the contract, or answers that "
     "depend on earlier calls."
 )
+LAST_FAILED_HELP = "Ask nothing but the cases that failed in earlier runs, which `.contactverif` keeps."
+NO_MEMORY_HELP = "Neither ask first what failed in earlier runs, nor keep what fails now."
 JOBS_HELP = (
     "Number of processes that share the work; the results are the same. "
     "(default: one for each 1000 planned cases, at most one for each core)"
@@ -114,13 +116,15 @@ class SamplingOptions:
 
 @dataclass(frozen=True, slots=True)
 class FailureOptions:
-    """The failures that count, and what the others of a formulation are worth once one is found."""
+    """The failures that count, those of earlier runs, and what others are worth once one is found."""
 
     known: Annotated[
         list[str] | None,
         typer.Option("--known", help="A known failure, with its reason. Repeatable.", metavar="ID=REASON"),
     ] = None
     keep_going: Annotated[bool, typer.Option("--keep-going", help=KEEP_GOING_HELP)] = False
+    last_failed: Annotated[bool, typer.Option("--last-failed", help=LAST_FAILED_HELP)] = False
+    no_memory: Annotated[bool, typer.Option("--no-memory", help=NO_MEMORY_HELP)] = False
 
 
 @dataclass(frozen=True, slots=True)

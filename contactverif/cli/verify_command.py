@@ -15,6 +15,7 @@ from contactverif.api.run_files import REPORT, run_writers
 from contactverif.api.settings import read_settings
 from contactverif.cli.annotations import annotate
 from contactverif.cli.isolation_options import IsolationOptions
+from contactverif.cli.last_failed import ask_what_failed
 from contactverif.cli.output_files import PictureFolder
 from contactverif.cli.run_endings import (
     End,
@@ -72,6 +73,9 @@ def verify(
     there, and --resume FILE goes on with a run that was stopped or killed.
     The folder goes when FILE is complete.
 
+    What fails is kept in `.contactverif` here, and is asked first in the next
+    run; it goes once it passes.
+
     \bExit status
       0  every promise is kept, and every property was judged
       1  a promise is broken, a property could not be judged, or a plugin
@@ -86,6 +90,7 @@ def verify(
       contactverif verify mine --mesh punch.msh --slave punch --master base
       contactverif verify vts-me --scene c -p 'patch.*'
       contactverif verify --resume vts-ppt.nc
+      contactverif verify mine --last-failed
     """
     typed = VerifyOptions(
         tuple(names or ()),
@@ -99,27 +104,39 @@ def verify(
         workers,
         isolation,
     )
+    settings = read_settings()
     if resume is not None:
         job = resumed_job(resume, typed)
     else:
         selected = tuple(select_names(names or [], all_, isolation.limits()))
-        job = new_job(replace(typed, names=selected).with_settings(read_settings()))
-    raise typer.Exit(run_job(job, screen))
+        job = new_job(replace(typed, names=selected).with_settings(settings))
+    if failures.last_failed:
+        raise typer.Exit(ask_what_failed(job))
+    raise typer.Exit(run_job(job, screen, memory=settings.memory and not failures.no_memory))
 
 
-def run_job(job: VerifyJob, screen: ScreenOptions) -> int:
-    """Judge what a job says, show the tables and write the files; return the exit status."""
+def run_job(job: VerifyJob, screen: ScreenOptions, *, memory: bool = False) -> int:
+    """Judge what a job says, show the tables and write the files; return the exit status.
+
+    With a memory, what failed in earlier runs is asked first. On a mesh or a scene of the user's there is none.
+    """
     from contactverif.cli.progress import Bar
+    from contactverif.run.failure_memory import FailureMemory
     from contactverif.run.rows import find_gap
     from contactverif.run.run import run
     from contactverif.run.scheduler import worker_pool
 
+    failures = FailureMemory() if memory and job.place is None else None
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
             plugins, journal = stack.enter_context(job.begin(job.load))
+            if failures is not None:
+                journal.earlier_failures = failures.recall(job.options.names, job.options.properties)
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
             options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
             result = run(plugins.subjects, plugins.questions, **options)
+        if failures is not None:
+            failures.update(result.rows)
         gap = partial(find_gap, result, plugins.subjects, plugins.questions, job.sampling)
         end = end_run(
             job, journal, gap, run_writers(result, job.files.names.get(REPORT)), promises_kept=result.promises_kept

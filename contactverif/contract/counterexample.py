@@ -26,6 +26,7 @@ class Origin(StrEnum):
 
     SHRUNK = "shrunk from the random cases"
     WITNESS = "the witness of a formulation"
+    EARLIER = "a case that failed in an earlier run"
     FIRST = "the first case that clearly fails, not shrunk"
 
 
@@ -46,7 +47,7 @@ class Counterexample:
     def origin(self) -> Origin:
         """The way to the case: only one that was shrunk is the smallest found."""
         if self.outcome is self.row.witness:
-            return Origin.WITNESS
+            return Origin.WITNESS if self.row.promise is False else Origin.EARLIER
         return Origin.FIRST if self.row.shrunk is None else Origin.SHRUNK
 
     @property
@@ -54,6 +55,8 @@ class Counterexample:
         """The case in a few words, for a reader."""
         if self.origin is Origin.WITNESS:
             words = f"its witness, the case {self.case.name}"
+        elif self.origin is Origin.EARLIER:
+            words = Origin.EARLIER
         elif self.case.name:
             words = f"the case {self.case.name}"
         else:
@@ -98,7 +101,8 @@ def counterexamples(run: Run) -> dict[str, Counterexample]:
     """Return all counterexamples {id: counterexample}, in the order of the run."""
     entries = [(row, outcome) for row in run.rows if (outcome := counterexample_of(row)) is not None]
     ids = distinct(
-        case_id(row.formulation, row.property_id, witness=outcome is row.witness) for row, outcome in entries
+        case_id(row.formulation, row.property_id, witness=outcome is row.witness and row.promise is False)
+        for row, outcome in entries
     )
     return {id_: Counterexample(id_, *entry) for id_, entry in zip(ids, entries, strict=True)}
 

@@ -170,9 +170,13 @@ def _derive(row: Row, opened: OpenRow | Row, sampling: Sampling) -> Row:
 
 
 def _sample(row: Row, opened: OpenRow, share: float) -> Sample:
-    """Return the random share of a row that is judged again, and its witness."""
+    """Return the random share of a row that is judged again, and its witness.
+
+    A failure of an earlier run is judged as a counterexample: nothing but the report says what its case is.
+    """
     outcomes = {number: row.outcomes[number] for number in choose_share(range(len(row.outcomes)), share)}
-    return Sample.of_row(opened, outcomes if row.witness is None else {**outcomes, WITNESS: row.witness})
+    witness = {} if row.witness is None or opened.witness is None else {WITNESS: row.witness}
+    return Sample.of_row(opened, outcomes | witness)
 
 
 def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str:

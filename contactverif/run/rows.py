@@ -163,11 +163,20 @@ class OpenRow:
         assert self.witness is not None
         self._witness_outcome = replace(outcome, case_or_summary=self.witness)
 
+    def add_earlier_failure(self, outcome: Outcome) -> None:
+        """Add the outcome of a case that failed in an earlier run, and fails again; a list has its cases anyway."""
+        if self.witness is None and self.listed is None:
+            self.witness, self._witness_outcome = outcome.case, outcome
+
+    @property
+    def witnessed(self) -> bool:
+        """Return whether the witness is judged, or is among the planned cases; without one too."""
+        return self.witness is None or self.witness_is_listed or self._witness_outcome is not None
+
     @property
     def complete(self) -> bool:
         """Return whether all cases and the witness are judged."""
-        witnessed = self.witness is None or self.witness_is_listed or self._witness_outcome is not None
-        return witnessed and self._all_drawn and not self._expected
+        return self.witnessed and self._all_drawn and not self._expected
 
     def judge(self, *, on_scene: bool) -> None:
         """Make the row of the outcomes; `on_scene` if the run is about one scene alone."""
@@ -262,6 +271,18 @@ def open_row(
     if promise is False and (_is_on_scene(question, sampling) or question.shown_by - subject.provides):
         row = replace(row, promise=None)
     return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None))
+
+
+def row_of_case(question: Property, subject: Subject, outcome: Outcome) -> Row:
+    """Return the row of a case that failed in an earlier run, alone."""
+    return Row(
+        formulation=subject.name,
+        info=question.info,
+        verdict=outcome.verdict,
+        promise=question.promise(subject.traits),
+        reason=outcome.reason,
+        witness=outcome,
+    )
 
 
 def _is_on_scene(question: Property, sampling: Sampling) -> bool:

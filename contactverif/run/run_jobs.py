@@ -30,7 +30,16 @@ from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
 from contactverif.run.outcome_records import WITNESS, BlockRecord
 from contactverif.run.profiles import Shrink
 from contactverif.run.provenance import collect_provenance
-from contactverif.run.rows import WHOLE, JudgedCases, OpenRow, Shrinking, judge_cases, open_row, shrink_case
+from contactverif.run.rows import (
+    WHOLE,
+    JudgedCases,
+    OpenRow,
+    Shrinking,
+    judge_cases,
+    open_row,
+    row_of_case,
+    shrink_case,
+)
 from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
@@ -67,6 +76,7 @@ class RunJobs:
         self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
         self._questions, self._known = questions, known
         self._share, self._shrink, self._keep_going = share, shrink, keep_going
+        self._fail_again: dict[tuple[str, str], Outcome] = {}
         self._needs: frozenset[str] = frozenset().union(*(question.needs for question in questions))
         self._rows: dict[tuple[str, str], OpenRow | Row] = {}
         # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
@@ -83,6 +93,8 @@ class RunJobs:
         look_at_journal(self._journal, self._subjects, self._questions, self._sampling, scheduler)
         if not self._keep_going:
             self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
+        scheduler.work(self._earlier_failures())
+        if not self._keep_going:
             # All jobs of these properties end before it is known who is asked more, so that it does not depend on time.
             if any(question.id in PURITY for question in self._questions):
                 scheduler.work(chain.from_iterable(self._parts_of_next()))
@@ -188,7 +200,32 @@ class RunJobs:
         }
         self._rows |= rows
         del self._groups[group]
-        return [row for row in rows.values() if isinstance(row, OpenRow)]
+        opened = [row for row in rows.values() if isinstance(row, OpenRow)]
+        for row in opened:
+            if (outcome := self._fail_again.get((row.subject.name, row.question.id))) is not None:
+                row.add_earlier_failure(outcome)
+        return opened
+
+    def _earlier_failures(self) -> Iterator[Job]:
+        """Yield the jobs to judge what failed in earlier runs; none of them counts among the planned cases."""
+        questions = chain.from_iterable(self._groups.values())
+        for question, subject in product(questions, self._subjects):
+            case = self._journal.earlier_failures.get((subject.name, question.id))
+            if case is None or subject.name in self._stopped or question.promise(subject.traits) is False:
+                continue
+            before = Progress(subject.name, question.id, "asking again", 0, 1)
+            self._report(before)
+            note = partial(self._note_earlier_failure, subject, question)
+            yield Job(judge.judge_if_applicable, (question, case, subject), note)
+
+    def _note_earlier_failure(self, subject: Subject, question: Property, outcome: Outcome) -> Iterable[Job]:
+        """Note a case that failed in an earlier run and fails again, and report it."""
+        if outcome.verdict not in (Verdict.FAIL, Verdict.CRASHED):
+            return ()
+        self._fail_again[subject.name, question.id] = outcome
+        before = Progress(subject.name, question.id, "asking again", 1, 1)
+        self._report(replace(before, row=row_of_case(question, subject, outcome)))
+        return ()
 
     def _parts(self) -> Iterator[Iterable[Job]]:
         """Yield the jobs of each part; those of a part are made when they are wanted."""
@@ -199,7 +236,7 @@ class RunJobs:
         """Yield the parts of the next properties with the same cases."""
         group = self._open_next()
         for row in group:
-            if row.witness is not None and not row.witness_is_listed:
+            if row.witness is not None and not row.witnessed:
                 yield self._judge(row, CaseChunk([row.witness], WITNESS))
         if not group:
             return

@@ -8,12 +8,13 @@ like those that cannot be read. Without a proof, outcomes count once a share of 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from secrets import token_hex
 
+from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, PropertyInfo, judge_stored
 from contactverif.run.journal import JournalKey
 from contactverif.run.known_outcomes import KnownOutcomes
@@ -72,6 +73,8 @@ class Journal:
         self.trouble = ""
         self.n_unproven = 0  # The number of outcomes without a proof that the run met.
         self.n_judged_again = 0  # The number of those that were judged again.
+        # {(formulation, property id): case} of what failed in other runs. It is asked first, and not written down.
+        self.earlier_failures: Mapping[tuple[str, str], Case] = {}
         self.remarks: list[str] = []  # What the user should know of records that were not believed.
         self._key = JournalKey() if folder is None else JournalKey.read(folder)
         self._session = token_hex(4)

@@ -44,7 +44,7 @@ from contactverif.isolation.one_thread import ONE_THREAD, one_thread_for_childre
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.run.registry import installed_properties, load_property
 
-Phase = Literal["first call (compiles)", "drawing", "judging", "diagnosis", "shrinking"]
+Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
 # What the server of processes imports once for all workers: the judge, and, as it is imported, all properties.
 _PRELOAD = ["contactverif.run.run", "contactverif.run.preload"]

@@ -22,7 +22,7 @@ class Answer(NamedTuple):
 
 
 Ask = Callable[..., Answer]
-_ROW = re.compile(r"^\S+ [a-z0-9.-]+: [A-Za-z ]+, \d+/\d+ judged(: .*)?\n", re.MULTILINE)
+_ROW = re.compile(r"^\S+ [a-z0-9.-]+: [A-Za-z ]+(, \d+/\d+ judged| again)(: .*)?\n", re.MULTILINE)
 
 
 def without_rows(err: str) -> str:

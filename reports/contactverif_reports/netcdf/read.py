@@ -203,7 +203,7 @@ class _Reader:
             return None, None, None
         dataset, case = self._examples[formulation, property_id]
         origin = Origin(str(dataset.attrs["origin"]))
-        if origin is Origin.WITNESS:
+        if origin in (Origin.WITNESS, Origin.EARLIER):
             return None, None, case
         outcome = OutcomeArrays(dataset, info, ()).outcome(0, case)
         return (outcome, None, None) if origin is Origin.SHRUNK else (None, outcome, None)

@@ -62,7 +62,7 @@ def property_group(info: PropertyInfo, rows: Mapping[str, Row], formulations: Se
         "least_contact": np.float64(info.least_contact),
         "usual_undecided": np.float64(info.usual_undecided),
         "comment": "one property: every random case of every formulation; names that begin with witness_ are of the "
-        "named case with which a formulation proves that it fails",
+        "named case with which a formulation proves that it fails, or of a case that failed in an earlier run",
     }
     return Group(table, attributes)
 
