@@ -66,7 +66,9 @@ class Child:
         """Start a copy of this process that calls a function with its end of the line, and ends."""
         ours, theirs = socket.socketpair()
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # Python warns of threads, and the child starts none.
+            # Python and JAX warn of threads, which the child neither has nor starts.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            warnings.filterwarnings("ignore", r"os\.fork\(\) was called", RuntimeWarning)
             pid = os.fork()
         if pid == 0:
             try:
