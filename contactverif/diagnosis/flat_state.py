@@ -14,6 +14,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
+from contactverif.contract.subject import Subject
 
 SLAVE = np.array([0.0, 1.0, 2.25, 3.125])
 MASTER = np.array([3.625, 2.625, 1.5, 0.6875, -0.5])  # The master runs the other way.
@@ -74,24 +75,32 @@ class FlatState:
 
 
 def flat_state(
-    slope: float = 0.0, depth: float = DEPTH, places: tuple[FloatArray, FloatArray] = (SLAVE, MASTER)
+    slope: float = 0.0,
+    depth: float = DEPTH,
+    places: tuple[FloatArray, FloatArray] = (SLAVE, MASTER),
+    depths: FloatArray | None = None,
 ) -> FlatState:
-    """Return the state whose penetration is `depth` (1 + slope x) at the place x along the slave."""
+    """Return the state whose penetration is `depth` (1 + slope x) at the place x along the slave.
+
+    Or the penetrations of the slave's nodes are `depths`, of which no segment has both signs.
+    """
     slave, master = places
+    depths = depth * (1 + slope * slave) if depths is None else depths
     n_slave, along = len(slave), np.concatenate(places)
     points = np.column_stack([along, np.zeros(len(along))])
     interface = Interface.from_chains(points[:n_slave], points[n_slave:])
     z = points.copy()
-    z[:n_slave, 1] = -depth * (1 + slope * slave)
+    z[:n_slave, 1] = -depths
     case = Case(interface, z.reshape(-1), PENALTY, name="flat")
-    ends = np.unique(along[(along >= slave[0]) & (along <= slave[-1])])
+    low, high = max(slave[0], master[-1]), min(slave[-1], master[0])
+    ends = np.unique(along[(along >= low) & (along <= high)])
     middles = (ends[1:] + ends[:-1]) / 2
     slave_segment = np.searchsorted(slave, middles) - 1
     master_segment = len(master) - 1 - np.searchsorted(master[::-1], middles)
     pieces = np.zeros((len(middles), len(along)))
     for piece, (first, last) in enumerate(pairwise(ends)):
         for x in (first + last) / 2 + _GAUSS * (last - first) / 2:
-            force = PENALTY * depth * (1 + slope * x) * (last - first) / 2
+            force = PENALTY * max(np.interp(x, slave, depths), 0.0) * (last - first) / 2
             for nodes in (
                 interface.slave.segments[slave_segment[piece]],
                 interface.master.segments[master_segment[piece]],
@@ -99,3 +108,12 @@ def flat_state(
                 share = (x - along[nodes[0]]) / (along[nodes[1]] - along[nodes[0]])
                 pieces[piece, nodes] += force * np.array([1 - share, share])
     return FlatState(case, pieces, slave_segment, master_segment, n_slave)
+
+
+def pushes_of(subject: Subject, state: FlatState) -> FloatArray:
+    """Return the forces (n_nodes, 2) that push the surfaces apart: positive along y on both sides if all is right."""
+    formulation, case = subject.for_case(state.case), state.case
+    pairing = formulation.pair(case.interface, case.z)
+    forces: FloatArray = -formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
+    sides = np.where(np.arange(len(forces)) < state.n_slave_nodes, 1.0, -1.0)
+    return forces * sides[:, None]

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import COARSE, DEPTH, FINE, PENALTY, FlatState, flat_state
+from contactverif.diagnosis.flat_state import COARSE, DEPTH, FINE, PENALTY, FlatState, flat_state, pushes_of
+from contactverif.diagnosis.other_states import (
+    diagnose_balance,
+    diagnose_digits,
+    diagnose_open_segment,
+    diagnose_turned,
+)
 from contactverif.diagnosis.piece_patterns import SAME, equal, of_pieces, same
 
-_TILT = 0.25  # The slope of a slave whose forces must balance, too.
 _MEANINGS = {  # {factor: what it may mean}
     2.0: "two passes that each have the whole penalty, or a factor 2",
     0.5: "a factor ½, such as a mean of two sides that is taken once too often",
@@ -29,13 +34,16 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     if rules.enforcement != "penalty" or rules.penalty == "nodal" or patch.flat is False:
         return ""  # Other forces than the consistent ones are right there.
     uniform, linear = flat_state(), flat_state(slope=1.0)
-    forces = _forces(subject, uniform)
+    forces = pushes_of(subject, uniform)
     return (
-        _uniform_pattern(uniform, forces, in_full=in_full)
+        diagnose_digits(subject)
+        or _uniform_pattern(uniform, forces, in_full=in_full)
         or _along_the_surface(forces)
-        or _linear_pattern(linear, _forces(subject, linear)[:, 1])
+        or _linear_pattern(linear, pushes_of(subject, linear)[:, 1])
         or _on_other_meshes(subject, in_full=in_full)
-        or (_directions(subject) if subject.traits.promises.conserves_force else "")
+        or diagnose_turned(subject)
+        or diagnose_open_segment(subject)
+        or (diagnose_balance(subject) if subject.traits.promises.conserves_force else "")
     )
 
 
@@ -43,38 +51,9 @@ def _on_other_meshes(subject: Subject, *, in_full: bool) -> str:
     """Return the pattern on a slave that is finer than its master, or coarser."""
     for places, words in ((FINE, "finer"), (COARSE, "coarser")):
         state = flat_state(places=places)
-        if text := _uniform_pattern(state, _forces(subject, state), in_full=in_full):
+        if text := _uniform_pattern(state, pushes_of(subject, state), in_full=in_full):
             return f"on a slave that is {words} than its master: {text}"
     return ""
-
-
-def _directions(subject: Subject) -> str:
-    """Return along which normals the forces of both sides are, where they do not balance on a tilted slave."""
-    state = flat_state(slope=_TILT, depth=1.0)
-    n, normals = state.n_slave_nodes, {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
-    forces = _forces(subject, state)
-    on_slave, on_master = forces[:n].sum(axis=0), forces[n:].sum(axis=0)
-    if same(on_slave, on_master):
-        return ""
-    along = [_name_direction(force, normals) for force in (on_slave, on_master)]
-    words = f"along {along[0]} normal on the slave, along {along[1]} normal on the master"
-    return f"the forces on the sides of a tilted slave do not balance: they are {words}"
-
-
-def _name_direction(force: FloatArray, normals: Mapping[str, FloatArray]) -> str:
-    """Return the name of the normal along which a force is."""
-    size = np.linalg.norm(force)
-    names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
-    return next(names, "another")
-
-
-def _forces(subject: Subject, state: FlatState) -> FloatArray:
-    """Return the forces (n_nodes, 2) that push the surfaces apart: positive along y on both sides if all is right."""
-    formulation, case = subject.for_case(state.case), state.case
-    pairing = formulation.pair(case.interface, case.z)
-    forces: FloatArray = -formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
-    sides = np.where(np.arange(len(forces)) < state.n_slave_nodes, 1.0, -1.0)
-    return forces * sides[:, None]
 
 
 def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> str:
@@ -118,15 +97,19 @@ def _exchange(state: FlatState, pushes: FloatArray, *, master: bool) -> str:
 
 
 def _length_pattern(state: FlatState, pushes: FloatArray) -> str:
-    """Return whether the parts of the slave's segments lack the length of their segment, or have it twice."""
+    """Return whether the parts of the slave's segments lack the length of their segment, or have another one."""
     factors = _factors(state.pieces, state.slave_segment, pushes)
     if factors is None:
         return ""
+    lengths = np.diff(state.along[: state.n_slave_nodes])
     for power, words in ((-1, "is missing"), (1, "is counted twice")):
-        if len(factors) > 1 and same(factors, np.diff(state.along[: state.n_slave_nodes]) ** power):
+        if len(factors) > 1 and same(factors, lengths**power):
             return (
                 f"the length of a slave segment {words}: its force has {_times(factors[1])} the exact size on segment 1"
             )
+    if len(factors) > 1 and same(factors * lengths, np.full(len(factors), (factors * lengths).mean())):
+        words = "" if not same(factors[0] * lengths[0], lengths.mean()) else ", the mean"
+        return f"each slave segment counts with the same length, {factors[0] * lengths[0]:.4g}{words}, whatever its own"
     return ""
 
 

@@ -20,6 +20,7 @@ def of_pieces(state: FlatState, pushes: FloatArray) -> str:
         or _piece_factors(state, pushes)
         or _halves(state, pushes)
         or _whole_segments(state, pushes)
+        or _shifted_points(state, pushes)
     )
 
 
@@ -78,6 +79,25 @@ def _whole_segments(state: FlatState, pushes: FloatArray) -> str:
                 f"the points of integration are the {n_points} of whole slave segments, not cut at the master's nodes"
             )
     return ""
+
+
+def _shifted_points(state: FlatState, pushes: FloatArray) -> str:
+    """Return by which share of its length the force of each piece acts beside the middle, if it is the same for all."""
+    shifts = np.zeros(len(pushes))  # The change of the forces if the share is 1.
+    interface, along = state.case.interface, state.along
+    lengths = state.pieces[:, : state.n_slave_nodes].sum(axis=1) / (PENALTY * DEPTH)
+    sides = (interface.slave.segments[state.slave_segment], interface.master.segments[state.master_segment])
+    for segments in sides:
+        change = PENALTY * DEPTH * lengths**2 / (along[segments[:, 1]] - along[segments[:, 0]])
+        np.add.at(shifts, segments, np.stack([-change, change], axis=1))
+    share = float(shifts @ (pushes - state.exact) / (shifts @ shifts))
+    if not same(pushes, state.exact + share * shifts):
+        return ""
+    end = "end" if share > 0 else "start"
+    return (
+        f"the force of each part acts {abs(share):.3g} of its length nearer to the part's {end}: look at the places of "
+        "the points of integration and at their weights"
+    )
 
 
 def _sum_at_points(state: FlatState, places: FloatArray, weights: FloatArray) -> FloatArray:

@@ -15,12 +15,15 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, dense
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import FlatState, flat_state
+from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state
 
 DEPTHS = tuple(2.0**-power for power in (5, 6, 7, 8))
 # Central differences of a step of 2^-20 of forces that are smooth over 1 err by less, over the largest entry.
 SAME = 1e-6
 STEP = 2.0**-20
+_BEND = 2.0**-11  # The step of second differences, a fraction of the smallest depth.
+_DIFFERENCES = 0.05  # The share of the errors of one-sided differences that a second derivative may leave.
+_SHORT_MASTER = MASTER[1:-1]  # The slave reaches past both of its ends.
 _PARTLY_APART = -0.625  # The slope of a penetration that ends at 1.6, inside a segment of either side.
 _POWER = 0.25  # A part grows like g^k if the measured power is as near to k.
 
@@ -31,6 +34,7 @@ class Tangents:
 
     tangents: FloatArray  # (n_depths, n, n)
     derivatives: FloatArray  # (n_depths, n, n)
+    curvatures: FloatArray  # (n_depths, n, n): the second derivative of each row by the unknown of the column.
     n_slave: int  # The number of rows of the slave, which come first.
 
     @property
@@ -53,8 +57,20 @@ def diagnose_tangent(subject: Subject) -> str:
     if pair.scale == 0:
         return ""
     if _is_small(pair.errors, pair.scale):
-        return _where_apart(subject)
-    return _as_a_whole(pair) or _one_line(pair) or _one_part(pair)
+        return _past_an_end(subject) or _where_apart(subject)
+    return _as_a_whole(pair) or _one_line(pair) or _one_side(pair) or _of_differences(pair) or _one_part(pair)
+
+
+def _past_an_end(subject: Subject) -> str:
+    """Return whether the tangent is wrong where the slave reaches past an end of the master, and in which columns."""
+    pair = _measure(subject, [flat_state(depth=DEPTHS[0], places=(SLAVE, _SHORT_MASTER))])
+    columns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=0) > SAME * pair.scale)
+    if not columns.size:
+        return ""
+    return (
+        "the tangent is wrong only where the slave reaches past an end of the master, in columns of "
+        f"{_nodes(columns, pair)}: look at the derivative of the limits between which the force is integrated"
+    )
 
 
 def _where_apart(subject: Subject) -> str:
@@ -63,21 +79,25 @@ def _where_apart(subject: Subject) -> str:
     if _is_small(pair.errors, pair.scale):
         return ""
     rows = np.flatnonzero(np.abs(pair.errors[0]).max(axis=1) > SAME * pair.scale)
-    nodes = ", ".join(dict.fromkeys(_unknown(int(row), pair)[5:] for row in rows))
-    return f"the tangent is wrong only where a part of the slave is apart from the master, and open: in rows of {nodes}"
+    words = f"in rows of {_nodes(rows, pair)}"
+    return f"the tangent is wrong only where a part of the slave is apart from the master, and open: {words}"
 
 
 def _measure(subject: Subject, states: Sequence[FlatState]) -> Tangents:
-    tangents, derivatives, n_slave = [], [], 0
+    tangents, derivatives, curvatures, n_slave = [], [], [], 0
     for state in states:
         case, formulation = state.case, subject.for_case(state.case)
         pairing = formulation.pair(case.interface, case.z)
         moves = STEP * np.eye(case.z.size)
         residuals = formulation.residual(case.interface, pairing, np.concatenate([case.z + moves, case.z - moves]))
         derivatives.append((residuals[: case.z.size] - residuals[case.z.size :]).T / (2 * STEP))
+        bends = _BEND * np.eye(case.z.size)
+        around = formulation.residual(case.interface, pairing, np.concatenate([case.z + bends, case.z - bends]))
+        middle = formulation.residual(case.interface, pairing, case.z)
+        curvatures.append((around[: case.z.size] + around[case.z.size :] - 2 * middle).T / _BEND**2)
         tangents.append(dense(formulation.tangent(case.interface, pairing, case.z)))
         n_slave = 2 * state.n_slave_nodes
-    return Tangents(np.stack(tangents), np.stack(derivatives), n_slave)
+    return Tangents(np.stack(tangents), np.stack(derivatives), np.stack(curvatures), n_slave)
 
 
 def _as_a_whole(pair: Tangents) -> str:
@@ -116,9 +136,36 @@ def _one_line(pair: Tangents) -> str:
     return ""
 
 
+def _one_side(pair: Tangents) -> str:
+    """Return the side whose nodes the tangent takes for rigid: all its columns are zero, and all others are right."""
+    number = np.arange(pair.tangents.shape[1])
+    for side, columns in (("slave", number < pair.n_slave), ("master", number >= pair.n_slave)):
+        if not pair.tangents[:, :, columns].any() and _is_small(pair.errors[:, :, ~columns], pair.scale):
+            return f"the columns of all {side} nodes are missing: the tangent takes the {side} for rigid"
+    return ""
+
+
+def _of_differences(pair: Tangents) -> str:
+    """Return the step of the one-sided differences that the tangent is made of, if its errors are those of one."""
+    # Half a step times the second derivative, and what follows it is smaller by the step over the size of a segment.
+    step = 2 * float((pair.errors * pair.curvatures).sum() / (pair.curvatures**2).sum())
+    rest = np.abs(pair.errors - step / 2 * pair.curvatures).max()
+    if rest > _DIFFERENCES * np.abs(pair.errors).max():
+        return ""
+    return f"the tangent is of one-sided differences with a step of about {abs(step):.1g}, on segments of length 1"
+
+
 def _unknown(number: int, pair: Tangents) -> str:
     node, axis = divmod(number, 2)
     return f"{'xy'[axis]} of {'slave' if number < pair.n_slave else 'master'} node {node}"
+
+
+def _nodes(unknowns: IntArray, pair: Tangents) -> str:
+    """Return the nodes of some unknowns in words."""
+    nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
+    sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
+    words = (f"{side} node{'s' * (len(of) > 1)} {', '.join(map(str, of))}" for side, of in sides.items() if len(of))
+    return " and ".join(words)
 
 
 def _one_part(pair: Tangents) -> str:

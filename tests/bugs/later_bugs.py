@@ -84,7 +84,7 @@ class NotZeroed(Springs):
 
 
 LATER = {  # {name on the command line: (factory, words of the diagnosis that say place and kind)}.
-    "wrong-interval": (WrongInterval, r"look at the points of integration"),
+    "wrong-interval": (WrongInterval, r"the points of integration"),
     "master-jacobian": (MasterJacobian, r"the length of the master segment stands where"),
     "normal-fixed": (NormalNotVaried, r"the part of δn, .* of the slave, is missing"),
     "open-stiff": (OpenPointsInTangent, r"only where a part of the slave is apart"),

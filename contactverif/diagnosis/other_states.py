@@ -1,0 +1,97 @@
+"""Tell what a formulation does wrong on states that differ from the flat one in one thing.
+
+The slave is tilted, a segment of it is open, all is turned by a quarter, or places change by little. Forces that are
+right on the flat state, and wrong on one of these, show what they depend on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray
+from contactverif.contract.subject import Subject
+from contactverif.diagnosis.flat_state import DEPTH, SLAVE, flat_state, pushes_of
+from contactverif.diagnosis.piece_patterns import same
+
+_TILT = 0.25  # The slope of a slave whose forces must balance, too.
+# A change of places near 1 that single precision, with digits of 2^-24, does not see, and one that it sees.
+_UNSEEN, _SEEN = 2.0**-26, 2.0**-12
+# The penetrations of the slave's nodes in which the first segment, or the last one, is open, over DEPTH.
+_OPEN_FIRST = np.array([-1.0, 0.0, 1.0, 1.0])
+_OPEN_LAST = np.array([1.0, 1.0, 0.0, -1.0])
+
+
+def diagnose_turned(subject: Subject) -> str:
+    """Return by how many quarters the flat state must be turned until its forces do not turn with it."""
+    state = flat_state()
+    interface, positions = state.case.interface, state.case.positions
+    formulation = subject.for_interface(interface, state.case.penalty)
+    expected = None
+    for degrees, x, y in ((0, 1, 0), (90, 0, 1), (180, -1, 0), (270, 0, -1)):
+        turn = np.array([[x, y], [-y, x]], dtype=np.float64)  # So it takes rows to rows, without any rounding.
+        turned, z = interface.at(interface.nodes @ turn), (positions @ turn).reshape(-1)
+        formulation = subject.for_interface(turned, state.case.penalty)
+        forces = formulation.residual(turned, formulation.pair(turned, z), z).reshape(-1, 2) @ turn.T
+        expected = forces if expected is None else expected
+        if not same(forces, expected):
+            words = "are reversed" if same(forces, -expected) else "do not turn with it"
+            return f"on a mesh that is turned by {degrees}° the forces {words}: look at the normal, and at angles"
+    return ""
+
+
+def diagnose_digits(subject: Subject) -> str:
+    """Return whether the forces do not see a change of places that has its digit in double precision alone."""
+    state = flat_state()
+    formulation, interface = subject.for_case(state.case), state.case.interface
+
+    def forces(change: float) -> FloatArray:
+        z = state.case.z.copy()
+        z[2 * np.arange(1, len(SLAVE) - 1)] += change
+        return formulation.residual(interface, formulation.pair(interface, z), z)
+
+    before = forces(0.0)
+    if np.array_equal(forces(_UNSEEN), before) and not np.array_equal(forces(_SEEN), before):
+        return (
+            f"a change of places near 1 by {_UNSEEN:.1e} changes no force: numbers have the digits of single precision"
+        )
+    return ""
+
+
+def diagnose_open_segment(subject: Subject) -> str:
+    """Return which nodes nothing pushes, of segments that are closed, where another segment is open."""
+    for depths, open_segment in ((_OPEN_FIRST, 0), (_OPEN_LAST, len(SLAVE) - 2)):
+        pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
+        if lost := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
+            nodes = f"slave node{'s' * (len(lost) > 1)} {', '.join(map(str, lost))}"
+            return f"where slave segment {open_segment} is open, nothing pushes {nodes}, which penetrate"
+    return ""
+
+
+def diagnose_balance(subject: Subject) -> str:
+    """Return how the forces on a tilted slave do not balance: by their directions, or by their moments."""
+    state = flat_state(slope=_TILT, depth=1.0)
+    n, normals = state.n_slave_nodes, {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
+    pushes = pushes_of(subject, state)
+    on_slave, on_master = pushes[:n].sum(axis=0), pushes[n:].sum(axis=0)
+    if not same(on_slave, on_master):
+        along = [_name_direction(force, normals) for force in (on_slave, on_master)]
+        words = f"along {along[0]} normal on the slave, along {along[1]} normal on the master"
+        return f"the forces on the sides of a tilted slave do not balance: they are {words}"
+    x, y = state.case.positions.T
+    moments = x * pushes[:, 1] - y * pushes[:, 0]
+    if not subject.traits.promises.conserves_moment or same(moments[:n].sum(), moments[n:].sum()):
+        return ""
+    direction = _name_direction(on_slave, normals)
+    return (
+        "the forces on the sides of a tilted slave balance, and their moments do not: the points that push each other "
+        f"do not face each other along the force, which is along {direction} normal: look at the projection"
+    )
+
+
+def _name_direction(force: FloatArray, normals: Mapping[str, FloatArray]) -> str:
+    """Return the name of the normal along which a force is."""
+    size = np.linalg.norm(force)
+    names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
+    return next(names, "another")
