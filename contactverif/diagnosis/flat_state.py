@@ -36,6 +36,8 @@ class FlatState:
         The state. Its normal, out of the master, is y.
     pieces : FloatArray, shape (n_pieces, n_nodes)
         The size of the force by which the pressure on a piece pushes each node.
+    starts, lengths : FloatArray, shape (n_pieces,)
+        The place along the interface where a piece begins, and its length.
     slave_segment, master_segment : IntArray, shape (n_pieces,)
         The segments that face each other there.
     n_slave_nodes : int
@@ -44,6 +46,8 @@ class FlatState:
 
     case: Case
     pieces: FloatArray
+    starts: FloatArray
+    lengths: FloatArray
     slave_segment: IntArray
     master_segment: IntArray
     n_slave_nodes: int
@@ -107,7 +111,7 @@ def flat_state(
             ):
                 share = (x - along[nodes[0]]) / (along[nodes[1]] - along[nodes[0]])
                 pieces[piece, nodes] += force * np.array([1 - share, share])
-    return FlatState(case, pieces, slave_segment, master_segment, n_slave)
+    return FlatState(case, pieces, ends[:-1], np.diff(ends), slave_segment, master_segment, n_slave)
 
 
 def pushes_of(subject: Subject, state: FlatState) -> FloatArray:

@@ -12,6 +12,7 @@ from contactverif.diagnosis.flat_state import COARSE, DEPTH, FINE, PENALTY, Flat
 from contactverif.diagnosis.other_states import (
     diagnose_balance,
     diagnose_digits,
+    diagnose_law,
     diagnose_open_segment,
     diagnose_turned,
 )
@@ -37,6 +38,7 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     forces = pushes_of(subject, uniform)
     return (
         diagnose_digits(subject)
+        or diagnose_law(subject)
         or _uniform_pattern(uniform, forces, in_full=in_full)
         or _along_the_surface(forces)
         or _linear_pattern(linear, pushes_of(subject, linear)[:, 1])

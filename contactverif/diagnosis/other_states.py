@@ -13,11 +13,13 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.flat_state import DEPTH, SLAVE, flat_state, pushes_of
-from contactverif.diagnosis.piece_patterns import same
+from contactverif.diagnosis.piece_patterns import SAME, same
 
 _TILT = 0.25  # The slope of a slave whose forces must balance, too.
 # A change of places near 1 that single precision, with digits of 2^-24, does not see, and one that it sees.
 _UNSEEN, _SEEN = 2.0**-26, 2.0**-12
+# The penetrations of a law are 2 to the power of minus these, small against all segments.
+_POWERS = range(16, 4, -1)
 # The penetrations of the slave's nodes in which the first segment, or the last one, is open, over DEPTH.
 _OPEN_FIRST = np.array([-1.0, 0.0, 1.0, 1.0])
 _OPEN_LAST = np.array([1.0, 1.0, 0.0, -1.0])
@@ -95,3 +97,23 @@ def _name_direction(force: FloatArray, normals: Mapping[str, FloatArray]) -> str
     size = np.linalg.norm(force)
     names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
     return next(names, "another")
+
+
+def diagnose_law(subject: Subject) -> str:
+    """Return how the force depends on a uniform penetration, where it is not proportional to it."""
+    depths = np.array([2.0**-power for power in _POWERS])
+    states = [flat_state(depth=depth) for depth in depths]
+    shares = np.array([pushes_of(subject, state)[:, 1].sum() / state.exact.sum() for state in states])
+    if same(shares, np.full(len(shares), shares[0])):
+        return ""
+    powers = np.diff(np.log2(np.abs(shares)))
+    if np.isfinite(powers).all() and same(powers, np.full(len(powers), powers[0])):
+        return (
+            f"the force grows like the penetration to the power {1 + powers[0]:.3g}, and should be proportional to it"
+        )
+    changed = int(np.argmax(np.abs(shares - shares[0]) > SAME * abs(shares[0])))
+    before, after, factor = depths[changed - 1], depths[changed], shares[changed] / shares[0]
+    return (
+        f"the force is proportional to the penetration up to {before:.2g}, and from {after:.2g} on it has {factor:.3g} "
+        "times this size, on segments of length 1: look for a limit of depths"
+    )

@@ -19,6 +19,7 @@ def of_pieces(state: FlatState, pushes: FloatArray) -> str:
         _single_piece(state, pushes)
         or _piece_factors(state, pushes)
         or _halves(state, pushes)
+        or _nearest_nodes(state, pushes)
         or _whole_segments(state, pushes)
         or _shifted_points(state, pushes)
     )
@@ -70,6 +71,25 @@ def _halves(state: FlatState, pushes: FloatArray) -> str:
     return "both nodes of a master segment take half of its force, wherever it acts: the shape functions are ½"
 
 
+def _nearest_nodes(state: FlatState, pushes: FloatArray) -> str:
+    """Return whether the whole force of a point of integration is that of the nearer node of a side."""
+    interface, along, n = state.case.interface, state.along, state.n_slave_nodes
+    sides = {
+        "slave": (interface.slave.segments[state.slave_segment], slice(None, n)),
+        "master": (interface.master.segments[state.master_segment], slice(n, None)),
+    }
+    for side, (segments, nodes) in sides.items():
+        for n_points in range(1, _MOST_POINTS + 1):
+            forces = np.zeros(len(pushes))
+            for start, length, of_piece in zip(state.starts, state.lengths, segments, strict=True):
+                places, weights = np.polynomial.legendre.leggauss(n_points)
+                distances = np.abs(along[of_piece] - (start + (places[:, None] + 1) / 2 * length))
+                np.add.at(forces, of_piece[distances.argmin(axis=1)], PENALTY * DEPTH * length * weights / 2)
+            if same(pushes[nodes], forces[nodes]):
+                return f"the whole force of a point of integration goes to the nearer node of the {side} segment"
+    return ""
+
+
 def _whole_segments(state: FlatState, pushes: FloatArray) -> str:
     """Return whether the forces are those of points of whole slave segments, which nodes of the master do not cut."""
     for n_points in range(1, _MOST_POINTS + 1):
@@ -85,7 +105,7 @@ def _shifted_points(state: FlatState, pushes: FloatArray) -> str:
     """Return by which share of its length the force of each piece acts beside the middle, if it is the same for all."""
     shifts = np.zeros(len(pushes))  # The change of the forces if the share is 1.
     interface, along = state.case.interface, state.along
-    lengths = state.pieces[:, : state.n_slave_nodes].sum(axis=1) / (PENALTY * DEPTH)
+    lengths = state.lengths
     sides = (interface.slave.segments[state.slave_segment], interface.master.segments[state.master_segment])
     for segments in sides:
         change = PENALTY * DEPTH * lengths**2 / (along[segments[:, 1]] - along[segments[:, 0]])

@@ -110,6 +110,9 @@ def _as_a_whole(pair: Tangents) -> str:
     factor = float((tangents * derivatives).sum() / (derivatives**2).sum())
     if _is_small(tangents - factor * derivatives, pair.scale):
         return f"the tangent has {'the opposite sign' if abs(factor + 1) < SAME else f'a factor {factor:.4g}'}"
+    order = np.arange(tangents.shape[1]).reshape(-1, 2).T.reshape(-1)  # All x, then all y.
+    if any(_is_small(tangents - derivatives[:, each][:, :, each], pair.scale) for each in (order, np.argsort(order))):
+        return "the tangent numbers the unknowns in another order than the forces: all x before all y"
     if _is_small(tangents - (derivatives + derivatives.transpose(0, 2, 1)) / 2, pair.scale):
         return "the tangent is the symmetric part of the derivative"
     for word, half in (("upper", np.triu(derivatives)), ("lower", np.tril(derivatives))):
@@ -185,7 +188,11 @@ def _one_part(pair: Tangents) -> str:
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
         return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"
-    return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"
+    change = _change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)
+    n = pair.n_slave // 2
+    if name == "nn" and all(_is_small(each.sum(axis=2), pair.scale) for each in (errors[:, :, :n], errors[:, :, n:])):
+        change = "stands at other nodes, as if it were lumped: it is right for a motion of a whole side alone"
+    return f"{part}, {change}"
 
 
 def _blocks(pair: Tangents) -> dict[str, tuple[IntArray, ...]]:

@@ -15,25 +15,27 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from later_bugs import LATER
+from fresh_bugs import FRESH
 from springs_with_bugs import BUGS, Springs
-from unseen_bugs import UNSEEN
 
 FOLDER = Path(__file__).parents[2] / "reports" / "trust"
 HEADS = ("formulation", "named", "first row", "first wrong row", "in all", "lines", "status", "diagnosis")
 WRONG = re.compile(r"^\S+ \S+: (fail|crashed|BROKEN|breaks)")
 RIGHT = "right"
-EVERY = BUGS | UNSEEN | LATER
-_PAGE = """# Twenty-eight mistakes, as the screen tells them
+EVERY = BUGS | FRESH
+_PAGE = """# Twenty mistakes, as the screen tells them
 
 Each formulation below was written with NumPy as a user would write it, has one mistake, and was judged by
 `contactverif verify NAME --seed 1` with all else as it is by default. Twelve mistakes were known to the authors of the
-rules of [diagnosis](../../docs/concepts/diagnosis.md). Two times eight were written by somebody who had not seen the
-rules. When they were asked for the first time, all sixteen were caught, but place and kind were named of one of the
-first eight and of one of the second, and one was called by a wrong name. Rules for the others were added then, so the
-counts below are no measure of what is said of a mistake that nobody has thought of. `tests/bugs/bugs_campaign.py` wrote
-this page. Seconds are those of a machine with two cores on which a loop of ten million turns in Python takes
-{loop:.2g} s.
+rules of [diagnosis](../../docs/concepts/diagnosis.md). Eight were written by somebody who had not seen the rules.
+
+Five times eight such mistakes were asked so far, and 38 were caught. A decision about contact by the mean gap of two
+segments is shown as `nodal-push` failing without a promise. Averages of the gap that are interpolated like nodal gaps
+break no promise: that formulation passes the patch test, and converges like others. When they were asked for the first time,
+place and kind were named of 1, 1, 2, 3 and 1 of the eight, and three were called by a wrong name. Rules for the others
+were added each time, so what is said below is no measure of what is said of a mistake that nobody has thought of.
+`tests/bugs/bugs_campaign.py` wrote this page. Seconds are those of a machine with two cores on which a loop of ten
+million turns in Python takes {loop:.2g} s.
 
 {summary}
 
@@ -115,7 +117,7 @@ def _loop() -> float:
 def _page(answers: list[Answer]) -> str:
     """Return the page: how many mistakes are named, the table, and each screen."""
     counts = []
-    for text, names in (("the twelve", BUGS), ("the first eight", UNSEEN), ("the second eight", LATER)):
+    for text, names in (("the twelve", BUGS), ("the eight", FRESH)):
         named = sum(answer.named for answer in answers if answer.name in names)
         silent = sum(not answer.diagnosis for answer in answers if answer.name in names)
         counts.append(f"Of {text}, {named} are named, place and kind; {silent} have no diagnosis.")
