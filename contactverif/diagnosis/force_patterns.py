@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -34,19 +35,30 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     rules, patch = subject.traits.rules, subject.traits.promises.patch
     if rules.enforcement != "penalty" or rules.penalty == "nodal" or patch.flat is False:
         return ""  # Other forces than the consistent ones are right there.
-    uniform, linear = flat_state(), flat_state(slope=1.0)
-    forces = pushes_of(subject, uniform)
-    return (
-        diagnose_digits(subject)
-        or diagnose_law(subject)
-        or _uniform_pattern(uniform, forces, in_full=in_full)
-        or _along_the_surface(forces)
-        or _linear_pattern(linear, pushes_of(subject, linear)[:, 1])
-        or _on_other_meshes(subject, in_full=in_full)
-        or diagnose_turned(subject)
-        or diagnose_open_segment(subject)
-        or (diagnose_balance(subject) if subject.traits.promises.conserves_force else "")
+    patterns = (
+        diagnose_digits,
+        diagnose_law,
+        partial(_diagnose_uniform, in_full=in_full),
+        _diagnose_linear,
+        partial(_on_other_meshes, in_full=in_full),
+        diagnose_turned,
+        diagnose_open_segment,
+        diagnose_balance,
     )
+    return next(filter(None, (pattern(subject) for pattern in patterns)), "")
+
+
+def _diagnose_uniform(subject: Subject, *, in_full: bool) -> str:
+    """Return the pattern of the forces of a uniform penetration, on the mesh on which no two segments are alike."""
+    state = flat_state()
+    forces = pushes_of(subject, state)
+    return _uniform_pattern(state, forces, in_full=in_full) or _along_the_surface(forces)
+
+
+def _diagnose_linear(subject: Subject) -> str:
+    """Return the pattern of the forces of a penetration that grows along the slave."""
+    state = flat_state(slope=1.0)
+    return _linear_pattern(state, pushes_of(subject, state)[:, 1])
 
 
 def _on_other_meshes(subject: Subject, *, in_full: bool) -> str:

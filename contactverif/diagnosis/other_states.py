@@ -17,7 +17,7 @@ from contactverif.diagnosis.piece_patterns import SAME, same
 
 _TILT = 0.25  # The slope of a slave whose forces must balance, too.
 # A change of places near 1 that single precision, with digits of 2^-24, does not see, and one that it sees.
-_UNSEEN, _SEEN = 2.0**-26, 2.0**-12
+_TOO_SMALL, _LARGE = 2.0**-26, 2.0**-12
 # The penetrations of a law are 2 to the power of minus these, small against all segments.
 _POWERS = range(16, 4, -1)
 # The penetrations of the slave's nodes in which the first segment, or the last one, is open, over DEPTH.
@@ -54,10 +54,8 @@ def diagnose_digits(subject: Subject) -> str:
         return formulation.residual(interface, formulation.pair(interface, z), z)
 
     before = forces(0.0)
-    if np.array_equal(forces(_UNSEEN), before) and not np.array_equal(forces(_SEEN), before):
-        return (
-            f"a change of places near 1 by {_UNSEEN:.1e} changes no force: numbers have the digits of single precision"
-        )
+    if np.array_equal(forces(_TOO_SMALL), before) and not np.array_equal(forces(_LARGE), before):
+        return f"places near 1 that change by {_TOO_SMALL:.1e} change no force: numbers have single precision"
     return ""
 
 
@@ -65,14 +63,16 @@ def diagnose_open_segment(subject: Subject) -> str:
     """Return which nodes nothing pushes, of segments that are closed, where another segment is open."""
     for depths, open_segment in ((_OPEN_FIRST, 0), (_OPEN_LAST, len(SLAVE) - 2)):
         pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
-        if lost := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
-            nodes = f"slave node{'s' * (len(lost) > 1)} {', '.join(map(str, lost))}"
+        if free := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
+            nodes = f"slave node{'s' * (len(free) > 1)} {', '.join(map(str, free))}"
             return f"where slave segment {open_segment} is open, nothing pushes {nodes}, which penetrate"
     return ""
 
 
 def diagnose_balance(subject: Subject) -> str:
     """Return how the forces on a tilted slave do not balance: by their directions, or by their moments."""
+    if not subject.traits.promises.conserves_force:
+        return ""
     state = flat_state(slope=_TILT, depth=1.0)
     n, normals = state.n_slave_nodes, {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
     pushes = pushes_of(subject, state)

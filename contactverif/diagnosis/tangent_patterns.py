@@ -58,7 +58,8 @@ def diagnose_tangent(subject: Subject) -> str:
         return ""
     if _is_small(pair.errors, pair.scale):
         return _past_an_end(subject) or _where_apart(subject)
-    return _as_a_whole(pair) or _one_line(pair) or _one_side(pair) or _of_differences(pair) or _one_part(pair)
+    patterns = (_as_a_whole, _one_line, _one_side, _of_differences, _one_part)
+    return next(filter(None, (pattern(pair) for pattern in patterns)), "")
 
 
 def _past_an_end(subject: Subject) -> str:
@@ -167,7 +168,7 @@ def _nodes(unknowns: IntArray, pair: Tangents) -> str:
     """Return the nodes of some unknowns in words."""
     nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
     sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
-    words = (f"{side} node{'s' * (len(of) > 1)} {', '.join(map(str, of))}" for side, of in sides.items() if len(of))
+    words = (f"{side} node{'s' * (len(own) > 1)} {', '.join(map(str, own))}" for side, own in sides.items() if len(own))
     return " and ".join(words)
 
 
@@ -188,11 +189,15 @@ def _one_part(pair: Tangents) -> str:
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
         return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"
-    change = _change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)
+    if name == "nn" and _is_lumped(errors, pair):
+        return f"{part}, stands at other nodes, as if it were lumped: it is right for a motion of a whole side alone"
+    return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"
+
+
+def _is_lumped(errors: FloatArray, pair: Tangents) -> bool:
+    """Return whether the errors of a block add up to nothing where all nodes of a side move alike."""
     n = pair.n_slave // 2
-    if name == "nn" and all(_is_small(each.sum(axis=2), pair.scale) for each in (errors[:, :, :n], errors[:, :, n:])):
-        change = "stands at other nodes, as if it were lumped: it is right for a motion of a whole side alone"
-    return f"{part}, {change}"
+    return all(_is_small(part.sum(axis=2), pair.scale) for part in (errors[:, :, :n], errors[:, :, n:]))
 
 
 def _blocks(pair: Tangents) -> dict[str, tuple[IntArray, ...]]:

@@ -133,12 +133,12 @@ class TangentOfFirstState(Springs):
 
     def __init__(self, *, penalty: float) -> None:
         super().__init__(penalty=penalty)
-        self.kept = {}
+        self.first_tangents = {}
 
     def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-        if z.size not in self.kept:
-            self.kept[z.size] = super().tangent(interface, pairing, z)
-        return self.kept[z.size].copy()
+        if z.size not in self.first_tangents:
+            self.first_tangents[z.size] = super().tangent(interface, pairing, z)
+        return self.first_tangents[z.size].copy()
 
 
 class SearchDoneOnce(Parts):
@@ -146,13 +146,13 @@ class SearchDoneOnce(Parts):
 
     def __init__(self, *, penalty: float) -> None:
         super().__init__(penalty=penalty)
-        self.found = {}
+        self.first_pairs = {}
 
     def pairs(self, interface: Any, x: Any) -> Any:
         key = len(x), len(interface.slave.segments), len(interface.master.segments)
-        if key not in self.found:
-            self.found[key] = super().pairs(interface, x)
-        return self.found[key]
+        if key not in self.first_pairs:
+            self.first_pairs[key] = super().pairs(interface, x)
+        return self.first_pairs[key]
 
     def part(self, s_c: Any, s_d: Any) -> Any:
         start, end = super().part(s_c, s_d)
@@ -170,7 +170,7 @@ class TangentMasterRigid(Springs):
 
 
 FURTHER: dict[str, tuple[Any, str]] = {
-    "single-precision": (SinglePrecision, r"digits of single precision"),
+    "single-precision": (SinglePrecision, r"numbers have single precision"),
     "quadrature-at-starts": (QuadratureAtStarts, r"0.125 of its length nearer to the part's start"),
     "coarse-differences": (CoarseDifferences, r"one-sided differences with a step of about 0.00"),
     "break-at-first-open": (BreakAtFirstOpen, r"where slave segment 0 is open, nothing pushes slave nodes 2, 3"),
