@@ -15,7 +15,7 @@ import signal
 import sys
 import time
 import traceback
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -193,19 +193,20 @@ BYTES: dict[str, Callable[[bytes, random.Random], bytes]] = {
 
 
 class Table:
-    """The counts: for each kind of damage how often a command ended how."""
+    """The counts: for each kind of damage how often a command ended how, in one of some words."""
 
-    def __init__(self) -> None:
-        self.counts: dict[str, Counter[str]] = {}
+    def __init__(self, head: str = "damage", endings: Sequence[str] = ENDINGS) -> None:
+        self.head, self.endings = head, endings
+        self.counts: dict[str, Counter[str]] = defaultdict(Counter)
 
     def add(self, kind: str, word: str) -> None:
         """Count an ending."""
-        self.counts.setdefault(kind, Counter())[word] += 1
+        self.counts[kind][word] += 1
 
     def text(self) -> str:
         """Return the table in Markdown."""
-        lines = [f"| damage | {' | '.join(ENDINGS)} |", "|---|" + "---:|" * len(ENDINGS)]
+        lines = [f"| {self.head} | {' | '.join(self.endings)} |", "|---|" + "---:|" * len(self.endings)]
         total: Counter[str] = sum(self.counts.values(), Counter())
         for kind, counts in {**self.counts, "all": total}.items():
-            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in ENDINGS)} |")
+            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in self.endings)} |")
         return "\n".join(lines)
