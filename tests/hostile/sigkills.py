@@ -16,14 +16,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import xarray as xr
 from catalogue import install
+from containment import scratch
 from reaper import adopt_orphans, descendants, kill_descendants
 
 from contactverif_reports.netcdf.differences import same_data
@@ -120,16 +121,6 @@ COMMANDS = {
     ),
     "campaign": Command(_SHARDED, _SHARDED, ("merge", "shards", "--out", "report.nc"), share=0.2),
 }  # fmt: skip
-
-
-@contextmanager
-def scratch() -> Iterator[Path]:
-    """Yield a folder that is deleted afterwards."""
-    folder = Path(tempfile.mkdtemp(prefix="kills-"))
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def start(folder: Path, words: Sequence[str], notes: str) -> subprocess.Popen[bytes]:
