@@ -27,21 +27,11 @@ FILES = {"glob", "io", "os", "pathlib", "pickle", "shutil", "socket", "sqlite3",
 
 @dataclass(frozen=True)
 class Room:
-    """The imports that the files of a folder may have, besides each other and the standard library.
-
-    Attributes
-    ----------
-    rooms : tuple[str, ...]
-        Other folders of the house.
-    others : tuple[str, ...]
-        Third-party packages, with all that is below them.
-    never : frozenset[str]
-        Modules of the standard library and builtins that are not used here.
-    """
+    """The imports that the files of a folder may have, besides each other and the standard library."""
 
     rooms: tuple[str, ...] = ()
-    others: tuple[str, ...] = ()
-    never: frozenset[str] = frozenset()
+    others: tuple[str, ...] = ()  # Third-party packages, with all that is below them
+    never: frozenset[str] = frozenset()  # Modules of the standard library and builtins
 
 
 QUIET = frozenset(FILES | {"print", "open", "input"})

@@ -29,25 +29,13 @@ GOOD = frozenset(ENDINGS[:3])
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a command.
+    """The end of a command."""
 
-    Attributes
-    ----------
-    status : int
-        Its exit status, negative for a signal.
-    output, errors : str
-        What it wrote.
-    seconds : float
-        The time that it took.
-    megabytes : int
-        The most memory that it had.
-    """
-
-    status: int
+    status: int  # Negative for a signal
     output: str
     errors: str
     seconds: float
-    megabytes: int
+    megabytes: int  # The most memory that it had
 
     def word(self, undamaged: Ending) -> str:
         """Return one of `ENDINGS`, beside what the command made of the undamaged file."""
@@ -70,17 +58,7 @@ class Ending:
 
 
 def run_command(arguments: Sequence[str], seconds: float = SECONDS, main: Callable[[], object] | None = None) -> Ending:
-    """Run a command line in a fork of this process, which has imported everything.
-
-    Parameters
-    ----------
-    arguments : Sequence[str]
-        What stands behind `contactverif`.
-    seconds : float
-        The time until it counts as a hang.
-    main : Callable[[], object] | None
-        A function to be run instead of the command.
-    """
+    """Run a command line, or a function, in a fork of this process, which has imported everything."""
     receive, send = os.pipe()
     start = time.monotonic()
     sys.stdout.flush()
