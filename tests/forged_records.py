@@ -1,4 +1,4 @@
-"""Forged journals: records that are changed by somebody who knows the format, but not the key."""
+"""Forged journals of one run: records that are changed by somebody who knows the format, but not the key."""
 
 import secrets
 import struct
@@ -10,9 +10,18 @@ from typing import Any
 import msgspec
 
 from contactverif.contract.property import Verdict
+from contactverif.contract.result import Run
 from contactverif.run.journal import JournalKey, read_messages, record_files
 from contactverif.run.outcome_records import BlockRecord, FormRecord, OutcomeRecord
+from contactverif.run.provenance import machine
+from contactverif.run.registry import load_formulation, load_properties
+from contactverif.run.run import run
+from contactverif.run.run_journal import Journal
+from contactverif.run.run_plan import Plan
 
+IDS = ("balance.force", "patch.flat.transmission")
+EXAMPLES, SEED = 12, 3
+BOX: dict[str, object] = {"isolation": {"isolation": "box"}}  # No plugin can read the key of such a run.
 Record = FormRecord | OutcomeRecord | BlockRecord
 _DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Record)
 _TAG = 16
@@ -30,8 +39,17 @@ def frame(record: Record) -> bytes:
     return struct.pack("<II", len(body), zlib.crc32(body)) + body
 
 
-def forge(journal: Path, change: Callable[[Record], Record], *, file: Path | None = None) -> None:
-    """Write all records of a journal anew, changed, into the same files or into one more; forms are where they were."""
+def plan_of(seed: int = SEED, options: dict[str, object] = BOX) -> Plan:
+    return Plan(formulations=("nts",), properties=IDS, examples=EXAMPLES, seed=seed, machine=machine(), options=options)
+
+
+def judge(journal: Journal, seed: int = SEED) -> Run:
+    """Judge what the journal does not have."""
+    return run([load_formulation("nts")], load_properties(IDS), examples=EXAMPLES, seed=seed, journal=journal)
+
+
+def forge(journal: Path, change: Callable[[Record], Record]) -> None:
+    """Write all records of a journal anew, changed, into the same files; forms are where they were."""
     for path in record_files(journal):
         records = list(read(path))
         data, places = b"", dict[int, int]()
@@ -41,7 +59,7 @@ def forge(journal: Path, change: Callable[[Record], Record], *, file: Path | Non
                 changed = msgspec.structs.replace(changed, form=places.get(changed.form, changed.form))
             places[place] = len(data)
             data += frame(changed)
-        (file or path).write_bytes(data)
+        path.write_bytes(data)
 
 
 def say_pass(record: Record) -> Record:

@@ -12,6 +12,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,21 +27,11 @@ FILES = {"glob", "io", "os", "pathlib", "pickle", "shutil", "socket", "sqlite3",
 
 @dataclass(frozen=True)
 class Room:
-    """The imports that the files of a folder may have, besides each other and the standard library.
-
-    Attributes
-    ----------
-    rooms : tuple[str, ...]
-        Other folders of the house.
-    others : tuple[str, ...]
-        Third-party packages, with all that is below them.
-    never : frozenset[str]
-        Modules of the standard library and builtins that are not used here.
-    """
+    """The imports that the files of a folder may have, besides each other and the standard library."""
 
     rooms: tuple[str, ...] = ()
-    others: tuple[str, ...] = ()
-    never: frozenset[str] = frozenset()
+    others: tuple[str, ...] = ()  # Third-party packages, with all that is below them
+    never: frozenset[str] = frozenset()  # Modules of the standard library and builtins
 
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
@@ -159,14 +150,20 @@ def imports_of(tree: ast.AST, module: str, *, is_package: bool) -> Iterator[tupl
                 yield node.lineno, f"builtins.{name}"
 
 
-def breaches(source: str, module: str, *, is_package: bool = False, place: str = "fake.py") -> list[str]:
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Return {module: its syntax tree}."""
+    return {module: ast.parse(path.read_text(encoding="utf-8")) for module, path in SOURCES.items()}
+
+
+def breaches(tree: ast.Module, module: str, *, is_package: bool = False, place: str = "fake.py") -> list[str]:
     """Return the forbidden imports of a file, a line each."""
     room = room_of(module, is_package=is_package)
     if room not in ROOMS:
         return [f"{place}:1: {module} is in no room; give it one in ROOMS"]
     rule = ROOMS[room]
     messages = []
-    for line, name in imports_of(ast.parse(source), module, is_package=is_package):
+    for line, name in imports_of(tree, module, is_package=is_package):
         top = name.partition(".")[0]
         if top in OUR_NAMES:
             other = room_of(name)
@@ -181,11 +178,11 @@ def breaches(source: str, module: str, *, is_package: bool = False, place: str =
     return messages
 
 
-@pytest.mark.parametrize("module", SOURCES)
-def test_imports_run_one_way(module: str) -> None:
-    path = SOURCES[module]
-    place = str(path.relative_to(ROOT))
-    messages = breaches(path.read_text(), module, is_package=path.stem == "__init__", place=place)
+def test_imports_run_one_way() -> None:
+    messages = []
+    for module, path in SOURCES.items():
+        place = str(path.relative_to(ROOT))
+        messages += breaches(trees()[module], module, is_package=path.stem == "__init__", place=place)
     assert not messages, "\n" + "\n".join(messages)
 
 
@@ -238,7 +235,7 @@ WRONG_IMPORTS = {
 )
 def test_the_reader_of_imports_sees_a_wrong_one(module: str, source: str, message: str) -> None:
     line = 1 + source[: max(source.rfind(word) for word in ("import", "print", "open"))].count("\n")
-    assert breaches(source, module) == [f"fake.py:{line}: {message}"]
+    assert breaches(ast.parse(source), module) == [f"fake.py:{line}: {message}"]
 
 
 @pytest.mark.parametrize(
@@ -257,7 +254,7 @@ def test_the_reader_of_imports_sees_a_wrong_one(module: str, source: str, messag
     ],
 )
 def test_the_reader_of_imports_lets_a_right_one_pass(module: str, source: str) -> None:
-    assert not breaches(source, module)
+    assert not breaches(ast.parse(source), module)
 
 
 def test_no_two_rooms_import_each_other() -> None:
@@ -301,8 +298,8 @@ def functions() -> Iterator[tuple[str, Function]]:
 
 def arguments() -> Iterator[tuple[str, int]]:
     """Return (place, number of arguments) of every function and method of the house."""
-    for path in SOURCES.values():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for module, path in SOURCES.items():
+        for node in ast.walk(trees()[module]):
             if isinstance(node, ast.FunctionDef):
                 everything = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                 names = [argument.arg for argument in everything if argument.arg not in ("self", "cls")]
@@ -337,30 +334,22 @@ def test_files_measure_what_a_reader_takes_in() -> None:
     assert len(long) <= MOST_LONG_FILES, long
 
 
-@pytest.mark.parametrize("module", SOURCES)
-def test_the_first_lines_of_a_file_say_why_it_exists(module: str) -> None:
-    text = SOURCES[module].read_text()
-    assert (ast.get_docstring(ast.parse(text)) or "").strip(), "a file starts with a docstring"
-    assert text.startswith(('"""', 'r"""')), "the docstring comes first"
+def test_the_first_lines_of_a_file_say_why_it_exists() -> None:
+    assert not [module for module, tree in trees().items() if not (ast.get_docstring(tree) or "").strip()]
+    assert not [module for module, path in SOURCES.items() if not path.read_text().startswith(('"""', 'r"""'))]
 
 
-def entry_points() -> list[tuple[str, str]]:
-    """(name, "module:attribute") of all that pyproject.toml promises."""
-    groups = {"scripts": PROJECT["project"]["scripts"], **PROJECT["project"]["entry-points"]}
-    return [(f"{group} {name}", target) for group, points in groups.items() for name, target in points.items()]
+def test_every_entry_point_loads() -> None:
+    for points in (PROJECT["project"]["scripts"], *PROJECT["project"]["entry-points"].values()):
+        for target in points.values():
+            module, _, attribute = target.partition(":")
+            loaded = importlib.import_module(module)
+            assert not attribute or getattr(loaded, attribute) is not None, target
 
 
-@pytest.mark.parametrize("target", [pytest.param(target, id=name) for name, target in entry_points()])
-def test_every_entry_point_loads(target: str) -> None:
-    module, _, attribute = target.partition(":")
-    loaded = importlib.import_module(module)
-    assert not attribute or getattr(loaded, attribute) is not None
-
-
-@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
-def test_every_package_is_typed(package: Path) -> None:
-    assert (package / "py.typed").is_file()
-    assert (package / "__init__.py").is_file()
+def test_every_package_is_typed() -> None:
+    assert not [package for package in PACKAGES if not (package / "py.typed").is_file()]
+    assert not [package for package in PACKAGES if not (package / "__init__.py").is_file()]
 
 
 OUR_DOTS = {".ci", ".github", ".gitignore", ".pre-commit-config.yaml"}

@@ -1,6 +1,6 @@
 """Plain English in names, docstrings and comments: what a reader of this project should not have to decode.
 
-One test for each folder and rule, so that `pytest tests/test_language.py -k contract` checks one folder.
+One test for each folder, so that `pytest tests/test_language.py -k contract` checks one folder.
 The rules, with examples, are in CONTRIBUTING.md. Rule for the next editor: a rule here must be decidable by a short
 list of words. What needs judgement belongs to the reviewer.
 """
@@ -9,7 +9,8 @@ import ast
 import io
 import re
 import tokenize
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -72,6 +73,12 @@ def sources() -> Iterator[Path]:
     """Return every Python file that a person reads: packages, tests, examples and scripts of the docs."""
     for folder in [*PACKAGES, *(ROOT / name for name in ("tests", "examples", "docs"))]:
         yield from sorted(folder.rglob("*.py"))
+
+
+@lru_cache(maxsize=1)
+def parse(text: str) -> ast.Module:
+    """Parse a file once for all rules, which read it one after the other."""
+    return ast.parse(text)
 
 
 FILES: dict[str, list[Path]] = {}
@@ -175,7 +182,7 @@ def is_participle(word: str) -> bool:
 
 
 def wrong_names(text: str, module: str) -> list[Finding]:
-    tree = ast.parse(text)
+    tree = parse(text)
     excepted = {
         line
         for node in ast.walk(tree)
@@ -232,7 +239,7 @@ def entries(text: str) -> Iterator[tuple[str, str, str]]:
 
 def wrong_docstrings(text: str, module: str) -> list[Finding]:
     wrong = []
-    for node, line, docstring in docstrings(ast.parse(text)):
+    for node, line, docstring in docstrings(parse(text)):
         first = docstring.splitlines()[0]
         if fragment := FRAGMENT_BEGINNINGS.match(first):
             wrong.append(Finding(line, f"a docstring does not begin with {fragment[0]!r}: {first}"))
@@ -253,7 +260,7 @@ def wrong_docstrings(text: str, module: str) -> list[Finding]:
 def wrong_comments(text: str, module: str) -> list[Finding]:
     constants = {
         node.end_lineno
-        for node in ast.walk(ast.parse(text))
+        for node in ast.walk(parse(text))
         if isinstance(node, ast.Assign | ast.AnnAssign)
         for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
         if isinstance(target, ast.Name) and target.id.isupper()  # The comment of a field may say where it is known.
@@ -283,22 +290,16 @@ def wrong_sentences(text: str, module: str) -> list[Finding]:
 # --------------------------------------------------------------------------------------------------------------
 # The rules, folder by folder
 
-RULES: dict[str, Callable[[str, str], list[Finding]]] = {
-    "names": wrong_names,
-    "docstrings": wrong_docstrings,
-    "comments": wrong_comments,
-    "sentences": wrong_sentences,
-}
+RULES = (wrong_names, wrong_docstrings, wrong_comments, wrong_sentences)
 
 
-@pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("folder", FILES)
-def test_a_folder_reads_as_plain_english(folder: str, rule: str) -> None:
-    wrong = [
-        f"{path.relative_to(ROOT)}:{finding.line}: {finding.message}"
-        for path in FILES[folder]
-        for finding in RULES[rule](path.read_text(encoding="utf-8"), path.stem)
-    ]
+def test_a_folder_reads_as_plain_english(folder: str) -> None:
+    wrong = []
+    for path in FILES[folder]:
+        text = path.read_text(encoding="utf-8")
+        findings = sorted(finding for rule in RULES for finding in rule(text, path.stem))
+        wrong += [f"{path.relative_to(ROOT)}:{finding.line}: {finding.message}" for finding in findings]
     assert not wrong, "\n" + "\n".join(wrong)
 
 

@@ -113,17 +113,17 @@ def count_work(name: str, counter: Counter, work: float) -> Subject:
     return Subject(name, make)
 
 
-@pytest.mark.parametrize(("factor", "status"), [(1.0, 0), (1.2, 0), (1.5, 1)])
 def test_a_formulation_that_does_more_work_is_found_end_to_end(
-    ask: Ask, counter: Counter, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, factor: float, status: int
+    ask: Ask, counter: Counter, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     works = {"vts-ppt": 1e-3, "nts-ar": 1e-3}
     monkeypatch.setattr(registry, "load_formulation", lambda name, limits: count_work(name, counter, works[name]))
     assert ask(*QUICK, "--out", tmp_path / "old.nc").status == 0
-    works["vts-ppt"] *= factor
-    answer = ask(*QUICK, "--out", tmp_path / "new.nc", "--against", tmp_path / "old.nc")
-    assert answer.status == status, answer.out + answer.err
-    new, old = (read_bench(tmp_path / f"{name}.nc") for name in ("new", "old"))
-    ratios = {change.formulation: change.ratio for change in slowdowns(new, old)}
-    assert ratios == {"vts-ppt": pytest.approx(factor, rel=0.05), "nts-ar": pytest.approx(1, rel=0.05)}
-    assert ("Slower than 1.25 times: vts-ppt." if status else "Nothing became slower.") in answer.out
+    for factor, status, words in ((1.2, 0, "Nothing became slower."), (1.5, 1, "Slower than 1.25 times: vts-ppt.")):
+        works["vts-ppt"] = factor * works["nts-ar"]
+        answer = ask(*QUICK, "--out", tmp_path / "new.nc", "--against", tmp_path / "old.nc")
+        assert answer.status == status, answer.out + answer.err
+        assert words in answer.out
+        new, old = (read_bench(tmp_path / f"{name}.nc") for name in ("new", "old"))
+        ratios = {change.formulation: change.ratio for change in slowdowns(new, old)}
+        assert ratios == {"vts-ppt": pytest.approx(factor, rel=0.05), "nts-ar": pytest.approx(1, rel=0.05)}

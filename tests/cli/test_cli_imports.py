@@ -12,13 +12,16 @@ from fresh_process import PYTHON
 from contactverif import __version__
 from contactverif.cli.app import COMMANDS
 
+# Each argument is a command line.
 SCRIPT = """
 import sys
 from contactverif.cli import main
-try:
-    main()
-except SystemExit as end:
-    assert not end.code, end.code
+for words in sys.argv[1:]:
+    sys.argv[1:] = words.split()
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, end.code
 print("\\nmodules:", *sorted(sys.modules))
 """
 SLOW = {"numba", "hypothesis", "numpy", "xarray", "matplotlib", "scipy", "netCDF4", "meshio", "pytest", "pandas"}
@@ -43,28 +46,27 @@ def run_python(*arguments: str, **variables: str) -> str:
     return finished.stdout
 
 
-def modules_after(*arguments: str) -> set[str]:
-    """Return the modules that a command has imported when it ends."""
-    return set(run_python("-c", SCRIPT, *arguments).rpartition("modules: ")[2].split())
+def modules_after(*lines: str) -> set[str]:
+    """Return the modules that are imported when some commands have ended, one after the other in one process."""
+    return set(run_python("-c", SCRIPT, *lines).rpartition("modules: ")[2].split())
 
 
-@pytest.mark.parametrize("command", ["", *COMMANDS])
-def test_help_imports_nothing_that_takes_long(command: str) -> None:
-    modules = modules_after(*[word for word in (command, "--help") if word])
+def test_help_imports_nothing_that_takes_long() -> None:
+    modules = modules_after("--help", *(f"{command} --help" for command in COMMANDS))
     assert not modules & SLOW
     after_numpy = run_python("-c", "import numpy, sys; print(len(sys.modules))")
     assert len(modules) <= 3 * int(after_numpy)
 
 
-def test_a_run_that_solves_nothing_imports_no_mechanics() -> None:
-    modules = modules_after("verify", "nts", "-p", "balance.*", "--examples", "2", "--seed", "1")
-    assert "contactverif.run.run" in modules
-    assert not {name for name in modules if name.startswith(FOR_SOLVING)}
+def test_a_run_imports_neither_mechanics_nor_the_kernels_of_another_family_unless_it_needs_them() -> None:
+    """Numba compiles a kernel when it is first called; a family that is not imported is not even read."""
+    modules = modules_after("verify nts -p balance.* --examples 2 --seed 1 --jobs 1")
+    assert {"contactverif.run.run", "contactverif_nts"} <= modules
+    assert not {name for name in modules if name.startswith((*FOR_SOLVING, "contactverif_mortar"))}
 
 
 def test_a_run_that_solves_imports_mechanics() -> None:
-    modules = modules_after("verify", "vts-ppt", "-p", "patch.flat.solve", "--examples", "1", "--seed", "1")
-    assert "contactverif.mechanics.newton" in modules
+    assert "contactverif.mechanics.newton" in modules_after("verify vts-ppt -p patch.flat.solve --examples 1 --seed 1")
 
 
 @pytest.mark.parametrize("start", [("-m", "contactverif"), ("-c", "from contactverif.cli import main; main()")])
@@ -87,10 +89,3 @@ def test_a_shell_completes_commands_formulations_and_properties(words: str, expe
         *("-m", "contactverif"), _CONTACTVERIF_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=str(last)
     )
     assert set(answer.split()) == expected
-
-
-def test_a_run_imports_no_other_family_whose_kernels_it_might_compile() -> None:
-    """Numba compiles a kernel when it is first called; a family that is not imported is not even read."""
-    modules = modules_after("verify", "nts", "-p", "balance.force", "--examples", "2", "--jobs", "1")
-    assert "contactverif_nts" in modules
-    assert not [name for name in modules if name.partition(".")[0] == "contactverif_mortar"]

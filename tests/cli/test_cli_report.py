@@ -4,19 +4,11 @@ import re
 from pathlib import Path
 
 import pytest
-from asking import Answer, Ask
+from asking import Ask
 
 from contactverif.cli.counterexample_output import announce_stored
 from contactverif.contract.errors import MisuseError
 from contactverif.run.registry import the_property
-
-
-@pytest.fixture
-def run(ask: Ask, tmp_path: Path) -> tuple[Path, Answer]:
-    """Return a report of NTS, which fails the patch test as it states, and the output of `verify`."""
-    path = tmp_path / "nts.nc"
-    options = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3", "--shrink", "all")
-    return path, ask("verify", "nts", "vts-ppt", *options, "--out", path, "-v")
 
 
 @pytest.mark.parametrize("files", [("page.html",), ("words.nc", "page.html")])
@@ -35,19 +27,17 @@ def test_verify_writes_the_page_with_or_without_the_report(
     )
 
 
-def test_the_table_is_the_one_of_the_run(ask: Ask, run: tuple[Path, Answer]) -> None:
-    path, verified = run
+def test_the_table_and_the_page_are_those_of_the_run(ask: Ask, tmp_path: Path) -> None:
+    """NTS fails the patch test as it states."""
+    path, page = tmp_path / "nts.nc", tmp_path / "nts.html"
+    options = ("-p", "patch.flat.*", "-p", "tangent.*", "--examples", "4", "--seed", "3", "--shrink", "all")
+    verified = ask("verify", "nts", "vts-ppt", *options, "--out", path, "-v")
     answer = ask("report", path, "-v")
     assert (answer.status, answer.err) == (0, "")
     *table, verdict, promises = answer.out.splitlines()
     assert len(table) > 8
     assert verified.out.splitlines()[: len(table)] == table
     assert verified.out.splitlines()[-2:] == [verdict, promises]
-
-
-def test_a_page_of_the_report(ask: Ask, run: tuple[Path, Answer], tmp_path: Path) -> None:
-    path, _ = run
-    page = tmp_path / "nts.html"
     answer = ask("report", path, "--out", page)
     assert (answer.status, answer.out, answer.err) == (0, f"page: {page}\n", "")
     text = page.read_text(encoding="utf-8")

@@ -129,8 +129,7 @@ def test_a_mistake_is_one_line_and_nothing_is_solved(
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize(("suffix", "begins"), [("png", PNG), ("svg", SVG)])
-@pytest.mark.parametrize("columns", [80, 140])
+@pytest.mark.parametrize(("suffix", "begins", "columns"), [("png", PNG, 80), ("svg", SVG, 140)])
 def test_fig_30_of_the_paper(ask: Ask, tmp_path: Path, suffix: str, begins: bytes, columns: int) -> None:
     names = ["vts-me", "vts-ppt-basic", "vts-ppt"]
     options = [word for name in names for word in ("--formulation", name)]

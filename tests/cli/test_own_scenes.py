@@ -8,7 +8,8 @@ import xarray
 from asking import Ask, check_mistake
 from curved_bodies import write_curved_bodies
 
-FEW = ("--examples", "2", "--seed", "1", "--isolation", "process")
+FEW = ("--examples", "2", "--seed", "1")
+PROCESS = ("--isolation", "process")
 SCENE = """
 from contactverif import load_scene
 
@@ -71,14 +72,15 @@ def test_a_scene_of_a_file_is_judged_stored_and_replayed_without_the_file(
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "own.py"
     file.write_text(SCENE)
-    answer = ask("verify", "vts-me", "--scene-file", "own.py:scene", "-p", "patch.flat.solve", *FEW, "--out", "own.nc")
+    words = ("vts-me", "--scene-file", "own.py:scene", "-p", "patch.flat.solve", "--out", "own.nc")
+    answer = ask("verify", *words, *FEW, *PROCESS)
     assert answer.status == 0, answer.err
     with xarray.open_datatree("own.nc") as report:
         assert report.attrs["place"] == "--scene-file own.py:scene"
         assert re.fullmatch(r"[0-9a-f]{16}", report.attrs["code_of_scene_file"])
     (case,) = ask("replay", "own.nc").out.split()
     file.unlink()
-    replayed = ask("replay", "own.nc", "--case", case, "--isolation", "process")
+    replayed = ask("replay", "own.nc", "--case", case, *PROCESS)
     assert replayed.status == 1, replayed.err
     check_mistake(
         ask("audit", "own.nc", "--scene-file", "own.py:scene"),

@@ -69,18 +69,7 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_report_of_an_unbroke
 
 
 def test_a_comparison_that_is_killed_goes_on(ask: Ask, tmp_path: Path) -> None:
-    words = [
-        "compare",
-        "nts",
-        "--against",
-        "vts-ppt",
-        "-p",
-        "patch.flat.transmission",
-        "--examples",
-        "60",
-        "--seed",
-        "1",
-    ]
+    words = ["compare", "nts", "--against", "vts-ppt", "-p", "patch.flat.transmission", *RUN[-4:]]
     report, journal, whole = tmp_path / "r.nc", tmp_path / "r.nc.journal", tmp_path / "whole.nc"
     kill_at(1, [*words, "--out", str(report), "--out", str(tmp_path / "r.html")], journal)
     assert not report.exists()

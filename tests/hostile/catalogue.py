@@ -39,27 +39,13 @@ AT_IMPORT = {
 
 @dataclass(frozen=True)
 class HostilePlugin:
-    """A hostile plugin.
+    """A hostile plugin."""
 
-    Attributes
-    ----------
-    name : str
-        The name on the command line.
-    target : str
-        Module and function of its factory, as an entry point names them.
-    ends : str
-        The end that a run with it must have, of `hostile_kit`.
-    summary : str
-        What it does, in one line.
-    verb : str
-        The method in which it does it.
-    """
-
-    name: str
-    target: str
-    ends: str
-    summary: str
-    verb: str = "import"
+    name: str  # On the command line
+    target: str  # Module and function of its factory, as an entry point names them
+    ends: str  # The end that a run with it must have, of `hostile_kit`
+    summary: str  # What it does, in one line
+    verb: str = "import"  # The method in which it does it
 
     @property
     def kind(self) -> str:

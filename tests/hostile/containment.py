@@ -57,28 +57,14 @@ MAIN = "from contactverif.cli import main; main()"
 
 @dataclass(frozen=True)
 class Finish:
-    """The end of a command.
+    """The end of a command."""
 
-    Attributes
-    ----------
-    status : int | None
-        The exit status; None if the command did not end in time.
-    seconds : float
-        The time it took.
-    output, errors : bytes
-        What it printed.
-    left : tuple[str, ...]
-        The processes and files that it left behind.
-    report : Path
-        The file that it was to write.
-    """
-
-    status: int | None
+    status: int | None  # None if the command did not end in time
     seconds: float
     output: bytes
     errors: bytes
-    left: tuple[str, ...]
-    report: Path
+    left: tuple[str, ...]  # The processes and files that it left behind
+    report: Path  # The file that it was to write
 
 
 def run_command(folder: Path, *arguments: str, seconds: float = SECONDS) -> Finish:

@@ -15,7 +15,7 @@ import signal
 import sys
 import time
 import traceback
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -29,25 +29,13 @@ GOOD = frozenset(ENDINGS[:3])
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a command.
+    """The end of a command."""
 
-    Attributes
-    ----------
-    status : int
-        Its exit status, negative for a signal.
-    output, errors : str
-        What it wrote.
-    seconds : float
-        The time that it took.
-    megabytes : int
-        The most memory that it had.
-    """
-
-    status: int
+    status: int  # Negative for a signal
     output: str
     errors: str
     seconds: float
-    megabytes: int
+    megabytes: int  # The most memory that it had
 
     def word(self, undamaged: Ending) -> str:
         """Return one of `ENDINGS`, beside what the command made of the undamaged file."""
@@ -70,17 +58,7 @@ class Ending:
 
 
 def run_command(arguments: Sequence[str], seconds: float = SECONDS, main: Callable[[], object] | None = None) -> Ending:
-    """Run a command line in a fork of this process, which has imported everything.
-
-    Parameters
-    ----------
-    arguments : Sequence[str]
-        What stands behind `contactverif`.
-    seconds : float
-        The time until it counts as a hang.
-    main : Callable[[], object] | None
-        A function to be run instead of the command.
-    """
+    """Run a command line, or a function, in a fork of this process, which has imported everything."""
     receive, send = os.pipe()
     start = time.monotonic()
     sys.stdout.flush()
@@ -193,19 +171,20 @@ BYTES: dict[str, Callable[[bytes, random.Random], bytes]] = {
 
 
 class Table:
-    """The counts: for each kind of damage how often a command ended how."""
+    """The counts: for each kind of damage how often a command ended how, in one of some words."""
 
-    def __init__(self) -> None:
-        self.counts: dict[str, Counter[str]] = {}
+    def __init__(self, head: str = "damage", endings: Sequence[str] = ENDINGS) -> None:
+        self.head, self.endings = head, endings
+        self.counts: dict[str, Counter[str]] = defaultdict(Counter)
 
     def add(self, kind: str, word: str) -> None:
         """Count an ending."""
-        self.counts.setdefault(kind, Counter())[word] += 1
+        self.counts[kind][word] += 1
 
     def text(self) -> str:
         """Return the table in Markdown."""
-        lines = [f"| damage | {' | '.join(ENDINGS)} |", "|---|" + "---:|" * len(ENDINGS)]
+        lines = [f"| {self.head} | {' | '.join(self.endings)} |", "|---|" + "---:|" * len(self.endings)]
         total: Counter[str] = sum(self.counts.values(), Counter())
         for kind, counts in {**self.counts, "all": total}.items():
-            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in ENDINGS)} |")
+            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in self.endings)} |")
         return "\n".join(lines)

@@ -270,15 +270,7 @@ def commands(good: Path, file: Path, case: str, chance: random.Random) -> list[l
 
 
 class Campaign:
-    """A campaign against the commands that read reports.
-
-    Parameters
-    ----------
-    folder : Path
-        A folder for its files.
-    write_good : Callable[[Path], str]
-        Writes the undamaged report, and returns the id of a counterexample.
-    """
+    """A campaign against the commands that read reports; `write_good` writes one and returns a counterexample's id."""
 
     def __init__(self, folder: Path, write_good: Callable[[Path], str]) -> None:
         self.folder, self.table, self.harm = folder, Table(), 0

@@ -12,40 +12,22 @@ import shutil
 import sys
 import tempfile
 import traceback
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-from damage import BYTES
-from forged_records import Record, frame, read, say_pass, scale_numbers
+from damage import BYTES, Table
+from forged_records import EXAMPLES, SEED, Record, frame, judge, plan_of, read, say_pass, scale_numbers
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import Run
 from contactverif.run.journal import JournalKey, begin_journal, record_files, write_record
 from contactverif.run.outcome_records import OutcomeRecord
-from contactverif.run.provenance import machine
-from contactverif.run.registry import load_formulation, load_properties
-from contactverif.run.run import run
 from contactverif.run.run_journal import Journal
-from contactverif.run.run_plan import Plan
 
-IDS = ("balance.force", "patch.flat.transmission")
-EXAMPLES, SEED = 10, 3
 ENDINGS = ("named", "judged again", "refused", "believed", "traceback")
 HARM = frozenset(ENDINGS[-2:])
 _Change = Callable[[Record, random.Random], Record]
-_BOX = {"isolation": {"isolation": "box"}}
-
-
-def plan_of(seed: int = SEED) -> Plan:
-    """Return the plan of a run in which no plugin can read the key."""
-    return Plan(formulations=("nts",), properties=IDS, examples=EXAMPLES, seed=seed, machine=machine(), options=_BOX)
-
-
-def judge(journal: Journal, seed: int = SEED) -> Run:
-    """Judge what the journal does not have."""
-    return run([load_formulation("nts")], load_properties(IDS), examples=EXAMPLES, seed=seed, journal=journal)
 
 
 def facts(result: Run) -> list[str]:
@@ -149,7 +131,7 @@ class Campaign:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.counts: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+        self.table = Table("forgery", ENDINGS)
         for name, seed in (("whole", SEED), ("same", SEED), ("seed", SEED + 1)):
             begin_journal(folder / name, plan_of(seed), [])
             result = judge(Journal(plan_of(seed), folder / name), seed)
@@ -163,7 +145,7 @@ class Campaign:
         shutil.copytree(self.folder / "whole", copy)
         KINDS[kind](copy, chance, self.folder)
         ending = self._go_on(copy)
-        self.counts[kind][ending] += 1
+        self.table.add(kind, ending)
         return ending
 
     def _go_on(self, copy: Path) -> str:
@@ -182,15 +164,7 @@ class Campaign:
     @property
     def harm(self) -> int:
         """The number of forgeries that were believed, or ended in a traceback."""
-        return sum(counts[word] for counts in self.counts.values() for word in HARM)
-
-    def table(self) -> str:
-        """Return the table in Markdown."""
-        lines = [f"| forgery | {' | '.join(ENDINGS)} |", "|---|" + "---:|" * len(ENDINGS)]
-        total = sum(self.counts.values(), Counter[str]())
-        for kind, counts in {**self.counts, "all": total}.items():
-            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in ENDINGS)} |")
-        return "\n".join(lines)
+        return sum(counts[word] for counts in self.table.counts.values() for word in HARM)
 
 
 def main(count: int, seed: int) -> int:
@@ -202,7 +176,7 @@ def main(count: int, seed: int) -> int:
         for number in range(count):
             kind = list(KINDS)[number % len(KINDS)]
             campaign.attack(kind, random.Random(f"{seed}/{number}"))
-        print(campaign.table(), flush=True)
+        print(campaign.table.text(), flush=True)
     return int(campaign.harm > 0)
 
 

@@ -12,7 +12,6 @@ import random
 import re
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import sqrt
@@ -21,13 +20,15 @@ from typing import Any
 
 import netCDF4
 import numpy as np
-from damage import Ending, run_command
+from damage import Ending, Table, run_command
+from damaged_reports import import_everything, write_report
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome
 from contactverif.contract.result import Row, Run
 
-WORDS = ("nts", "vts-ppt", "-p", "balance.force", "-p", "patch.flat.transmission", "-p", "hard.deep")
+PROPERTIES = ("balance.force", "patch.flat.transmission", "hard.deep")
+WORDS = ("nts", "vts-ppt", *(word for name in PROPERTIES for word in ("-p", name)))
 EXAMPLES, N_NUMBERS = 20, 10
 ENDINGS = ("seen", "refused", "missed", "traceback")
 HARM = frozenset(ENDINGS[2:])
@@ -154,8 +155,11 @@ class Campaign:
 
     def __init__(self, folder: Path) -> None:
         self.report, self.forged = folder / "report.nc", folder / "forged.nc"
-        self.counts: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+        self.table = Table("forgery", ENDINGS)
         self.chances: list[float] = []  # Of each report with forged numbers, that the audit sees one.
+        # Forks find everything imported, and the kernels loaded.
+        import_everything()
+        write_report(self.forged, PROPERTIES)
         words = ("verify", *WORDS, "--examples", str(EXAMPLES), "--seed", "1", "--jobs", "1", *INLINE)
         ending = run_command([*words, "--out", str(self.report)], seconds=600)
         assert ending.status == 0, ending.errors
@@ -175,7 +179,7 @@ class Campaign:
         else:
             write(RUNS[kind](read_run(self.report), chance), self.forged)
         ending = self._word(self._audit(self.forged))
-        self.counts[kind][ending] += 1
+        self.table.add(kind, ending)
         if kind in NUMBERS:
             self.chances.append(self.chance[str(NUMBERS[kind])])
         return ending
@@ -192,7 +196,7 @@ class Campaign:
     @property
     def n_seen(self) -> int:
         """The number of reports with forged numbers in which one was seen."""
-        return sum(self.counts[kind]["seen"] for kind in NUMBERS)
+        return sum(self.table.counts[kind]["seen"] for kind in NUMBERS)
 
     @property
     def as_often_as_said(self) -> bool:
@@ -203,19 +207,13 @@ class Campaign:
     @property
     def harm(self) -> int:
         """The number of tracebacks, and of forgeries that no audit may miss."""
-        others = {kind: counts for kind, counts in self.counts.items() if kind not in NUMBERS}
-        missed = sum(counts["missed"] for counts in others.values())
-        return missed + sum(counts["traceback"] for counts in self.counts.values())
+        missed = sum(counts["missed"] for kind, counts in self.table.counts.items() if kind not in NUMBERS)
+        return missed + sum(counts["traceback"] for counts in self.table.counts.values())
 
-    def table(self) -> str:
+    def text(self) -> str:
         """Return the table in Markdown, and how often forged numbers were seen."""
-        lines = [f"| forgery | {' | '.join(ENDINGS)} |", "|---|" + "---:|" * len(ENDINGS)]
-        for kind, counts in self.counts.items():
-            lines.append(f"| {kind} | {' | '.join(str(counts[word] or '') for word in ENDINGS)} |")
-        often = (
-            f"forged numbers: seen in {self.n_seen} of {len(self.chances)} reports, {sum(self.chances):.1f} expected"
-        )
-        return "\n".join([*lines, "", often])
+        often = f"seen in {self.n_seen} of {len(self.chances)} reports, {sum(self.chances):.1f} expected"
+        return f"{self.table.text()}\n\nforged numbers: {often}"
 
 
 def main(count: int, seed: int) -> int:
@@ -225,7 +223,7 @@ def main(count: int, seed: int) -> int:
         campaign = Campaign(Path(folder))
         for number in range(count):
             campaign.attack(KINDS[number % len(KINDS)], random.Random(f"{seed}/{number}"))
-        print(campaign.table(), flush=True)
+        print(campaign.text(), flush=True)
     return int(campaign.harm > 0 or not campaign.as_often_as_said)
 
 

@@ -16,14 +16,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import xarray as xr
 from catalogue import install
+from containment import scratch
 from reaper import adopt_orphans, descendants, kill_descendants
 
 from contactverif_reports.netcdf.differences import same_data
@@ -42,32 +43,15 @@ _COUNTED = ("verify", *_COUNTING, *_FLAT, "--out", "report.nc")
 
 @dataclass(frozen=True)
 class Command:
-    """A command that is killed.
-
-    Attributes
-    ----------
-    words : tuple[str, ...]
-        The command line.
-    resume : tuple[str, ...]
-        The command line that goes on; empty if there is none.
-    after : tuple[str, ...]
-        A command line that makes the report from what is there; empty if there is none.
-    jobs : int
-        The number of processes that judge; each may lose one case.
-    share : float
-        The share of the kills that hit this command.
-    read : Callable[[Path], object]
-        Reads a file of its results, and raises if it is broken.
-    compare : Callable[[Path, Path], list[str]]
-        Returns the differences of two folders, one of them from a run that was never killed.
-    """
+    """A command that is killed."""
 
     words: tuple[str, ...]
-    resume: tuple[str, ...] = ()
-    after: tuple[str, ...] = ()
-    jobs: int = 1
-    share: float = 0.2
-    read: Callable[[Path], object] = read_run
+    resume: tuple[str, ...] = ()  # The command line that goes on, if there is one
+    after: tuple[str, ...] = ()  # A command line that makes the report from what is there, if one is needed
+    jobs: int = 1  # Processes that judge; each may lose one case.
+    share: float = 0.2  # The share of the kills that hit this command
+    read: Callable[[Path], object] = read_run  # It raises if a file of the results is broken.
+    # The differences of two folders, one of them from a run that was never killed.
     compare: Callable[[Path, Path], list[str]] = field(default=lambda a, b: _same_reports(a, b))
 
 
@@ -120,16 +104,6 @@ COMMANDS = {
     ),
     "campaign": Command(_SHARDED, _SHARDED, ("merge", "shards", "--out", "report.nc"), share=0.2),
 }  # fmt: skip
-
-
-@contextmanager
-def scratch() -> Iterator[Path]:
-    """Yield a folder that is deleted afterwards."""
-    folder = Path(tempfile.mkdtemp(prefix="kills-"))
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def start(folder: Path, words: Sequence[str], notes: str) -> subprocess.Popen[bytes]:
@@ -230,18 +204,9 @@ def _broken_reports(folder: Path, read: Callable[[Path], object]) -> list[str]:
 
 
 def kill_once(name: str, moment: float, group: bool, count: Count) -> None:
-    """Kill a command at a moment, look at what is there, resume it, and look again.
+    """Kill a command or its process group at a moment, look at what is there, resume it, and look again.
 
-    Parameters
-    ----------
-    name : str
-        The name of the command.
-    moment : float
-        The moment, as a share of the time of an unbroken run.
-    group : bool
-        Kill the whole process group, or only the first process.
-    count : Count
-        The counts, which are raised.
+    The moment is a share of the time of an unbroken run. The counts are raised.
     """
     command, whole = COMMANDS[name], unbroken(name)
     with scratch() as folder:

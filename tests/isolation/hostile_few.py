@@ -177,57 +177,39 @@ class Counts(Springs):
 
 
 class Matrix(Springs):
-    """Its tangent is a sparse matrix of a format of scipy."""
-
-    kind = "csr"
+    """Its tangent is a sparse matrix of scipy; the penalty says which."""
 
     def tangent(self, interface, pairing, z):
         depths = np.arange(1, 2 * interface.n_slave_nodes, 2)
-        entries = sparse.coo_array((self.penalty * pairing["active"], (depths, depths)), shape=(z.size, z.size))
-        return self.change(entries.asformat(self.kind))
+        entries = sparse.coo_array((1.0 * pairing["active"], (depths, depths)), shape=(z.size, z.size))
+        return MATRICES[self.penalty](entries)
 
-    def change(self, matrix):
+
+def _change(part, change):
+    """Return a function that makes a matrix of which a part is changed."""
+
+    def make(entries):
+        matrix = entries.tocsr()
+        setattr(matrix, part, change(getattr(matrix, part)))
         return matrix
 
-
-class MatrixByColumns(Matrix):
-    kind = "csc"
+    return make
 
 
-class MatrixOfBlocks(Matrix):
-    kind = "bsr"
-
-
-class MatrixOfEntries(Matrix):
-    kind = "coo"
-
-
-class MatrixInTwelveBits(Matrix):
-    """Its indices have a type that nobody else uses."""
-
-    def change(self, matrix):
-        matrix.indices = matrix.indices.astype(np.int16)
-        return matrix
-
-
-class MatrixOutside(Matrix):
-    """It has an entry in a column that is not there."""
-
-    def change(self, matrix):
-        matrix.indices[0] = 10**6
-        return matrix
-
-
-class MatrixTooShort(Matrix):
-    def change(self, matrix):
-        matrix.indices = matrix.indices[:-1]
-        return matrix
-
-
-class MatrixWithNothing(Matrix):
-    def change(self, matrix):
-        matrix.data[0] = np.nan
-        return matrix
+MATRICES = {
+    1.0: sparse.coo_array.tocsr,
+    2.0: sparse.coo_array.tocsc,
+    3.0: sparse.coo_array.tobsr,
+    4.0: sparse.coo_array.tocoo,
+    # A type of indices that nobody else uses.
+    5.0: _change("indices", lambda indices: indices.astype(np.int16)),
+}
+WRONG_MATRICES = {
+    6.0: _change("indices", lambda indices: indices + np.int32(10**6)),
+    7.0: _change("indices", lambda indices: indices[:-1]),
+    8.0: _change("data", lambda data: data * np.nan),
+}
+MATRICES |= WRONG_MATRICES
 
 
 class LoadsLibrary(Springs):

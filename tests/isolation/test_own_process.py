@@ -59,27 +59,20 @@ def test_a_batch_goes_in_one_piece_to_a_plugin_that_takes_none() -> None:
     assert np.array_equal(forces[1], formulation.residual(CASE.interface, pairing, 2 * CASE.z))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("Matrix", "MatrixByColumns", "MatrixOfBlocks", "MatrixOfEntries", "MatrixInTwelveBits"),
-        *("MatrixOutside", "MatrixTooShort", "MatrixWithNothing"),
-    ],
-)
-def test_a_matrix_is_the_same_there_and_here_and_so_are_its_mistakes(name: str) -> None:
-    far = load_remote(hostile_few.PROGRAM, name, QUICK).for_case(CASE)
-    near = Subject(name, getattr(hostile_few, name)).for_case(CASE)
-    answers = []
-    for formulation in (near, far):
-        pairing = formulation.pair(CASE.interface, CASE.z)
-        try:
-            tangent = formulation.tangent(CASE.interface, pairing, CASE.z)
-            entries = tangent.tocoo()
-            answers.append([tangent.format, *(part.tolist() for part in (entries.data, entries.row, entries.col))])
-        except ContractError as error:
-            answers.append(f"{type(error).__name__}: {error}")
-    assert answers[0] == answers[1]
-    assert isinstance(answers[0], str) is (name in ("MatrixOutside", "MatrixTooShort", "MatrixWithNothing"))
+def test_a_matrix_is_the_same_there_and_here_and_so_are_its_mistakes() -> None:
+    near, far = Subject("Matrix", hostile_few.Matrix), load_remote(hostile_few.PROGRAM, "Matrix", QUICK)
+    for penalty in hostile_few.MATRICES:
+        answers = []
+        for formulation in (near.with_penalty(penalty), far.with_penalty(penalty)):
+            pairing = formulation.pair(CASE.interface, CASE.z)
+            try:
+                tangent = formulation.tangent(CASE.interface, pairing, CASE.z)
+                entries = tangent.tocoo()
+                answers.append([tangent.format, *(part.tolist() for part in (entries.data, entries.row, entries.col))])
+            except ContractError as error:
+                answers.append(f"{type(error).__name__}: {error}")
+        assert answers[0] == answers[1]
+        assert isinstance(answers[0], str) is (penalty in hostile_few.WRONG_MATRICES)
 
 
 def test_multipliers_that_nobody_promised_are_found_at_the_first_question() -> None:

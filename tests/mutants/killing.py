@@ -3,16 +3,14 @@
 from functools import cache
 
 from mutate import Mutant
+from subjects import load_property
 from without_points import CAUGHT_BY, count_points, take_points_away
 
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
 from contactverif.run.draw import Sampling, draw_cases
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
-OTHERS = 20  # Cases of each other property, which fill the matrix and decide nothing.
-OTHERS_OF_A_LIST = 1  # The same of properties with a finite list, which are many.
-OTHERS_SOLVED = 1  # The same of properties that solve bodies, which are slow.
-OTHERS_FOR_A_SURVIVOR = 25  # Cases of each other property where no property may catch the mutant.
+OTHERS = 20  # Cases of each other property, which `tox -e trust` asks.
 SEED = 0
 KEY = "kills"  # under which a row of the matrix travels in the report of a test
 
@@ -26,10 +24,10 @@ def properties() -> tuple[Property, ...]:
 
 
 @cache
-def cases(property_id: str, seed: int = SEED, examples: int = EXAMPLES) -> tuple[Case, ...]:
-    """Return the planned cases of a property, as a run with that seed draws them."""
-    (question,) = (question for question in properties() if question.id == property_id)
-    key = Sampling(examples=examples, seed=seed).key(question)
+def cases(property_id: str, examples: int = EXAMPLES) -> tuple[Case, ...]:
+    """Return the planned cases of a property, as a run draws them."""
+    question = load_property(property_id)
+    key = Sampling(examples=examples, seed=SEED).key(question)
     return draw_cases(question.cases(None), seed=key, examples=examples).cases
 
 
@@ -49,41 +47,21 @@ def caught_at(question: Property, subject: Subject, examples: int | None) -> int
     return 0
 
 
-def property_named(property_id: str) -> Property:
-    """Return the installed property of an id."""
-    (question,) = (question for question in properties() if question.id == property_id)
-    return question
-
-
 def first_kill(mutant: Mutant) -> tuple[int, bool]:
     """Return `caught_at` of the property that is meant to catch a mutant, and whether it looked at contact points."""
     calls: list[None] = []
-    number = caught_at(property_named(mutant.caught_by), Subject(mutant.name, count_points(mutant.make, calls)), None)
+    number = caught_at(load_property(mutant.caught_by), Subject(mutant.name, count_points(mutant.make, calls)), None)
     return number, bool(calls)
 
 
 def first_kill_without_points(mutant: Mutant) -> int:
     """Return `caught_at` of a mutant without contact points, of its property or of the one that `CAUGHT_BY` names."""
-    question = property_named(CAUGHT_BY.get(mutant.name, mutant.caught_by))
+    question = load_property(CAUGHT_BY.get(mutant.name, mutant.caught_by))
     return caught_at(question, Subject(mutant.name, take_points_away(mutant.make)), None)
 
 
-def kills(mutant: Mutant, others: int = OTHERS) -> dict[str, int]:
-    """Return {property id: `caught_at`} of a mutant."""
-    subject = Subject(mutant.name, mutant.make)
-
-    def examples(question: Property) -> int | None:
-        if question.id == mutant.caught_by:
-            return None
-        if isinstance(question.cases(None), tuple):
-            return OTHERS_OF_A_LIST
-        return OTHERS_SOLVED if question.bodies and others == OTHERS else others
-
-    return {question.id: caught_at(question, subject, examples(question)) for question in properties()}
-
-
 def as_lines(matrix: dict[str, tuple[str, dict[str, int]]]) -> list[str]:
-    """Write the kill matrix as text, from {mutant: (the property that is meant to catch it, its `kills`)}.
+    """Write the kill matrix as text, from {mutant: (the property that is meant to catch it, its cells)}.
 
     A number is the first case that caught the mutant, in brackets where the property is the one that is meant to; a
     bracket without a number is a survivor.

@@ -11,6 +11,7 @@ import sys
 import types
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -48,38 +49,44 @@ class Mutant:
     make: Callable[..., Any]
 
 
-def changed_line(
-    module: str, old: str, new: str, *, factory: str, nth: int = 0, in_one_call: bool = False, **options: Any
-) -> Callable[..., Any]:
-    """Return the factory of a copy of the plugin in which the nth occurrence of `old` in a module reads `new`.
+@cache
+def _sources() -> dict[str, str]:
+    return {name: inspect.getsource(importlib.import_module(f"{PACKAGE}.{name}")) for name in MODULES}
 
-    The copy computes residual and tangent in two calls unless `in_one_call`.
-    """
-    sources = {name: inspect.getsource(importlib.import_module(f"{PACKAGE}.{name}")) for name in MODULES}
-    parts = sources[module].split(old)
-    if len(parts) < nth + 2:
-        raise AssertionError(f"{module} has no line {old!r} number {nth} any more: bring the mutant up to date")
-    sources[module] = old.join(parts[: nth + 1]) + new + old.join(parts[nth + 1 :])
 
+def _load_copy(sources: dict[str, str], in_one_call: bool) -> dict[str, Any]:
+    """Load modules of changed sources under names of their own; return all that they define."""
     copy = f"{PACKAGE}_mutant_{next(_numbers)}"
     package = types.ModuleType(copy)
     package.__path__ = []
     sys.modules[copy] = package
+    names: dict[str, Any] = {}
     for name, source in sources.items():
         source = re.sub(r"\n@compile_\w+\n", "\n", source.replace(PACKAGE, copy))
         part = types.ModuleType(f"{copy}.{name}")
         sys.modules[f"{copy}.{name}"] = part
         setattr(package, name, part)
         exec(compile(source, f"<{copy}.{name}>", "exec"), vars(part))
+        names |= vars(part)
     # A mutant has one wrong line, in one of two kernels. Newton's method shall see it, whichever it is.
     if not in_one_call:
-        del vars(sys.modules[f"{copy}.patch_test_passing"])["PatchTestPassing"].residual_and_tangent
-    make = next(vars(part)[factory] for name in MODULES if factory in vars(part := sys.modules[f"{copy}.{name}"]))
+        del names["PatchTestPassing"].residual_and_tangent
+    return names
 
-    def mutant(*, penalty: float) -> Any:
-        return make(penalty=penalty, **options)
 
-    return mutant
+def changed_line(
+    module: str, old: str, new: str, *, factory: str, nth: int = 0, in_one_call: bool = False, **options: Any
+) -> Callable[..., Any]:
+    """Return the factory of a copy of the plugin in which the nth occurrence of `old` in a module reads `new`.
+
+    The copy computes residual and tangent in two calls unless `in_one_call`. It is loaded at its first use.
+    """
+    parts = _sources()[module].split(old)
+    if len(parts) < nth + 2:
+        raise AssertionError(f"{module} has no line {old!r} number {nth} any more: bring the mutant up to date")
+    changed = old.join(parts[: nth + 1]) + new + old.join(parts[nth + 1 :])
+    load = cache(lambda: _load_copy(_sources() | {module: changed}, in_one_call))
+    return lambda *, penalty: load()[factory](penalty=penalty, **options)
 
 
 def wrap(

@@ -7,12 +7,12 @@ the largest component. With springs of 1e8 E/h, as in the item on locking, the c
 
 import re
 from fractions import Fraction
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from reports.page_reader import Page
 
 from contactverif import MisuseError
 from contactverif.cli import app as cli
@@ -265,29 +265,10 @@ def test_every_stored_figure_belongs_to_an_item() -> None:
     assert (STORED / "paper.nc").stat().st_size < 400_000
 
 
-class Reader(HTMLParser):
-    """Collects the ids, the tags and the addresses of a page."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.ids: list[str] = []
-        self.tags: list[str] = []
-        self.addresses: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        attributes = dict(attrs)
-        self.ids += [attributes["id"] or ""] if "id" in attributes else []
-        self.addresses += [value for name, value in attrs if name in ("src", "srcset") and value]
-        if tag == "link":
-            self.addresses.append(attributes.get("href") or "")
-
-
 def test_the_page_needs_nothing_else_and_says_everything(paper: Paper) -> None:
     text = page(paper, dict.fromkeys([figure.name for figure in paper.figures], "<i>figure</i>"))
-    reader = Reader()
-    reader.feed(text)
-    assert not reader.addresses
+    reader = Page(text)
+    assert not [attrs for tag, attrs in reader.tags if tag == "link" or {"src", "srcset"} & set(attrs)]
     assert len(set(reader.ids)) == len(reader.ids)
     assert not re.search(r"url\(['\"]?https?:", text)
     assert {f"#{name}" for name in reader.ids} >= set(re.findall(r'href="(#[^"]+)"', text))

@@ -12,30 +12,16 @@ from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rule
 
 
 class PointSprings:
-    """Springs at points of each slave segment, against the nearest closed master segment.
-
-    Parameters
-    ----------
-    penalty : float
-        The distributed stiffness ε̂.
-    places, weights : tuple[float, ...]
-        The places on a segment from 0 to 1, and the share of its length that each stands for.
-    last : bool
-        Take the last of equally near segments, not the first.
-    tau : float
-        How far past a free end a point still counts, in lengths of the segment.
-    stated : bool
-        State the traits; a newcomer states nothing.
-    """
+    """Springs at points of each slave segment, against the nearest closed master segment."""
 
     def __init__(
         self,
         penalty: float,
-        places: tuple[float, ...] = (0.25, 0.75),
-        weights: tuple[float, ...] = (0.5, 0.5),
-        last: bool = False,
-        tau: float = 0.0,
-        stated: bool = True,
+        places: tuple[float, ...] = (0.25, 0.75),  # On a segment, from 0 to 1
+        weights: tuple[float, ...] = (0.5, 0.5),  # The share of its length that each place stands for
+        last: bool = False,  # Take the last of equally near segments, not the first.
+        tau: float = 0.0,  # How far past a free end a point still counts, in lengths of the segment
+        stated: bool = True,  # A newcomer states no traits.
     ) -> None:
         self.penalty, self.places, self.weights, self.last, self.tau = penalty, places, weights, last, tau
         self.traits = Traits()

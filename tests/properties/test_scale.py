@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hard_strangers import PointSprings, Softened, simpson, trapezoid
-from strangers import STRANGERS
 from subjects import change_verbs, judge_as, load_property, load_subject, with_promises
 
 import contactverif_nts
@@ -61,8 +60,7 @@ def test_nodal_springs_pass_whether_they_state_their_unit_or_not(name: str) -> N
             judge_as(Verdict.PASS, SCALE, case, subject)
 
 
-RIGHT_ONES = {
-    **STRANGERS,
+RIGHT_ONES = {  # Beside all `STRANGERS`, which `test_strangers.py` asks.
     "quarter points": PointSprings,
     "nodes": trapezoid,
     "Simpson's rule, the last of equals": lambda penalty: simpson(penalty, last=True),

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
-from strangers import STRANGERS, NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
+from strangers import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
 from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
-from contactverif import Case, Interface, Subject, Verdict, judge_case
+from contactverif import Case, Interface, Verdict, judge_case
 from contactverif.run.draw import draw_cases
 from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
 from contactverif_properties.shared.same_answer import BITS
@@ -23,8 +23,7 @@ EXAMPLES = 8
 
 MASTER = {"force_along": "master normal", "local": True}
 SLAVE = {"force_along": "slave normal", "local": True}
-RIGHT_ONES = {
-    **{name: Subject(name, make) for name, make in STRANGERS.items() if make.traits.promises.local},
+RIGHT_ONES = {  # Beside all `STRANGERS`, which `test_strangers.py` asks.
     **{
         make.__name__: with_promises(make, **(SLAVE if make.traits.rules.gap == "slave normal" else MASTER))
         for make in (PointsFirst, TurnedFrame, SlaveNormalAtGaussPoints, NearbyOnly)

@@ -146,16 +146,22 @@ def test_every_template_can_be_read() -> None:
         environment.get_template(name)
 
 
-@pytest.mark.parametrize("passing", [True, False])
-def test_the_page_of_a_report_is_sound(tmp_path: Path, passing: bool) -> None:
-    html = page(tmp_path, small_run(passing=passing))
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Return the folder of a report with failures, and its page."""
+    folder = tmp_path_factory.mktemp("failing")
+    return folder, page(folder, small_run())
+
+
+def test_the_page_of_a_report_is_sound(failing: tuple[Path, str]) -> None:
+    folder, html = failing
     assert not complaints(html)
-    path = tmp_path / "report.nc"
+    path = folder / "report.nc"
     assert html == report_page(read_run(path), path), "the same report gives the same bytes"
 
 
-def test_the_page_says_what_failed(tmp_path: Path) -> None:
-    text = Page(page(tmp_path, small_run())).text
+def test_the_page_says_what_failed(failing: tuple[Path, str]) -> None:
+    text = Page(failing[1]).text
     assert "✗ 1 crash, 1 plugin not loaded. 2 formulations, 3 properties, 13 of 14 random cases decided." in text
     assert "vts-me:n=4 , objectivity: crashed" in text
     assert "mine : not loaded . ModuleNotFoundError: No module named 'mine'" in text.replace("mine: ", "mine : ")
@@ -165,6 +171,7 @@ def test_the_page_says_what_failed(tmp_path: Path) -> None:
 
 def test_the_page_of_a_run_that_passed(tmp_path: Path) -> None:
     html = page(tmp_path, small_run(passing=True))
+    assert not complaints(html)
     text = Page(html).text
     assert "✓ Every promise is kept and every property was judged." in text
     assert "What went wrong" not in text
@@ -174,9 +181,9 @@ def test_the_page_of_a_run_that_passed(tmp_path: Path) -> None:
     )
 
 
-def test_numbers_agree_with_the_file(tmp_path: Path) -> None:
-    html = page(tmp_path, small_run())
-    run = read_run(tmp_path / "report.nc")
+def test_numbers_agree_with_the_file(failing: tuple[Path, str]) -> None:
+    folder, html = failing
+    run = read_run(folder / "report.nc")
     tables = [table for table in Page(html).tables if table.caption.startswith("What ")]
     assert len(tables) == len(run.formulations)
     for name, table in zip(run.formulations, tables, strict=True):

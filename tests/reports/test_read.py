@@ -17,11 +17,18 @@ from contactverif_reports.netcdf.read import case_ids, open_report, read_case
 from contactverif_reports.netcdf.write import write
 
 
-@pytest.fixture
-def report(tmp_path: Path) -> Path:
-    path = tmp_path / "report.nc"
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("whole") / "report.nc"
     write(small_run(), path)
-    return path
+    return path.read_bytes()
+
+
+@pytest.fixture
+def report(whole: bytes, tmp_path: Path) -> Path:
+    """Return a report that a test may damage."""
+    (tmp_path / "report.nc").write_bytes(whole)
+    return tmp_path / "report.nc"
 
 
 def test_ids_in_the_order_of_the_run(report: Path) -> None:

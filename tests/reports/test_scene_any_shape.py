@@ -57,12 +57,8 @@ def test_a_contact_as_wide_as_its_bodies_is_not(name: str) -> None:
     assert close_up(solve_scene(load_scene(name).case(), [load_formulation("nts-ar")])) is None
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_it_is_drawn(disk: SolvedScene, suffix: str, tmp_path: Path) -> None:
-    target = tmp_path / f"a.{suffix}"
-    draw_scene(disk, target, title="example-2")
-    assert target.stat().st_size > 10_000
-    if suffix == "svg":
-        words = target.read_text()
-        assert "displacements × 1, penetration × 50" in words
-        assert "all of the meshes" in words
+def test_it_is_drawn(disk: SolvedScene, tmp_path: Path) -> None:
+    draw_scene(disk, tmp_path / "a.svg", title="example-2")
+    words = (tmp_path / "a.svg").read_text()
+    assert "displacements × 1, penetration × 50" in words
+    assert "all of the meshes" in words

@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from forged_records import BOX
 from test_scheduler import facts
 
 from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formulation, load_properties, named_case
@@ -36,7 +37,6 @@ from contactverif.run.scheduler import Progress
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
 EXAMPLES = 30
-BOX = {"isolation": {"isolation": "box"}}  # The options of a run in which no plugin can read the key.
 PLAN = Plan(
     formulations=NAMES,
     properties=PROPERTY_IDS,

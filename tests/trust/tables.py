@@ -24,22 +24,10 @@ def read(name: str) -> list[dict[str, str]]:
 def fill(
     name: str, heads: Iterable[str], keys: Iterable[str], cells: Callable[[str], list[str]], processes: int = 1
 ) -> None:
-    """Write a table with a line for each key: the key, then its cells.
+    """Write a table with a line for each key, in their order: the key, then its cells; the first head is the key's.
 
-    Lines that are there stay as they are, if the table has the same heads. Delete the file to begin anew.
-
-    Parameters
-    ----------
-    name : str
-        The file's name in `reports/trust`.
-    heads : Iterable[str]
-        The heads of the columns. The first is that of the key.
-    keys : Iterable[str]
-        The keys in the order of the table.
-    cells : Callable[[str], list[str]]
-        A function of a module, which returns the cells of a key.
-    processes : int
-        The number of processes that share the keys.
+    Lines that are there stay as they are, if the table has the same heads. Delete the file to begin anew. `processes`
+    share the keys, so `cells` is a function of a module.
     """
     heads, keys = list(heads), list(keys)
     lines = {row[heads[0]]: [row[head] for head in heads] for row in read(name) if list(row) == heads}

@@ -67,14 +67,8 @@ class HostileNts:
 def instead(verb: str, *, ends: str = CAUGHT) -> Callable[..., Factory]:
     """Decorate `act(right, *arguments)`, which answers a verb; `right()` is the right answer.
 
-    The decorators of this file take a summary beside an act that is no function with a docstring.
-
-    Parameters
-    ----------
-    verb : str
-        A method of a formulation, "traits" or "make".
-    ends : str
-        The end that a run with the plugin must have.
+    The decorators of this file take a summary beside an act that is no function with a docstring. A verb is a method of
+    a formulation, "traits" or "make"; `ends` is the end that a run with the plugin must have.
     """
 
     def decorate(act: Act, summary: str | None = None) -> Factory:
