@@ -168,23 +168,19 @@ def _nodes(unknowns: IntArray, pair: Tangents) -> str:
     """Return the nodes of some unknowns in words."""
     nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
     sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
-    words = (f"{side} node{'s' * (len(own) > 1)} {', '.join(map(str, own))}" for side, own in sides.items() if len(own))
+    words = (
+        f"{side} node{'s' * (len(part) > 1)} {', '.join(map(str, part))}" for side, part in sides.items() if len(part)
+    )
     return " and ".join(words)
 
 
 def _one_part(pair: Tangents) -> str:
     """Return the part of the tangent that is wrong, if its size, its place and its growth are those of one part."""
-    blocks = _blocks(pair)
-    large = {
-        name: pair.errors[block] for name, block in blocks.items() if not _is_small(pair.errors[block], pair.scale)
-    }
-    powers = {name: _power_of_depth(errors) for name, errors in large.items()}
-    # A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
-    wrong = [name for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER]
-    if len(wrong) != 1:
-        return _several(wrong) if wrong else ""
-    (name,) = wrong
-    errors, power = large[name], powers[name]
+    blocks, powers = _blocks(pair), _powers_of_wrong_blocks(pair)
+    if len(powers) != 1:
+        return _several([*powers]) if powers else ""
+    ((name, power),) = powers.items()
+    errors = pair.errors[blocks[name]]
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
@@ -192,6 +188,16 @@ def _one_part(pair: Tangents) -> str:
     if name == "nn" and _is_lumped(errors, pair):
         return f"{part}, stands at other nodes, as if it were lumped: it is right for a motion of a whole side alone"
     return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"
+
+
+def _powers_of_wrong_blocks(pair: Tangents) -> dict[str, float]:
+    """Return {block: power of the penetration with which its errors grow} of the blocks that are wrong by themselves.
+
+    A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
+    """
+    errors = {name: pair.errors[block] for name, block in _blocks(pair).items()}
+    powers = {name: _power_of_depth(part) for name, part in errors.items() if not _is_small(part, pair.scale)}
+    return {name: power for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER}
 
 
 def _is_lumped(errors: FloatArray, pair: Tangents) -> bool:

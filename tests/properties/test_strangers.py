@@ -13,8 +13,8 @@ from contactverif.contract.property import Property
 from contactverif.run.draw import draw_cases
 from contactverif.run.registry import property_ids
 
-EXAMPLES = 5  # Cases of each property, random or spread over its list
-MOST_UNDECIDED = 5
+EXAMPLES = 50  # Cases of each property, random or spread over its list
+MOST_UNDECIDED = 50
 QUESTIONS = [question for question in map(load_property, property_ids()) if not question.bodies]
 
 
