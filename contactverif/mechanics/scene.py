@@ -41,6 +41,8 @@ _BODIES = "bodies_"  # The prefix of the parameters of a case that hold its bodi
 class Scene:
     """Elastic or rigid bodies in contact: a boundary value problem that `solve` solves with any formulation.
 
+    Its methods take the unknowns q (n_free,), a length each, and the share `factor` of loads and imposed displacements.
+
     Attributes
     ----------
     bodies : tuple[Body, ...]
@@ -96,15 +98,10 @@ class Scene:
 
     @cached_property
     def bodies_in_reach(self) -> tuple[int, ...]:
-        """The indices of the bodies that a body of the other side can reach, slaves first.
+        """The indices of the bodies that a body of the other side can reach, slaves first; an error if there are none.
 
         Two bodies can reach each other if the boxes around their contact boundaries meet. Each box is widened by its
         own diagonal, and holds both the reference and the first guess.
-
-        Raises
-        ------
-        MisuseError
-            If no slave can reach a master.
         """
         boxes = [_box_in_reach(body) for body in self.bodies]
 
@@ -208,105 +205,38 @@ class Scene:
         return np.concatenate([self.bodies[index].start[unknowns % 2] for index, unknowns in pairs])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the current positions of the interface's nodes.
-
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_unknowns,)
-            The positions z, flat, a length each.
-        """
+        """Return the current positions z (n_unknowns,) of the interface's nodes, a length each."""
         nodes: FloatArray = self.interface.nodes.reshape(-1)
         return nodes + factor * self.imposed_displacements + self.transformation @ q
 
     def bulk_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return S q − g: the forces that contact must supply.
-
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_free,)
-            The forces on the unknowns.
-        """
+        """Return S q − g (n_free,): the forces on the unknowns that contact must supply."""
         return self.stiffness @ q - factor * self.load
 
     def nodal_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the forces that contact must supply, at the nodes of the interface.
+        """Return the forces (n_nodes, 2) that contact must supply at the interface's nodes, in global axes.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_nodes, 2)
-            The forces in global axes, without the reactions of supports on the contact boundary.
+        Reactions of supports on the contact boundary are not among them.
         """
         return (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Return the displacements of all bodies; a body out of reach is solved on its own.
+        """Return the displacements (n_nodes, 2) of the nodes of each body, a length each, in global axes.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        list[FloatArray], each of shape (n_nodes, 2)
-            The displacements of the nodes of each body, a length each, in global axes.
+        A body out of reach is solved on its own.
         """
         return [body.displacements(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Return the stresses of all bodies at their Gauss points.
+        """Return the stresses (n_cells, n_points, 3) of each body at its Gauss points, force per length squared.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        list[FloatArray], each of shape (n_cells, n_points, 3)
-            For each body the normal stresses along its first and second axis and the shear stress, force per length
-            squared, positive in tension; a rigid body has no cells.
+        They are the normal stresses along its first and second axis, positive in tension, and the shear stress. A rigid
+        body has no cells.
         """
         return [body.stresses(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def case(self, *, seed: int = 0) -> Case:
-        """Return the scene as a case, at the first guess of its solution.
-
-        Parameters
-        ----------
-        seed : int
-            The seed of the case.
-
-        Returns
-        -------
-        Case
-            The case holds the whole scene; `scene_of` gives it back.
-        """
+        """Return the scene as a case, at the first guess of its solution; `scene_of` gives the scene back."""
         arrays = {_BODIES + name: values for name, values in pack_bodies(self.bodies, self.slave).items()}
         z = self.positions(self.start)
         case = Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)

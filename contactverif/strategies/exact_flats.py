@@ -36,12 +36,9 @@ _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return states of uniform penetration, near the origin, whose exact forces are rationals.
 
-    Returns
-    -------
-    SearchStrategy[Case] | None
-        Cases with the parameters of `contactverif.problems.flat_states.flat_state`, and "shift" (2,), a length each: a
-        translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point
-        projects inside the master.
+    Cases have the parameters of `contactverif.problems.flat_states.flat_state`, and "shift" (2,), a length each: a
+    translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point projects
+    inside the master.
     """
     return _exact_flat_cases() if interface is None else None
 

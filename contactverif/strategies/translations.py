@@ -37,14 +37,10 @@ _TILTS = st.sampled_from([0.25, -0.25, 0.0625, -0.0625])  # Slopes of a slave th
 
 @random_source("contactverif.strategies.translations.translated_cases")
 def translated_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return states near the origin that a translation by the parameter "shift" moves exactly.
+    """Return states near the origin that a translation by the parameter "shift" (2,), a length each, moves exactly.
 
-    Returns
-    -------
-    SearchStrategy[Case]
-        Cases with the parameter "shift" (2,), a length each: the translation of state and reference. The penetration is
-        2^-20 to 2^-7, and the translation up to 2^20, in units of segments of length 1 to 4. `Case.kind` is one of
-        `KINDS`; it is empty for a given interface.
+    State and reference move. The penetration is 2^-20 to 2^-7, and the translation up to 2^20, in units of segments of
+    length 1 to 4. `Case.kind` is one of `KINDS`; it is empty for a given interface.
     """
     return _translated_cases() if interface is None else _given_cases(interface)
 

@@ -99,16 +99,8 @@ def continuity(case: Case, subject: Subject) -> Measurement:
 def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: float) -> list[tuple[float, float]]:
     """Return the places and sizes of the jumps of a function on the way from 0 to 1, the largest first.
 
-    Parameters
-    ----------
-    function : Function
-        The function of some places (k,), with the values (k, n).
-    samples : FloatArray, shape (N_STEPS + 1, n)
-        Its values at `N_STEPS` + 1 equal distances.
-    halvings : int
-        The number of times that a step is halved.
-    allowed : float
-        Less than this share of the step's change counts as no jump, and ends the search.
+    The function takes places (k,) to values (k, n). Its samples (N_STEPS + 1, n) are at equal distances. A step is
+    halved `halvings` times; less than the share `allowed` of its change counts as no jump, and ends the search.
     """
     changes = np.diff(samples, axis=0)
     padded = np.vstack([changes[1], changes, changes[-2]])

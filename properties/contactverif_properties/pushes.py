@@ -59,16 +59,10 @@ def lift_slave(case: Case, height: float) -> Case:
 
 
 def open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
-    """Return the case with its slave lifted so that the gap grows along it, and only its first part is closed.
+    """Return a flat case with its slave lifted so that the gap grows along it, and only its first part is closed.
 
-    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight.
-
-    Parameters
-    ----------
-    case : Case
-        A flat case with a uniform penetration.
-    closed : float
-        The share of the slave's length that is closed.
+    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight. `closed` is
+    the share of the slave's length that is closed.
     """
     interface, positions = case.interface, case.positions.copy()
     depth, places = case.parameter("penetration"), _slave_places(case)
@@ -141,20 +135,9 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
 def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     """Lift a flat interface until all gaps are as wide as the penetration was deep, and until all but an end is open.
 
-    Parameters
-    ----------
-    case : Case
-        A flat case with the parameter `penetration`, a length.
-    subject : Subject
-        The formulation.
-
-    Returns
-    -------
-    Measurement
-        The largest force across the open gap over ε̂ |g| L. The largest force far from the contact zone over the largest
-        force; missing where no node is that far, and with multipliers, since `complementarity` judges those that pull.
-        The pull of a contact point, in the flat state and where one end alone is closed. Broken: nothing begins where
-        the surfaces penetrate, or the slave is pulled.
+    The force far from the contact zone is missing where no node is that far, and with multipliers, since
+    `complementarity` judges those that pull. The pull of a contact point is that of the flat state and of the one with
+    a closed end. The measurement is broken if nothing begins where the surfaces penetrate, or if the slave is pulled.
     """
     formulation = subject.for_case(case)
     depth = case.parameter("penetration")
