@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.body import Body
-from contactverif.contract.case import Case
+from contactverif.contract.case import BODIES, Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.mechanics.bulk import (
@@ -33,8 +33,6 @@ from contactverif.mechanics.bulk import (
     loose_modes,
 )
 from contactverif.mechanics.packed_bodies import body_name, pack_bodies, unpack_bodies
-
-_BODIES = "bodies_"  # The prefix of the parameters of a case that hold its bodies.
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,11 +235,11 @@ class Scene:
 
     def case(self, *, seed: int = 0) -> Case:
         """Return the scene as a case, at the first guess of its solution; `scene_of` gives the scene back."""
-        arrays = {_BODIES + name: values for name, values in pack_bodies(self.bodies, self.slave).items()}
+        arrays = {BODIES + name: values for name, values in pack_bodies(self.bodies, self.slave).items()}
         z = self.positions(self.start)
         case = Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
-        if all(body.name == body_name(arrays[_BODIES + "is_slave"], index) for index, body in enumerate(self.bodies)):
-            _ORIGINS.remember(case, self)
+        if all(body.name == body_name(arrays[BODIES + "is_slave"], index) for index, body in enumerate(self.bodies)):
+            _remember(case, self)
         return case
 
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
@@ -258,36 +256,24 @@ class Scene:
 
 def has_bodies(case: Case) -> bool:
     """Return whether the case holds a scene."""
-    return f"{_BODIES}nodes" in case.parameters
+    return bool(case.packed_bodies)
 
 
-class _Origins:
-    """The scenes of the last cases, so that a scene that has just been made is not made again from its case."""
-
-    def __init__(self) -> None:
-        self._scenes: OrderedDict[Case, Scene] = OrderedDict()  # By identity: cases have no other equality.
-
-    def remember(self, case: Case, scene: Scene) -> None:
-        """Keep the scene of a case, and let go of the oldest one if there are too many."""
-        self._scenes[case] = scene
-        if len(self._scenes) > CACHE_SIZE:
-            self._scenes.popitem(last=False)
-
-    def find(self, case: Case) -> Scene | None:
-        """Return the scene of a case; None if it is not there."""
-        return self._scenes.get(case)
-
-    def forget(self) -> None:
-        """Let go of all scenes."""
-        self._scenes.clear()
+# The scenes of the last cases, so that a scene that has just been made is not made again from its case. They are kept
+# by identity: cases have no other equality.
+_ORIGINS: OrderedDict[Case, Scene] = OrderedDict()
 
 
-_ORIGINS = _Origins()
+def _remember(case: Case, scene: Scene) -> None:
+    """Keep the scene of a case, and let go of the oldest one if there are too many."""
+    _ORIGINS[case] = scene
+    if len(_ORIGINS) > CACHE_SIZE:
+        _ORIGINS.popitem(last=False)
 
 
 def forget_bodies() -> None:
     """Let go of all scenes and condensed bodies, before the time that they take is measured."""
-    _ORIGINS.forget()
+    _ORIGINS.clear()
     forget_condensed()
 
 
@@ -297,17 +283,15 @@ def scene_of(case: Case) -> Scene:
     The last cases have their scenes still, with whatever is condensed of them. Any other case, such as a stored one,
     gives the same scene to the last bit.
     """
-    if (scene := _ORIGINS.find(case)) is not None:
+    if (scene := _ORIGINS.get(case)) is not None:
         return scene
-    if not has_bodies(case):
+    packed = case.packed_bodies
+    if not packed:
         raise MisuseError("case", "an interface without bodies", "a case made of a scene")
-    packed = {
-        name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
-    }
-    facts = {name: values for name, values in case.parameters.items() if not name.startswith(_BODIES)}
+    facts = {name: values for name, values in case.parameters.items() if not name.startswith(BODIES)}
     bodies, slave, master = unpack_bodies(packed)
     scene = Scene(bodies, slave, master, case.penalty, facts, case.name)
-    _ORIGINS.remember(case, scene)
+    _remember(case, scene)
     return scene
 
 
