@@ -36,11 +36,6 @@ SLOPE = Quantity(
 Function = Callable[[FloatArray], FloatArray]
 
 
-def promise_continuity(traits: Traits) -> bool | None:
-    """Return True for a promise of C0 or C1, False for the statement that forces jump, None for nothing."""
-    return None if traits.promises.continuity is None else traits.promises.continuity != "jumps"
-
-
 def refuse_unstated_continuity(traits: Traits) -> str:
     """Return why the question makes no sense for a formulation, or an empty string if it does."""
     if traits.rules.enforcement == "multiplier":
@@ -53,7 +48,7 @@ def refuse_unstated_continuity(traits: Traits) -> str:
     family="invariants",
     quantities=(FORCE, SLOPE),
     cases=Cases.random(sliding_cases),
-    promise=promise_continuity,
+    promise=lambda traits: None if traits.promises.continuity is None else traits.promises.continuity != "jumps",
     applicable=refuse_unstated_continuity,
 )
 def continuity(case: Case, subject: Subject) -> Measurement:

@@ -44,16 +44,12 @@ class Constraints:
         """Return which multipliers (n_multipliers,) have something opposite."""
         return self.areas > 0
 
-    @property
-    def knows_inactive_areas(self) -> bool:
-        """Return whether the area of an inactive constraint is known: a second pass may be covered in part."""
-        return self.rules.penalty == "nodal" or self.rules.area is not None
-
     def errors(self, rows: FloatArray, multipliers: FloatArray, gap: float) -> FloatArray:
         """Return the errors of constraint rows (n_multipliers,) over their tolerance; infinite for a wrong sign."""
         active = self.active(multipliers, gap)
         sizes = self.tolerance * self.spreads * np.where(active, abs(gap), np.abs(multipliers))
-        known = active | self.knows_inactive_areas & (self.sees | (self.rules.penalty == "nodal"))
+        # The area of an inactive constraint may be unknown: a second pass may be covered in part.
+        known = active | (self.rules.penalty == "nodal") | (self.rules.area is not None) & self.sees
         signs = np.where(rows * multipliers > 0, 0.0, np.inf)  # The area of an inactive constraint is positive.
         errors: FloatArray = np.where(known, np.abs(rows - self.right(multipliers, gap)) / sizes, signs)
         return errors
