@@ -289,9 +289,8 @@ def _describe_need(name: str, option: str, value: Any) -> str:
     if option == "sides":
         return "" if value in ("rollers", "free") else "rollers or free"
     if option == "refine":
-        finest, is_whole = _FINEST if name in BLOCKS else _FINEST_DISK, isinstance(value, int | np.integer)
-        is_right = is_whole and not isinstance(value, bool) and 1 <= value <= finest
-        return "" if is_right else f"a whole number from 1 to {finest}"
+        finest = _FINEST if name in BLOCKS else _FINEST_DISK
+        return "" if _is_whole(value) and 1 <= value <= finest else f"a whole number from 1 to {finest}"
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return "a number"
     low, high, needed = -inf, inf, "a finite number"
@@ -300,6 +299,10 @@ def _describe_need(name: str, option: str, value: Any) -> str:
     elif option in _ABOVE_ZERO:
         low, needed = 0.0, "a number > 0"
     return "" if low < _as_float(value) < high else needed
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def _as_float(value: Any) -> float:

@@ -82,8 +82,8 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more.
     """
     traits, total = subject.traits, linear_gaps.slave_forces(case, subject).sum(axis=0)
-    if not total.any() and case.kind == STEEP and traits.rules.gap is None:
-        return Measurement()  # No stated rule says that the slave sees what it is so steep to.
+    if not total.any() and _may_overlook(case, traits):
+        return Measurement()
     normal = linear_gaps.directions(case)[0 if traits.rules.force_along == "master normal" else 1]
     push, across = float(total @ normal), abs(float(total[0] * normal[1] - total[1] * normal[0]))
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
@@ -100,6 +100,11 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
         reach = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
         undecided = explain_by_kink(FrozenState.at(formulation, case), reach, {"forces": error})
     return Measurement(check_all(values, tolerance), undecided, broken)
+
+
+def _may_overlook(case: Case, traits: Traits) -> bool:
+    """Return whether no stated rule says that the slave sees what it is so steep to."""
+    return case.kind == STEEP and traits.rules.gap is None
 
 
 def refuse_unknown_integral(traits: Traits) -> str:

@@ -275,11 +275,10 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
     if (kink := find_kink(state, 4 * step, direction)) or state.pairing is None:
         return kink, ""
     beside = [pair(sign * 2.0**-10 * np.arange(1, 4)) for sign in (1, -1)]
-    if all(pairing == pairings[0] for pairings in beside for pairing in pairings):
+    if all(map(_all_agree, beside)):
         return "a kink: the pairing changes here, and is steady on either side", ""
     around = [pair(scale * np.arange(-2, 4)) for scale in (1, 2.0**-5, 2.0**-10)]
-    changes = all(first != second for pairings in around for first, second in combinations(pairings, 2))
-    if changes and _change_forces(list(chain(*around)), state, directions):
+    if all(map(_all_differ, around)) and _change_forces(list(chain(*around)), state, directions):
         return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
     return "", ""
 
@@ -296,6 +295,16 @@ def _change_forces(pairings: Sequence[Pairing | None], state: FrozenState, direc
     roundoff = COORDINATE_ROUNDING * case.largest_coordinate * slope
     others = (replace(state, pairing=pairing).residual_at(places) for pairing in pairings)
     return any(np.abs(other - forces).max() > roundoff for other in others)
+
+
+def _all_agree(pairings: Sequence[Pairing | None]) -> bool:
+    """Return whether all of some pairings are alike."""
+    return all(pairing == pairings[0] for pairing in pairings)
+
+
+def _all_differ(pairings: Sequence[Pairing | None]) -> bool:
+    """Return whether no two of some pairings are alike."""
+    return all(first != second for first, second in combinations(pairings, 2))
 
 
 def first_directions(case: Case, n_random: int) -> FloatArray:
