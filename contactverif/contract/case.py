@@ -18,6 +18,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import clean, name_line
 from contactverif.contract.interface import Interface, Surface
 
+BODIES = "bodies_"  # The prefix of the parameters that hold the bodies of a scene.
 _PREFIX = "parameter_"
 
 
@@ -133,6 +134,12 @@ class Case:
     def n_segments(self) -> int:
         """The number of segments of both sides; N in the tolerances."""
         return len(self.interface.slave) + len(self.interface.master)
+
+    @property
+    def packed_bodies(self) -> dict[str, FloatArray]:
+        """The arrays that hold the bodies of a scene, by their names without prefix; none for a mere interface."""
+        arrays = self.parameters.items()
+        return {name.removeprefix(BODIES): values for name, values in arrays if name.startswith(BODIES)}
 
     def parameter(self, name: str) -> float:
         """Return a parameter that is one number.

@@ -243,12 +243,8 @@ class Formulation(ResidualOnly, Protocol):
 
         Parameters
         ----------
-        interface : Interface
-            The meshes in their reference configuration.
-        pairing : Pairing
-            What ``pair`` returned.
-        z : FloatArray, shape (n_unknowns,)
-            One state: current positions, then multipliers.
+        interface, pairing, z : Interface, Pairing, FloatArray of shape (n_unknowns,)
+            As for ``residual``; z is one state.
 
         Returns
         -------
@@ -266,12 +262,8 @@ class Formulation(ResidualOnly, Protocol):
 
         Parameters
         ----------
-        interface : Interface
-            The meshes in their reference configuration.
-        pairing : Pairing
-            What ``pair`` returned.
-        z : FloatArray, shape (n_unknowns,)
-            One state: current positions, then multipliers. Never a batch.
+        interface, pairing, z : Interface, Pairing, FloatArray of shape (n_unknowns,)
+            As for ``residual``; z is one state, never a batch.
 
         Returns
         -------
@@ -287,12 +279,8 @@ class Formulation(ResidualOnly, Protocol):
 
         Parameters
         ----------
-        interface : Interface
-            The meshes in their reference configuration.
-        pairing : Pairing
-            What ``pair`` returned.
-        z : FloatArray, shape (n_unknowns,)
-            One state: current positions, then multipliers.
+        interface, pairing, z : Interface, Pairing, FloatArray of shape (n_unknowns,)
+            As for ``residual``; z is one state.
 
         Returns
         -------

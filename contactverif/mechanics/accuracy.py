@@ -36,24 +36,14 @@ GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 ti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A solved scene, as its errors need it, whoever solved it."""
+    """A solved scene, as its errors need it."""
 
     scene: Scene  # It has the distributed penalty ε̂ that it was solved with.
     state: Case  # The positions, multipliers behind them.
     forces: FloatArray  # (n_nodes, 2), by which contact pushes the nodes
-    points: ContactPoints | None = None  # None if none are reported
-    nodal: bool = False  # Pressures of points are nodal forces (trait `penalty="nodal"`).
-    trace: Trace | None = None  # Newton's method, iterate by iterate; None if another code solved the scene.
-
-    @classmethod
-    def from_displacements(cls, scene: Scene, displacements: FloatArray) -> Solution:
-        """Return the solution of another code from its displacements (n_nodes, 2) of the interface's nodes.
-
-        The forces are those that the bodies need for these displacements, supports included.
-        """
-        state = Case(scene.interface, (scene.interface.nodes + displacements).reshape(-1), scene.penalty)
-        q = scene.transformation.T @ displacements.reshape(-1)
-        return cls(scene, state, scene.nodal_forces(np.asarray(q)))
+    points: ContactPoints | None  # None if none are reported
+    nodal: bool  # Pressures of points are nodal forces (trait `penalty="nodal"`).
+    trace: Trace  # Newton's method, iterate by iterate.
 
     @property
     def interface(self) -> Interface:
@@ -68,21 +58,21 @@ class Solution:
     @property
     def n_iterations(self) -> int:
         """The number of iterations of Newton's method."""
-        return self.trace.n_iterations if self.trace is not None else 0
+        return self.trace.n_iterations
 
     @property
     def end(self) -> str:
         """The end of Newton's method, in words."""
-        return self.trace.end.label if self.trace is not None else ""
+        return self.trace.end.label
 
     @property
     def balanced(self) -> bool:
         """True if Newton's method found a solution (up to BALANCED), or came as near to one as roundoff lets it."""
-        return self.trace is None or self.trace.end in (End.CONVERGED, End.STAGNATED)
+        return self.trace.end in (End.CONVERGED, End.STAGNATED)
 
     def is_balanced_to(self, force: float) -> bool:
         """Return whether it is a solution, or out of balance by no more than a force."""
-        return self.balanced or (self.trace is not None and bool(self.trace.residuals[-1] <= force))
+        return self.balanced or bool(self.trace.residuals[-1] <= force)
 
 
 def solve_for_accuracy(
@@ -212,16 +202,15 @@ def displacement_error(
     return float(np.sqrt(squares[0] / squares[1]))
 
 
-def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | FloatArray, floor: float = 0.0) -> float:
+def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | FloatArray) -> float:
     """Return the slope of log error over log h, fitted by least squares.
 
-    Errors up to the floor are roundoff, and do not count. The rate is infinite if fewer than two errors are above the
-    floor, NaN if an error is.
+    Errors of 0 do not count. The rate is infinite if fewer than two errors are above 0, NaN if an error is.
     """
     values = np.asarray(errors, dtype=np.float64)
     if np.isnan(values).any():
         return np.nan
-    counted = values > floor
+    counted = values > 0
     if counted.sum() < 2:
         return np.inf
     return float(np.polyfit(np.log(np.asarray(sizes)[counted]), np.log(values[counted]), 1)[0])

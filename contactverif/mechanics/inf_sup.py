@@ -26,6 +26,7 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation
+from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.scene import Scene
 
 # A singular value below this share of the largest one is 0. Differences are exact to u^(2/3), and no constant that was
@@ -106,8 +107,7 @@ def mean_node_lengths(interface: Interface, forces: FloatArray) -> FloatArray:
 
     It is half of the segments beside the slave nodes that it pushes, weighted by its forces.
     """
-    halves = np.repeat(interface.slave.lengths(interface.nodes) / 2, 2)
-    lengths = np.bincount(interface.slave.segments.reshape(-1), weights=halves, minlength=interface.n_slave_nodes)
+    lengths = shape_integrals(interface.slave, interface.nodes)[: interface.n_slave_nodes]
     sizes = np.linalg.norm(forces.reshape(len(forces), -1, 2)[:, : interface.n_slave_nodes], axis=2)
     totals = sizes.sum(axis=1)
     means: FloatArray = sizes @ lengths / np.where(totals > 0, totals, 1.0)

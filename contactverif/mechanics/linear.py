@@ -143,11 +143,7 @@ def _estimate_inverse_norm(factors: Any, n: int, right: FloatArray, step: FloatA
 
     Pivots alone do not reveal a singular matrix. The bound is the largest of three growths: that of equal entries (one
     column, since more would be random), which misses what is orthogonal to them; that of a vector of alternating signs,
-    as in LAPACK's dlacn2; and that of the right-hand side.
-
-    References
-    ----------
-    Higham, ACM Trans. Math. Software 14 (1988) 381–396.
+    as in LAPACK's dlacn2 (Higham, ACM Trans. Math. Software 14 (1988) 381–396); and that of the right-hand side.
     """
     inverse = LinearOperator((n, n), factors.solve, lambda v: factors.solve(v, "T"), dtype=np.float64)
     alternating = np.where(np.arange(n) % 2, -1.0, 1.0) * (1 + np.arange(n) / max(n - 1, 1))

@@ -181,7 +181,9 @@ def _falls_fast(record: Record, first: int, residual: FloatArray, floor: FloatAr
 def _end(record: Record, first: int, n_free: int, *, keeps: bool) -> End | None:
     """Return how the load step whose iterates begin at number `first` has ended, None if it goes on."""
     residuals, roundings = record.residuals[first:], record.roundings[first:]
-    if _is_at_rest(roundings[-1], keeps=keeps):
+    # The floor of a matrix that is kept is that of another state, whose forces may be larger. So what still falls fast,
+    # `keeps`, is not at rest, however small it is.
+    if roundings[-1] <= (0 if keeps else 1):
         return End.CONVERGED
     if not np.isfinite(residuals[-1]) or residuals[-1] > DIVERGENCE_FACTOR * max(residuals[0], record.floors[first]):
         return End.DIVERGED
@@ -191,15 +193,6 @@ def _end(record: Record, first: int, n_free: int, *, keeps: bool) -> End | None:
     if earlier and min(latest) >= min(earlier) <= NEAR_CONVERGENCE:
         return End.STAGNATED
     return None
-
-
-def _is_at_rest(rounding: float, *, keeps: bool) -> bool:
-    """Return whether a residual, over its floor, is a zero.
-
-    The floor of a matrix that is kept is that of another state, whose forces may be larger. So what still falls fast,
-    `keeps`, is not at rest, however small it is.
-    """
-    return rounding == 0 or (rounding <= 1 and not keeps)
 
 
 def _alternates(q: list[FloatArray]) -> bool:

@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.body import Body
-from contactverif.contract.case import Case
+from contactverif.contract.case import BODIES, Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.mechanics.bulk import (
@@ -34,12 +34,12 @@ from contactverif.mechanics.bulk import (
 )
 from contactverif.mechanics.packed_bodies import body_name, pack_bodies, unpack_bodies
 
-_BODIES = "bodies_"  # The prefix of the parameters of a case that hold its bodies.
-
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Elastic or rigid bodies in contact: a boundary value problem that `solve` solves with any formulation.
+
+    Its methods take the unknowns q (n_free,), a length each, and the share `factor` of loads and imposed displacements.
 
     Attributes
     ----------
@@ -96,15 +96,10 @@ class Scene:
 
     @cached_property
     def bodies_in_reach(self) -> tuple[int, ...]:
-        """The indices of the bodies that a body of the other side can reach, slaves first.
+        """The indices of the bodies that a body of the other side can reach, slaves first; an error if there are none.
 
         Two bodies can reach each other if the boxes around their contact boundaries meet. Each box is widened by its
         own diagonal, and holds both the reference and the first guess.
-
-        Raises
-        ------
-        MisuseError
-            If no slave can reach a master.
         """
         boxes = [_box_in_reach(body) for body in self.bodies]
 
@@ -208,110 +203,43 @@ class Scene:
         return np.concatenate([self.bodies[index].start[unknowns % 2] for index, unknowns in pairs])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the current positions of the interface's nodes.
-
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_unknowns,)
-            The positions z, flat, a length each.
-        """
+        """Return the current positions z (n_unknowns,) of the interface's nodes, a length each."""
         nodes: FloatArray = self.interface.nodes.reshape(-1)
         return nodes + factor * self.imposed_displacements + self.transformation @ q
 
     def bulk_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return S q − g: the forces that contact must supply.
-
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_free,)
-            The forces on the unknowns.
-        """
+        """Return S q − g (n_free,): the forces on the unknowns that contact must supply."""
         return self.stiffness @ q - factor * self.load
 
     def nodal_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the forces that contact must supply, at the nodes of the interface.
+        """Return the forces (n_nodes, 2) that contact must supply at the interface's nodes, in global axes.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        FloatArray, shape (n_nodes, 2)
-            The forces in global axes, without the reactions of supports on the contact boundary.
+        Reactions of supports on the contact boundary are not among them.
         """
         return (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Return the displacements of all bodies; a body out of reach is solved on its own.
+        """Return the displacements (n_nodes, 2) of the nodes of each body, a length each, in global axes.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        list[FloatArray], each of shape (n_nodes, 2)
-            The displacements of the nodes of each body, a length each, in global axes.
+        A body out of reach is solved on its own.
         """
         return [body.displacements(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Return the stresses of all bodies at their Gauss points.
+        """Return the stresses (n_cells, n_points, 3) of each body at its Gauss points, force per length squared.
 
-        Parameters
-        ----------
-        q : FloatArray, shape (n_free,)
-            The unknowns, a length each.
-        factor : float
-            The share of loads and imposed displacements.
-
-        Returns
-        -------
-        list[FloatArray], each of shape (n_cells, n_points, 3)
-            For each body the normal stresses along its first and second axis and the shear stress, force per length
-            squared, positive in tension; a rigid body has no cells.
+        They are the normal stresses along its first and second axis, positive in tension, and the shear stress. A rigid
+        body has no cells.
         """
         return [body.stresses(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def case(self, *, seed: int = 0) -> Case:
-        """Return the scene as a case, at the first guess of its solution.
-
-        Parameters
-        ----------
-        seed : int
-            The seed of the case.
-
-        Returns
-        -------
-        Case
-            The case holds the whole scene; `scene_of` gives it back.
-        """
-        arrays = {_BODIES + name: values for name, values in pack_bodies(self.bodies, self.slave).items()}
+        """Return the scene as a case, at the first guess of its solution; `scene_of` gives the scene back."""
+        arrays = {BODIES + name: values for name, values in pack_bodies(self.bodies, self.slave).items()}
         z = self.positions(self.start)
         case = Case(self.interface, z, self.penalty, {**self.facts, **arrays}, seed, self.name)
-        if all(body.name == body_name(arrays[_BODIES + "is_slave"], index) for index, body in enumerate(self.bodies)):
-            _ORIGINS.remember(case, self)
+        if all(body.name == body_name(arrays[BODIES + "is_slave"], index) for index, body in enumerate(self.bodies)):
+            _remember(case, self)
         return case
 
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
@@ -328,36 +256,24 @@ class Scene:
 
 def has_bodies(case: Case) -> bool:
     """Return whether the case holds a scene."""
-    return f"{_BODIES}nodes" in case.parameters
+    return bool(case.packed_bodies)
 
 
-class _Origins:
-    """The scenes of the last cases, so that a scene that has just been made is not made again from its case."""
-
-    def __init__(self) -> None:
-        self._scenes: OrderedDict[Case, Scene] = OrderedDict()  # By identity: cases have no other equality.
-
-    def remember(self, case: Case, scene: Scene) -> None:
-        """Keep the scene of a case, and let go of the oldest one if there are too many."""
-        self._scenes[case] = scene
-        if len(self._scenes) > CACHE_SIZE:
-            self._scenes.popitem(last=False)
-
-    def find(self, case: Case) -> Scene | None:
-        """Return the scene of a case; None if it is not there."""
-        return self._scenes.get(case)
-
-    def forget(self) -> None:
-        """Let go of all scenes."""
-        self._scenes.clear()
+# The scenes of the last cases, so that a scene that has just been made is not made again from its case. They are kept
+# by identity: cases have no other equality.
+_ORIGINS: OrderedDict[Case, Scene] = OrderedDict()
 
 
-_ORIGINS = _Origins()
+def _remember(case: Case, scene: Scene) -> None:
+    """Keep the scene of a case, and let go of the oldest one if there are too many."""
+    _ORIGINS[case] = scene
+    if len(_ORIGINS) > CACHE_SIZE:
+        _ORIGINS.popitem(last=False)
 
 
 def forget_bodies() -> None:
     """Let go of all scenes and condensed bodies, before the time that they take is measured."""
-    _ORIGINS.forget()
+    _ORIGINS.clear()
     forget_condensed()
 
 
@@ -367,17 +283,15 @@ def scene_of(case: Case) -> Scene:
     The last cases have their scenes still, with whatever is condensed of them. Any other case, such as a stored one,
     gives the same scene to the last bit.
     """
-    if (scene := _ORIGINS.find(case)) is not None:
+    if (scene := _ORIGINS.get(case)) is not None:
         return scene
-    if not has_bodies(case):
+    packed = case.packed_bodies
+    if not packed:
         raise MisuseError("case", "an interface without bodies", "a case made of a scene")
-    packed = {
-        name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
-    }
-    facts = {name: values for name, values in case.parameters.items() if not name.startswith(_BODIES)}
+    facts = {name: values for name, values in case.parameters.items() if not name.startswith(BODIES)}
     bodies, slave, master = unpack_bodies(packed)
     scene = Scene(bodies, slave, master, case.penalty, facts, case.name)
-    _ORIGINS.remember(case, scene)
+    _remember(case, scene)
     return scene
 
 

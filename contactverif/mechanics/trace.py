@@ -199,22 +199,11 @@ class Record:
 
     def trace(self, scene: Scene, end: End, solve_seconds: float) -> Trace:
         """Return the trace of the iterates so far."""
-        return Trace(
-            scene=scene,
-            end=end,
-            u=freeze(np.array(self.u), np.float64),
-            factors=freeze(self.factors, np.float64),
-            residuals=freeze(self.residuals, np.float64),
-            energies=freeze(self.energies, np.float64),
-            floors=freeze(self.floors, np.float64),
-            roundings=freeze(self.roundings, np.float64),
-            changes=freeze(self.changes, np.int64),
-            conditions=freeze(self.conditions, np.float64),
-            deficiencies=freeze(self.deficiencies, np.int64),
-            solve_seconds=solve_seconds,
-            pairings=tuple(self.pairings),
-            forces=freeze(self.forces, np.float64),
-        )
+        names = ("factors", "residuals", "energies", "floors", "roundings", "conditions", "forces")
+        arrays: dict[str, Any] = {name: freeze(getattr(self, name), np.float64) for name in names}
+        arrays |= {name: freeze(getattr(self, name), np.int64) for name in ("changes", "deficiencies")}
+        u = freeze(np.array(self.u), np.float64)
+        return Trace(scene, end, u, solve_seconds=solve_seconds, pairings=tuple(self.pairings), **arrays)
 
 
 def largest_rounding(residual: FloatArray, floor: FloatArray) -> float:

@@ -73,17 +73,15 @@ def seen_excess(
     """
     view = slave_normal_view(lattice, points, segments)
     past = np.maximum(np.maximum(-view.xi.floats(), view.xi.floats() - 1), 0.0) * view.master_length
-    farther = _farther_than_nearest(lattice, points, slave_segment, segments, view)
+    farther = _farther_than_nearest(lattice, points, segments, view)
     if cells and farther.any():
         middle = _middles(lattice, slave_segment, segments)
         in_middle = slave_normal_view(lattice, middle, segments)
-        farther = np.minimum(farther, _farther_than_nearest(lattice, middle, slave_segment, segments, in_middle))
+        farther = np.minimum(farther, _farther_than_nearest(lattice, middle, segments, in_middle))
     return np.where(view.cosine > 0, np.maximum(past, farther), np.inf)
 
 
-def _farther_than_nearest(
-    lattice: Lattice, points: ExactPoints, slave_segment: IntArray, choice: IntArray, view: View
-) -> FloatArray:
+def _farther_than_nearest(lattice: Lattice, points: ExactPoints, choice: IntArray, view: View) -> FloatArray:
     """Return how much larger |gap| is on the chosen segments than on the nearest ones that are seen, a length ≥ 0.
 
     Segments deeper or farther than two lengths of both need not count as contact, and so are no rivals.

@@ -32,7 +32,7 @@ def kind_of(interface: Interface, z: FloatArray, slave_segment: int, c: float) -
     The arguments are those of `is_of_kind`.
     """
     probe = _Probe(interface, z, slave_segment, c)
-    return next((kind for kind in _MOST_SPECIAL_FIRST if KIND_TESTS[kind](probe)), "other")
+    return next((kind for kind, test in KIND_TESTS.items() if test(probe)), "other")
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,45 +229,34 @@ def _other_node(probe: _Probe) -> bool:
     return _inside(probe) and min(distances.values()) < least
 
 
-def _three_segments(probe: _Probe) -> bool:
-    return sum(foot.is_inside for foot in probe.tied) >= 3
-
-
 def _three_nodes(probe: _Probe) -> bool:
     return len({probe.master[foot.segment][int(foot.xi >= 1)] for foot in probe.tied if not foot.is_inside}) >= 3
 
 
+# The most special kind first: a coincidence is more special than a direction, and a direction more than a place.
 KIND_TESTS: dict[str, Callable[[_Probe], bool]] = {
-    "inside a segment": _inside,
-    "first of several segments": lambda probe: _role(probe, "first"),
-    "intermediate of several segments": lambda probe: _role(probe, "intermediate"),
-    "last of several segments": lambda probe: _role(probe, "last"),
-    "node hit exactly": lambda probe: _at_node(probe, free=False),
-    "coincident nodes": _coincident,
-    "convex vertex": lambda probe: _vertex(probe, 1),
-    "concave vertex": lambda probe: _vertex(probe, -1),
-    "master angle below 90°": lambda probe: _vertex(probe, 0, sharp=True),
-    "equidistant from three segments": _three_segments,
+    "equidistant from three segments": lambda probe: sum(foot.is_inside for foot in probe.tied) >= 3,
     "equidistant from three nodes": _three_nodes,
+    "coincident nodes": _coincident,
+    "node hit exactly": lambda probe: _at_node(probe, free=False),
     "free end hit exactly": lambda probe: _at_node(probe, free=True),
+    "edge-on, 90°": lambda probe: _angle(probe, 90),
+    "from behind": lambda probe: _angle(probe, 180),
+    "edge-on, 89.9°": lambda probe: _angle(probe, 89.9),
     "past a free end, inside τ": lambda probe: _past_end(probe, inside=True),
     "past a free end, outside τ": lambda probe: _past_end(probe, inside=False),
     "overlap going to zero": _small_overlap,
-    "edge-on, 89.9°": lambda probe: _angle(probe, 89.9),
-    "edge-on, 90°": lambda probe: _angle(probe, 90),
-    "from behind": lambda probe: _angle(probe, 180),
+    "nearest node not on nearest segment": _other_node,
     "second body behind": _second_body,
     "closing segment": _closing,
-    "nearest node not on nearest segment": _other_node,
+    "first of several segments": lambda probe: _role(probe, "first"),
+    "intermediate of several segments": lambda probe: _role(probe, "intermediate"),
+    "last of several segments": lambda probe: _role(probe, "last"),
+    "inside a segment": _inside,
+    "master angle below 90°": lambda probe: _vertex(probe, 0, sharp=True),
+    "convex vertex": lambda probe: _vertex(probe, 1),
+    "concave vertex": lambda probe: _vertex(probe, -1),
 }
-# A coincidence is more special than a direction, and a direction more special than a place.
-_MOST_SPECIAL_FIRST = (
-    *("equidistant from three segments", "equidistant from three nodes", "coincident nodes", "node hit exactly"),
-    *("free end hit exactly", "edge-on, 90°", "from behind", "edge-on, 89.9°", "past a free end, inside τ"),
-    *("past a free end, outside τ", "overlap going to zero", "nearest node not on nearest segment"),
-    *("second body behind", "closing segment", "first of several segments", "intermediate of several segments"),
-    *("last of several segments", "inside a segment", "master angle below 90°", "convex vertex", "concave vertex"),
-)
 
 
 def _minus(a: Vector, b: Vector) -> Vector:

@@ -10,7 +10,7 @@ Rule for the next editor: the master reaches beyond the slave at either end, so 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import radians
 
 import numpy as np
 
@@ -55,13 +55,6 @@ class Arcs:
     def length(self) -> float:
         """The length of the slave's arc."""
         return self.slave_radius * radians(self.slave[1] - self.slave[0])
-
-    @property
-    def slave_force(self) -> FloatArray:
-        """The force (2,) that pushes the slave: the integral of the pressure along its arc, towards its body."""
-        first, last = map(radians, self.slave)
-        outwards = np.array([sin(last) - sin(first), cos(first) - cos(last)]) * self.slave_radius
-        return self.pressure * (-outwards if self.convex_slave else outwards)
 
     def case(self, refine: int = 1, name: str = "") -> Case:
         """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike."""

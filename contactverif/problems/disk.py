@@ -28,7 +28,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle, block
+from contactverif.mechanics.simple_bodies import Rectangle, block, grid_cells
 from contactverif.problems.hertz import half_width, layer_half_width, solve_winkler_contact
 from contactverif.problems.line_pressure import LinePressure
 
@@ -201,8 +201,7 @@ def _unit_disk(
     loops = np.vstack([walk, len(square) + np.arange(rings[..., 0].size).reshape(len(rings), -1)])
     following = np.roll(loops, -1, axis=1)
     around = np.stack([loops[:-1], loops[1:], following[1:], following[:-1]], axis=-1)
-    inside = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1)
-    cells = np.concatenate([inside.reshape(-1, 4), around.reshape(-1, 4)])
+    cells = np.concatenate([grid_cells(number), around.reshape(-1, 4)])
     return np.vstack([square, rings.reshape(-1, 2)]), cells, loops[-1, : len(below)]
 
 

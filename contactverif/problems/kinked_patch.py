@@ -21,6 +21,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.simple_bodies import grid_cells
 from contactverif.problems.problem import Problem, ProblemInstance
 from contactverif.problems.uniform_stress import pose_uniform
 
@@ -133,7 +134,6 @@ def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
     low, high = (edge, far) if upper else (far, edge)
     rows = [low + layer / LAYERS * (high - low) for layer in range(LAYERS)] + [high]
     number = np.arange((LAYERS + 1) * len(edge)).reshape(LAYERS + 1, len(edge))
-    cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
     sides = [number[0], number[:, -1], number[-1, ::-1], number[::-1, 0]]  # Around the block, which is on the left.
     contact = sides.pop(0 if upper else 2)
     nodes = np.vstack(rows)
@@ -149,7 +149,7 @@ def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
         load[fixed] = 0.0
     return Body(
         nodes,
-        cells,
+        grid_cells(number),
         np.column_stack([contact[:-1], contact[1:]]),
         problem.young,
         problem.poisson,

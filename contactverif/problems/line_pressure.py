@@ -15,7 +15,6 @@ contact) and 5.8 (elastic foundation).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import ceil, log2, pi
@@ -182,7 +181,13 @@ class LinePressure:
 
 def hertz_pressure(half_width: float, peak: float) -> LinePressure:
     """Return Hertz' pressure p0 √(1 − x²/a²) (Johnson, 4.44)."""
-    return _fit(half_width, lambda gap: peak * np.sqrt(gap * (2 - gap)), _HERTZ_LEVELS)
+    points, weights = gauss_rule(TERMS)
+    begin, end = 2.0 ** -np.arange(_HERTZ_LEVELS + 1.0), np.append(2.0 ** -np.arange(1.0, _HERTZ_LEVELS + 1), 0.0)
+    gaps = (begin + end)[:, None] / 2 - (begin - end)[:, None] / 2 * points  # 1 − |x|/a keeps its digits at the edge.
+    factors = (np.arange(TERMS) + 0.5) * weights[:, None] * legendre.legvander(points, TERMS - 1)
+    half = peak * np.sqrt(gaps * (2 - gaps)) @ factors
+    coefficients = np.concatenate([half[::-1] * (-1.0) ** np.arange(TERMS), half])
+    return LinePressure(half_width, _edges(_HERTZ_LEVELS), coefficients)
 
 
 def hertz_contact(half_width: float, radius: float, stiffness: float) -> LinePressure:
@@ -291,14 +296,3 @@ def _edges(levels: int) -> FloatArray:
     half = 1 - 2.0 ** -np.arange(levels + 1)
     right = np.append(half, 1.0)
     return np.concatenate([-right[:0:-1], right])
-
-
-def _fit(half_width: float, pressure: Callable[[FloatArray], FloatArray], levels: int) -> LinePressure:
-    """Return the pressure that is given as a function of 1 − |x|/a, whose digits are kept next to the edge."""
-    edges = _edges(levels)
-    points, weights = gauss_rule(TERMS)
-    begin, end = 2.0 ** -np.arange(levels + 1.0), np.append(2.0 ** -np.arange(1.0, levels + 1), 0.0)
-    gaps = (begin + end)[:, None] / 2 - (begin - end)[:, None] / 2 * points
-    factors = (np.arange(TERMS) + 0.5) * weights[:, None] * legendre.legvander(points, TERMS - 1)
-    half = pressure(gaps) @ factors
-    return LinePressure(half_width, edges, np.concatenate([half[::-1] * (-1.0) ** np.arange(TERMS), half]))

@@ -34,10 +34,6 @@ MOTIONS = "slave displacement", "master displacement"
 PRESSURE, ITERATIONS = "pressure", "iterations"
 
 
-def _no_errors(solution: Solution) -> Errors:
-    return {}
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ProblemInstance:
     """A problem on one mesh, at one penalty, for formulations of some traits, with its exact answer."""
@@ -49,7 +45,7 @@ class ProblemInstance:
     pressure_scale: float  # The pressure that errors of pressures are divided by
     parts: int = 1  # The number of equal parts of a segment, in each of which displacements are smooth
     deformed: bool = True  # Forces are distributed over current lengths, not over those of the reference.
-    further: Callable[[Solution], Errors] = _no_errors  # Further kinds of error
+    further: Callable[[Solution], Errors] = lambda _: {}  # Further kinds of error
     start: FloatArray | None = None  # (n_free,): the first iterate; None for the first guess of the scene
     step: float | None = None  # The step of differences, a length, where a formulation has no tangent
     best: Mapping[str, float] = field(default_factory=dict)  # The least errors that the mesh allows, where known
@@ -68,7 +64,7 @@ class ProblemInstance:
         return forces
 
     def errors(self, solution: Solution) -> Errors:
-        """Return the errors of a solution by kind, whoever solved the scene."""
+        """Return the errors of a solution by kind."""
         interface = solution.interface
         surfaces = interface.slave, interface.master
         positions = solution.state.positions if self.deformed else interface.nodes

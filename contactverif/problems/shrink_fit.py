@@ -97,18 +97,7 @@ class ShrinkFit:
         )
 
     def pressure(self, penalty: float = inf) -> float:
-        """Return the pressure between the rings, force per length.
-
-        Parameters
-        ----------
-        penalty : float
-            The distributed stiffness ε̂ of springs between the rings; infinite without springs.
-
-        Returns
-        -------
-        float
-            The pressure p = δ / (c_i + c_o + 1/ε̂), with the compliances of both rings.
-        """
+        """Return the pressure p = δ / (c_i + c_o + 1/ε̂), force per length, with both compliances and the springs ε̂."""
         return self.interference / (sum(self.compliances) + 1 / penalty)
 
     @property
@@ -124,22 +113,8 @@ class ShrinkFit:
         """Return the fit with contact measured after it.
 
         A force f for each unit of angle is a traction f/R on a ring of contact radius R, which moves by C(R) f/R with
-        Lamé's compliance C. The springs give way by p/ε̂ with p = f/r and r the radius of the slave, after the fit or
-        before it. All that adds up to δ.
-
-        Parameters
-        ----------
-        slave : Literal['inner', 'outer']
-            The ring that the springs stand on.
-        penalty : float
-            The distributed stiffness ε̂; infinite without springs.
-        area : Literal['current', 'reference']
-            The configuration of the slave in which its length is measured.
-
-        Returns
-        -------
-        FiniteFit
-            Force and pressure.
+        Lamé's compliance C. The springs ε̂ stand on the slave ring. They give way by p/ε̂ with p = f/r and r the radius
+        of the slave, after the fit ("current") or before it ("reference"). All that adds up to δ.
         """
         radii, index = self.contact_radii, int(slave == "outer")
         flexibilities = [replace(self, radius=radius).compliances[ring] / radius for ring, radius in enumerate(radii)]
@@ -163,20 +138,6 @@ class ShrinkFit:
         radius R before it. So f_i = p R_i/(1 + p C_i/R_i) on the inner ring, and f_o = p R_o/(1 − p C_o/R_o) on the
         outer one, or p R for lengths of the reference. By how much the rings give way, and the penetration p/ε̂, add up
         to δ. After the fit the radii differ by p/ε̂, and so the forces by p²/ε̂.
-
-        Parameters
-        ----------
-        slave : Literal['inner', 'outer']
-            The ring that is the slave.
-        penalty : float
-            The distributed stiffness ε̂; infinite without springs.
-        area : Literal['current', 'reference']
-            The configuration in which lengths are measured.
-
-        Returns
-        -------
-        FiniteFit
-            Forces and pressure.
         """
         radii = self.contact_radii
         flexibilities = [replace(self, radius=radius).compliances[ring] / radius for ring, radius in enumerate(radii)]
@@ -197,25 +158,13 @@ class ShrinkFit:
         return FiniteFit(inner, pressure, outer) if slave == "inner" else FiniteFit(outer, pressure, inner)
 
     def displacement(self, radius: FloatArray, ring: Role, penalty: float = inf) -> FloatArray:
-        """Return the radial displacement (n,) of a ring at the radii (n,), a length, positive outwards.
-
-        Raises
-        ------
-        MisuseError
-            If there is no such ring.
-        """
+        """Return the radial displacement (n,) of a ring at the radii (n,), a length, positive outwards."""
         radius = np.asarray(radius, dtype=np.float64)
         modulus, ratio, (mean, deviation) = self._constants(ring, penalty)
         return ((1 - ratio) * mean * radius + (1 + ratio) * deviation / radius) / modulus
 
     def stresses(self, radius: FloatArray, ring: Role, penalty: float = inf) -> FloatArray:
-        """Return the radial and the hoop stress (n, 2) of a ring at the radii (n,), positive in tension.
-
-        Raises
-        ------
-        MisuseError
-            If there is no such ring.
-        """
+        """Return the radial and the hoop stress (n, 2) of a ring at the radii (n,), positive in tension."""
         radius = np.asarray(radius, dtype=np.float64)
         _, _, (mean, deviation) = self._constants(ring, penalty)
         return np.stack([mean - deviation / radius**2, mean + deviation / radius**2], axis=-1)

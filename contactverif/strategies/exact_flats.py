@@ -13,13 +13,12 @@ from itertools import accumulate
 
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn, SearchStrategy
+from hypothesis.strategies import DrawFn
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
-from contactverif.strategies.parts import OFFSETS, penalties, repeat_cyclically, seeds
+from contactverif.strategies.parts import OFFSETS, on_own_meshes, penalties, repeat_cyclically, seeds
 from contactverif.strategies.translations import FINENESS, exact_shifts
 
 _TURNS: tuple[Turn, ...] = ((4, 3, 5), (12, -5, 13), (-3, 4, 5), (-5, -12, 13))
@@ -33,26 +32,14 @@ _SHIFTS = st.one_of(st.just(np.zeros(2)), exact_shifts())
 _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 
 
-def exact_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+@on_own_meshes
+def exact_flat_cases(draw: DrawFn) -> Case:
     """Return states of uniform penetration, near the origin, whose exact forces are rationals.
 
-    Returns
-    -------
-    SearchStrategy[Case] | None
-        Cases with the parameters of `contactverif.problems.flat_states.flat_state`, and "shift" (2,), a length each: a
-        translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point
-        projects inside the master.
+    Cases have the parameters of `contactverif.problems.flat_states.flat_state`, and "shift" (2,), a length each: a
+    translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point projects
+    inside the master.
     """
-    return _exact_flat_cases() if interface is None else None
-
-
-def linear_flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
-    return _linear_flat_cases() if interface is None else None
-
-
-@st.composite
-def _exact_flat_cases(draw: DrawFn) -> Case:
     turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
     depth = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS)
     penalty, seed, shift, offsets = _others(draw)
@@ -62,8 +49,9 @@ def _exact_flat_cases(draw: DrawFn) -> Case:
     return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
 
 
-@st.composite
-def _linear_flat_cases(draw: DrawFn) -> Case:
+@on_own_meshes
+def linear_flat_cases(draw: DrawFn) -> Case:
+    """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
     turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
     depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
     penalty, seed, shift, offsets = _others(draw)

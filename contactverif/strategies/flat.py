@@ -47,12 +47,9 @@ def flat_cases(interface: Interface | None) -> SearchStrategy[Case] | None: ...
 def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration; every slave point projects inside the master.
 
-    Returns
-    -------
-    SearchStrategy[Case] | None
-        Cases with the parameters "penetration" (|g| > 0, a length), "along" (n_nodes,) (coordinate of each node
-        along the line, the unit of z, before any rigid motion) and "direction" (2,) (unit vector, from the slave's
-        first to its last node). None if the interface is not flat, or its slave is not over its master.
+    Their parameters are "penetration" (|g| > 0, a length), "along" (n_nodes,) (coordinate of each node along the line,
+    the unit of z, before any rigid motion) and "direction" (2,) (unit vector, from the slave's first to its last node).
+    There are none if the interface is not flat, or its slave is not over its master.
     """
     return uniform_penetrations(_panels()) if interface is None else given_interface.flat_cases(interface)
 

@@ -7,9 +7,9 @@ Strategies are cached because hypothesis validates each new one anew, which take
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, wraps
 from itertools import accumulate, cycle, islice
 from math import ldexp
 
@@ -18,13 +18,26 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
 
 SEVENTHS = st.integers(0, 6)
 # Numerators of offsets from the lattice, dealt out in turn and never 0: over 7 along the slave, over 11 across it,
 # over 13 for the master. All are coprime to the powers of two, and to each other, so that none undoes another.
 OFFSETS = st.lists(st.integers(1, 6), min_size=1, max_size=7)
 _QUARTER_TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}  # exact (cos, sin)
+
+
+def on_own_meshes(draw_case: Callable[[DrawFn], Case]) -> Callable[..., SearchStrategy[Case] | None]:
+    """Return the cases of a function that draws one on a mesh of its own; there are none on a mesh of the user."""
+    cases = st.composite(draw_case)
+
+    @wraps(draw_case)
+    def make(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+        return cases() if interface is None else None
+
+    return make
 
 
 @cache

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn, SearchStrategy
+from hypothesis.strategies import DrawFn
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
-from contactverif.contract.interface import Interface
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
-from contactverif.strategies.parts import draw_others, ends_of, repeat_cyclically
+from contactverif.strategies.parts import draw_others, ends_of, on_own_meshes, repeat_cyclically
 
 _SLAVE = st.lists(st.sampled_from([1.0, 1.5, 2.0]), min_size=1, max_size=3)
 _MASTER = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=3)
@@ -26,16 +25,12 @@ _MARGIN = 3.0  # The length of master on both sides of what the slave passes.
 
 
 @random_source("contactverif.strategies.sliding.sliding_cases")
-def sliding_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+@on_own_meshes
+def sliding_cases(draw: DrawFn) -> Case:
     """Return slaves that slide along a bent master by the length of a segment; None for a given mesh.
 
     The parameter "path" (n_unknowns,) holds the way of each node, a length each: states are z + t path, 0 ≤ t ≤ 1.
     """
-    return _sliding_cases() if interface is None else None
-
-
-@st.composite
-def _sliding_cases(draw: DrawFn) -> Case:
     steps = draw(_SLAVE)
     way = max(steps)
     x = ends_of(steps)

@@ -15,14 +15,22 @@ from math import ceil, log2
 
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn, SearchStrategy
+from hypothesis.strategies import DrawFn
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
-from contactverif.contract.interface import Interface
 from contactverif.strategies.panels import Chain, assemble_chains, on_lattice
-from contactverif.strategies.parts import SEVENTHS, depth_units, ends_of, lengths, penalties, seeds, shuffles
+from contactverif.strategies.parts import (
+    SEVENTHS,
+    depth_units,
+    ends_of,
+    lengths,
+    on_own_meshes,
+    penalties,
+    seeds,
+    shuffles,
+)
 from contactverif.strategies.sketches import exact_turns
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
@@ -37,51 +45,24 @@ _DISTANCES = st.integers(1, 4)  # Distances of the body behind, in lengths that 
 
 
 @random_source("contactverif.strategies.straight.tilted_cases")
-def tilted_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+@on_own_meshes
+def tilted_cases(draw: DrawFn) -> Case:
     """Return straight slaves, tilted by 0.06 to 0.6 rad, wholly in contact with a flat master; None for a given mesh.
 
     The slave's reference is level, so that its lengths there are others than in the state.
     """
-    return _tilted_cases() if interface is None else None
-
-
-@random_source("contactverif.strategies.straight.steep_cases")
-def steep_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Return slaves as `tilted_cases` does, tilted by 35° to 89°; None for a given mesh.
-
-    Coordinates along the slave are integers over a power of two, and so are those across it. No rounding bends it.
-    """
-    return _steep_cases() if interface is None else None
-
-
-@random_source("contactverif.strategies.straight.bent_end_cases")
-def bent_end_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Return slaves, straight and tilted or not, between the bent ends of a master; None for a given mesh.
-
-    The parameter "bent" (n_unknowns,) holds the positions after the two unloaded end segments of the master have turned
-    about the nodes that join them to the flat part.
-    """
-    return _bent_end_cases() if interface is None else None
-
-
-def cases_over_a_body(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Return slaves as `bent_end_cases` does on a straight master, with a place for a second body; None for a mesh.
-
-    The parameter "behind" (n, 2) holds the nodes of a surface of the second body: it lies behind the master, farther
-    than any point penetrates, and is walked as the master is.
-    """
-    return _cases_over_a_body() if interface is None else None
-
-
-@st.composite
-def _tilted_cases(draw: DrawFn) -> Case:
     slope = draw(_SIXTEENTHS) * draw(_SIGNS) / 16
     slave, master, reference, _ = _layout(draw, slope)
     return _place(draw, slave, master, reference)
 
 
-@st.composite
-def _steep_cases(draw: DrawFn) -> Case:
+@random_source("contactverif.strategies.straight.steep_cases")
+@on_own_meshes
+def steep_cases(draw: DrawFn) -> Case:
+    """Return slaves as `tilted_cases` does, tilted by 35° to 89°; None for a given mesh.
+
+    Coordinates along the slave are integers over a power of two, and so are those across it. No rounding bends it.
+    """
     slope = draw(_STEEP_SIXTEENTHS) / 16
     x = ends_of(draw(_SLAVE)) * 2.0 ** -ceil(3 + log2(max(slope, 1.0)))  # So the slave is less than 1 high.
     shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) / 8
@@ -95,8 +76,14 @@ def _steep_cases(draw: DrawFn) -> Case:
     return _place(draw, np.column_stack([x, -depth]), np.column_stack([master_x, np.zeros(5)]), level)
 
 
-@st.composite
-def _bent_end_cases(draw: DrawFn) -> Case:
+@random_source("contactverif.strategies.straight.bent_end_cases")
+@on_own_meshes
+def bent_end_cases(draw: DrawFn) -> Case:
+    """Return slaves, straight and tilted or not, between the bent ends of a master; None for a given mesh.
+
+    The parameter "bent" (n_unknowns,) holds the positions after the two unloaded end segments of the master have turned
+    about the nodes that join them to the flat part.
+    """
     slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
     slave, master, reference, reach = _layout(draw, slope)
     ends = [_turn_end(corner, side, reach, draw(_BENDS)) for corner, side in ((master[0], 1.0), (master[-1], -1.0))]
@@ -105,8 +92,13 @@ def _bent_end_cases(draw: DrawFn) -> Case:
     return _place(draw, slave, straight, reference, bent=np.vstack([slave, bent]))
 
 
-@st.composite
-def _cases_over_a_body(draw: DrawFn) -> Case:
+@on_own_meshes
+def cases_over_a_body(draw: DrawFn) -> Case:
+    """Return slaves as `bent_end_cases` does on a straight master, with a place for a second body; None for a mesh.
+
+    The parameter "behind" (n, 2) holds the nodes of a surface of the second body: it lies behind the master, farther
+    than any point penetrates, and is walked as the master is.
+    """
     slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
     slave, master, reference, reach = _layout(draw, slope)
     depth = reach * draw(_DISTANCES)

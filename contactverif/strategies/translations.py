@@ -37,16 +37,14 @@ _TILTS = st.sampled_from([0.25, -0.25, 0.0625, -0.0625])  # Slopes of a slave th
 
 @random_source("contactverif.strategies.translations.translated_cases")
 def translated_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return states near the origin that a translation by the parameter "shift" moves exactly.
+    """Return states near the origin that a translation by the parameter "shift" (2,), a length each, moves exactly.
 
-    Returns
-    -------
-    SearchStrategy[Case]
-        Cases with the parameter "shift" (2,), a length each: the translation of state and reference. The penetration is
-        2^-20 to 2^-7, and the translation up to 2^20, in units of segments of length 1 to 4. `Case.kind` is one of
-        `KINDS`; it is empty for a given interface.
+    State and reference move. The penetration is 2^-20 to 2^-7, and the translation up to 2^20, in units of segments of
+    length 1 to 4. `Case.kind` is one of `KINDS`; it is empty for a given interface.
     """
-    return _translated_cases() if interface is None else _given_cases(interface)
+    if interface is None:
+        return _translated_cases()
+    return st.builds(_centre, given_interface.states(interface, smooth=True), exact_shifts())
 
 
 @st.composite
@@ -121,12 +119,8 @@ def _onto_lattice(points: FloatArray, exponent: int) -> FloatArray:
     return np.round(points * 2.0**-exponent) * 2.0**exponent
 
 
-def _given_cases(interface: Interface) -> SearchStrategy[Case]:
-    """Return random states of an interface, its centre moved to the origin, on a lattice fine for its size."""
-    return st.builds(_centre, given_interface.states(interface, smooth=True), exact_shifts())
-
-
 def _centre(case: Case, shift: FloatArray) -> Case:
+    """Return a state with its centre moved to the origin, on a lattice fine for its size."""
     nodes, positions = case.interface.nodes, case.positions
     centre = positions.mean(axis=0)
     size = ceil(log2(max(np.abs(nodes - centre).max(), np.abs(positions - centre).max())))

@@ -36,11 +36,6 @@ SLOPE = Quantity(
 Function = Callable[[FloatArray], FloatArray]
 
 
-def promise_continuity(traits: Traits) -> bool | None:
-    """Return True for a promise of C0 or C1, False for the statement that forces jump, None for nothing."""
-    return None if traits.promises.continuity is None else traits.promises.continuity != "jumps"
-
-
 def refuse_unstated_continuity(traits: Traits) -> str:
     """Return why the question makes no sense for a formulation, or an empty string if it does."""
     if traits.rules.enforcement == "multiplier":
@@ -53,7 +48,7 @@ def refuse_unstated_continuity(traits: Traits) -> str:
     family="invariants",
     quantities=(FORCE, SLOPE),
     cases=Cases.random(sliding_cases),
-    promise=promise_continuity,
+    promise=lambda traits: None if traits.promises.continuity is None else traits.promises.continuity != "jumps",
     applicable=refuse_unstated_continuity,
 )
 def continuity(case: Case, subject: Subject) -> Measurement:
@@ -99,16 +94,8 @@ def continuity(case: Case, subject: Subject) -> Measurement:
 def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: float) -> list[tuple[float, float]]:
     """Return the places and sizes of the jumps of a function on the way from 0 to 1, the largest first.
 
-    Parameters
-    ----------
-    function : Function
-        The function of some places (k,), with the values (k, n).
-    samples : FloatArray, shape (N_STEPS + 1, n)
-        Its values at `N_STEPS` + 1 equal distances.
-    halvings : int
-        The number of times that a step is halved.
-    allowed : float
-        Less than this share of the step's change counts as no jump, and ends the search.
+    The function takes places (k,) to values (k, n). Its samples (N_STEPS + 1, n) are at equal distances. A step is
+    halved `halvings` times; less than the share `allowed` of its change counts as no jump, and ends the search.
     """
     changes = np.diff(samples, axis=0)
     padded = np.vstack([changes[1], changes, changes[-2]])

@@ -118,7 +118,9 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     (forces, forces_there), tangents = ask_forces_and_tangents(state, there)
 
     largest = max(case.largest_coordinate, case_there.largest_coordinate)
-    one_pass = forces / _count_passes(state, subject)
+    # Where springs act twice, in two passes, half of the penetration needs the same forces.
+    n_passes = len(list(state.passes)) if subject.traits.rules.area is None and state.has_points else 1
+    one_pass = forces / n_passes
     tolerance = roundoff.segment_tolerance(case, one_pass, largest)
     size = roundoff.sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
     changes = [Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
@@ -129,8 +131,3 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
     numbers, undecided = judge_changes(changes, tolerance, [state, there], largest)
     return Measurement(numbers, undecided, idle=not forces[:n].any())
-
-
-def _count_passes(state: FrozenState, subject: Subject) -> int:
-    """Return 2 where springs act twice, in two passes: half of the penetration needs the same forces. Else return 1."""
-    return len(list(state.passes)) if subject.traits.rules.area is None and state.has_points else 1

@@ -162,16 +162,9 @@ def _load_less(scene: Scene, share: float) -> Scene:
 
 
 def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
-    """Return the solution u with what roundoff may do to it, None if the matrix has no inverse there.
+    """Return the solution u (n_unknowns,) with what roundoff may do to it; None if the matrix has no inverse there.
 
-    Parameters
-    ----------
-    system : System
-        The scene near the origin, with its formulation.
-    case : Case
-        The case of the scene.
-    u : FloatArray, shape (n_free + n_multipliers,)
-        The unknowns.
+    The scene of the system lies near the origin.
     """
     scene, n_free, z = system.scene, system.scene.n_free, system.state(u)
     case = replace(case, interface=scene.interface, z=z, n_multipliers=system.n_multipliers)

@@ -218,20 +218,9 @@ class Steps:
 
 
 def fit_steps(system: System, case: Case, trace: Trace, matrix: Any, condition: float) -> Steps:
-    """Take one Newton step from each of some states around a solution, and fit their order.
+    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
 
-    Parameters
-    ----------
-    system : System
-        The scene with its formulation.
-    case : Case
-        The case of the scene, for its seed and its shortest segment.
-    trace : Trace
-        Newton's method, whose last iterate is the solution.
-    matrix : Any
-        The matrix there.
-    condition : float
-        Its reciprocal condition.
+    The matrix is the one at the solution, and the condition its reciprocal condition.
     """
     solution, pairing, length = trace.u[-1], trace.pairing, case.shortest_segment
     units = scale_factors(matrix, system.scene.n_free)[1]
@@ -256,24 +245,12 @@ def fit_steps(system: System, case: Case, trace: Trace, matrix: Any, condition: 
 
 
 def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
-    """Fit the slope of log after over log before at the nearest distances above the floor.
+    """Fit the slope of log after over log before at the nearest distances above the floor, where roundoff decides.
 
-    Parameters
-    ----------
-    before : FloatArray, shape (n_steps,)
-        Distances from the solution before the step, descending.
-    after : FloatArray, shape (n_steps,)
-        Distances after the step; infinite where the matrix had no inverse.
-    floor : float
-        The distance at which roundoff decides.
-
-    Returns
-    -------
-    order : float
-        The slope. Infinite where even the longest distance ends at the floor: one step is exact. NaN where there are
-        too few distances, or where the slope is below 2 and still rises towards it as the distances fall.
-    rate : float
-        The ratio after/before at the nearest distance.
+    Distances (n_steps,) from the solution before a step descend; those after it are infinite where the matrix had no
+    inverse. The slope is infinite where even the longest distance ends at the floor: one step is exact. It is NaN where
+    there are too few distances, or where it is below 2 and still rises towards 2 as they fall. Behind it comes the
+    ratio after/before at the nearest distance.
     """
     if not len(before):
         return np.nan, np.nan
@@ -294,12 +271,7 @@ def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[floa
 
 
 def spectral_radius(matrix: Any, exact: Any) -> float:
-    """Return the spectral radius of I − K⁻¹ ∂R/∂u, the rate of Newton's method with the matrix K.
-
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Fig. 30.
-    """
+    """Return the spectral radius of I − K⁻¹ ∂R/∂u, the rate of Newton's method with K (Fig. 30 of the paper)."""
     rest = np.eye(matrix.shape[0]) - linalg.solve(dense(matrix), dense(exact))
     return float(np.abs(linalg.eigvals(rest)).max())
 

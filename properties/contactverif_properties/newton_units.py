@@ -133,21 +133,7 @@ class Units:
 
 
 def measure_step(system: System, case: Case, trace: Trace, number: int, difference: FloatArray) -> float:
-    """Return the difference of a next iterate over what roundoff does to the step.
-
-    Parameters
-    ----------
-    system : System
-        The scene with its formulation.
-    case : Case
-        The case of the scene.
-    trace : Trace
-        The solution.
-    number : int
-        The number of the iterate from which the step is taken.
-    difference : FloatArray, shape (n_free + n_multipliers,)
-        The difference of the two next iterates.
-    """
+    """Return the difference (n_unknowns,) of the iterates after iterate `number` over what roundoff does to a step."""
     u, units = trace.u[number], np.ones(system.size)
     if system.n_multipliers:
         units = scale_factors(system.matrix(u, trace.pairings[number])[0], system.scene.n_free)[1]

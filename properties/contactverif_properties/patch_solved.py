@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -39,7 +39,7 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
     return Measurement(
         [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
         undecided=moderate.undecided or high.undecided,
-        details={**moderate.details, **_rename_high(high.details), SLOPE: slope},
+        details={**moderate.details, **{high_name(name): value for name, value in high.details.items()}, SLOPE: slope},
     )
 
 
@@ -50,10 +50,6 @@ def high_name(name: str) -> str:
 
 def _at_high(quantity: Quantity) -> Quantity:
     return replace(quantity, name=high_name(quantity.name))
-
-
-def _rename_high(numbers: Mapping[str, float]) -> dict[str, float]:
-    return {high_name(name): number for name, number in numbers.items()}
 
 
 def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -> Cases:

@@ -9,7 +9,6 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -189,8 +188,12 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     """
     both = [Reported.from_case(state, subject) for state in (case, _in_large_unit(case))]
     wrong, decided = zip(*map(_count, both), strict=True)
-    homeless = any(_without_place(each.points).any() for each in both)
-    n_points = sum(len(each.points.c) for each in both)
+    samples = [each.points for each in both]
+    homeless = any(
+        (points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))).any()
+        for points in samples
+    )
+    n_points = sum(len(points.c) for points in samples)
     return Measurement(
         [WRONG.check(float(sum(wrong)), 0.0)],
         broken="an active point names no place or no master segment" if homeless else "",
@@ -218,11 +221,6 @@ def _count(reported: Reported) -> tuple[int, int]:
         wrong += int((sure & (weighted.active != (weighted.gap < 0))).sum())
         decided += int(sure.sum())
     return wrong, decided
-
-
-def _without_place(points: ContactPoints) -> BoolArray:
-    """Return which points are active but cannot be: without a place, or without a master segment for a gap there."""
-    return points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))
 
 
 def _decide(places: Places, rule: str | None) -> tuple[BoolArray, BoolArray]:

@@ -243,16 +243,8 @@ def _compare_penalties(
 def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> float:
     """Return the largest difference of a batch over what moving the nodes by X would change.
 
-    Parameters
-    ----------
-    case : Case
-        The state z.
-    near : FloatArray, shape (n_unknowns + n_multipliers,)
-        The state nearby.
-    forces : Array, shape (2, n_unknowns + n_multipliers)
-        The residuals of both states, asked one by one.
-    batch : Array, shape (2, 2, n_unknowns + n_multipliers)
-        The residuals of the batch: both states, then both in the other order.
+    The forces (2, n) are the residuals at the state of the case and at one nearby, (n,), asked one by one. The batch
+    (2, 2, n) has both states, then both in the other order.
     """
     way = float(np.abs(near - case.z).max())
     slope = float(np.abs(forces[1] - forces[0]).max()) / way if way > 0 else 0.0

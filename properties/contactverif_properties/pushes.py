@@ -27,7 +27,7 @@ from contactverif_properties.shared.applicability import may_act_twice
 from contactverif_properties.shared.constraint_rows import check_constraint_rows
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.passes import Pass
-from contactverif_properties.shared.uniform_pressure import unit_forces
+from contactverif_properties.shared.uniform_pressure import normal_of, unit_forces
 
 CLOSED = 1 / 8  # The share of the slave's length, at one end, that is closed while the rest is open.
 SHALLOW = 2.0**-6  # The deepest penetration there over the slave's length, so that the slave hardly tilts.
@@ -52,29 +52,21 @@ def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
 
 def lift_slave(case: Case, height: float) -> Case:
     """Return the case with its slave moved away from the master, across the interface, by a height (a length)."""
-    along = case.parameters["direction"]
     positions = case.positions.copy()
-    positions[: case.interface.n_slave_nodes] += height * np.array([-along[1], along[0]])
+    positions[: case.interface.n_slave_nodes] += height * normal_of(case)
     return replace(case, z=positions.reshape(-1))
 
 
 def open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
-    """Return the case with its slave lifted so that the gap grows along it, and only its first part is closed.
+    """Return a flat case with its slave lifted so that the gap grows along it, and only its first part is closed.
 
-    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight.
-
-    Parameters
-    ----------
-    case : Case
-        A flat case with a uniform penetration.
-    closed : float
-        The share of the slave's length that is closed.
+    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight. `closed` is
+    the share of the slave's length that is closed.
     """
     interface, positions = case.interface, case.positions.copy()
     depth, places = case.parameter("penetration"), _slave_places(case)
     shallow = min(depth, SHALLOW * case.slave_length)
-    x, y = case.parameters["direction"]
-    positions[: interface.n_slave_nodes] += (depth + shallow * (places / closed - 1))[:, None] * np.array([-y, x])
+    positions[: interface.n_slave_nodes] += (depth + shallow * (places / closed - 1))[:, None] * normal_of(case)
     return replace(case, z=positions.reshape(-1))
 
 
@@ -141,20 +133,9 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
 def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     """Lift a flat interface until all gaps are as wide as the penetration was deep, and until all but an end is open.
 
-    Parameters
-    ----------
-    case : Case
-        A flat case with the parameter `penetration`, a length.
-    subject : Subject
-        The formulation.
-
-    Returns
-    -------
-    Measurement
-        The largest force across the open gap over ε̂ |g| L. The largest force far from the contact zone over the largest
-        force; missing where no node is that far, and with multipliers, since `complementarity` judges those that pull.
-        The pull of a contact point, in the flat state and where one end alone is closed. Broken: nothing begins where
-        the surfaces penetrate, or the slave is pulled.
+    The force far from the contact zone is missing where no node is that far, and with multipliers, since
+    `complementarity` judges those that pull. The pull of a contact point is that of the flat state and of the one with
+    a closed end. The measurement is broken if nothing begins where the surfaces penetrate, or if the slave is pulled.
     """
     formulation = subject.for_case(case)
     depth = case.parameter("penetration")
@@ -189,8 +170,7 @@ def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
 
 def _push_of_slave(forces: FloatArray, case: Case) -> float:
     """Return the total force on the slave along the master's outward normal."""
-    x, y = case.parameters["direction"]
-    return -float((forces[: case.interface.n_slave_nodes] @ np.array([-y, x])).sum())
+    return -float((forces[: case.interface.n_slave_nodes] @ normal_of(case)).sum())
 
 
 def _pull_of_points(state: FrozenState) -> tuple[dict[Quantity, float], dict[Quantity, float]]:

@@ -287,18 +287,13 @@ def inf_sup(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerances), details=details, series=series)
 
 
-def promise_smoothness(traits: Traits) -> bool | None:
-    """Return whether the formulation promises not to lock; None if it promises nothing."""
-    return None if traits.promises.locks is None else not traits.promises.locks
-
-
 @Property.define(
     id="stability.locking",
     family="stability",
     quantities=(DRIFT, ROUGHNESS),
     needs=frozenset({"pair"}),
     cases=Cases.from_list(wave_cases),
-    promise=promise_smoothness,
+    promise=lambda traits: None if traits.promises.locks is None else not traits.promises.locks,
     applicable=refuse_unknown_pressure,
     bodies=True,
 )

@@ -151,19 +151,11 @@ class Comparison:
 
 
 def compare(state: FrozenState, directions: FloatArray, length: float) -> Comparison:
-    """Compare derivatives along directions with central differences and Taylor remainders, all in one batch.
+    """Compare derivatives along directions (n, n_unknowns) with central differences and Taylor remainders, all at once.
 
-    The length over which the residual bends is the root of its size over its third derivative, from the central
-    differences of two steps. The tangent plays no part in it.
-
-    Parameters
-    ----------
-    state : FrozenState
-        The state x, and the tangent K that is judged.
-    directions : FloatArray, shape (n_directions, n_unknowns)
-        The directions d.
-    length : float
-        The length over which the residual is taken to bend; steps are shares of it.
+    Steps are shares of the length over which the residual is taken to bend. The length over which it does bend is the
+    root of its size over its third derivative, from the central differences of two steps. The tangent plays no part in
+    it.
     """
     case, reach = state.case, state.case.largest_coordinate
     derivative = directions @ state.tangent.T  # (n_directions, n_unknowns)
@@ -242,17 +234,9 @@ def _worst_row(
 def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
     """Return the slope of log |remainder| over log h: the best between two steps, the worst over the directions.
 
-    Two steps count only where one is `STEP_RATIO` times the other: between two that are nearly equal, the slope is
-    noise.
-
-    Parameters
-    ----------
-    remainders : FloatArray, shape (n_steps, n_directions)
-        Taylor remainders.
-    steps : FloatArray, shape (n_steps,)
-        Their steps h, in any order.
-    floor : float
-        A remainder below it is roundoff. A direction that has no slope because of that is exact.
+    Remainders are (n_steps, n_directions), the steps h (n_steps,) in any order. Two steps count only where one is
+    `STEP_RATIO` times the other: between two that are nearly equal, the slope is noise. A remainder below the floor is
+    roundoff, and a direction that has no slope because of that is exact.
     """
     best = np.full(remainders.shape[1], -np.inf)
     decided = np.zeros(remainders.shape[1], dtype=bool)
@@ -324,12 +308,9 @@ def _all_differ(pairings: Sequence[Pairing | None]) -> bool:
 
 
 def first_directions(case: Case, n_random: int) -> FloatArray:
-    """Return random directions that move all unknowns, then one for each chain and one for the multipliers.
+    """Return random directions (n, n_unknowns) that move all unknowns, one for each chain, and one for the multipliers.
 
-    Returns
-    -------
-    FloatArray, shape (n_directions, n_unknowns + n_multipliers)
-        Entries in [−1, 1]; the largest of each direction is ±1.
+    The largest entry of each is ±1.
     """
     regions = _regions(case)
     moves = random_directions(case.seed, n_random + len(regions), case.z.size)
@@ -341,20 +322,11 @@ def first_directions(case: Case, n_random: int) -> FloatArray:
 
 
 def defect_directions(directions: FloatArray, defects: FloatArray) -> FloatArray:
-    """Return the largest defect as a direction, and the leading singular direction of what maps one to the other.
+    """Return the largest defect, and the leading singular direction of what maps directions to defects, (2, n).
 
-    Parameters
-    ----------
-    directions : FloatArray, shape (n_directions, n)
-        Directions d.
-    defects : FloatArray, shape (n_directions, n)
-        The tangent times d, minus the difference quotient along d.
-
-    Returns
-    -------
-    FloatArray, shape (2, n) or (0, n)
-        Two directions whose largest entry is ±1; none where there is no defect. The singular direction is the one in
-        the span of `directions` with the largest defect for its length.
+    Defects (n_directions, n) are the tangent times a direction, minus the difference quotient along it. The singular
+    direction is the one in the span of the directions with the largest defect for its length. Where there is no defect,
+    there are no directions, (0, n). The largest entry of each is ±1.
     """
     worst = defects[np.abs(defects).max(axis=1).argmax()]
     if not worst.any():

@@ -105,8 +105,6 @@ def _iteration_statement(example: Example2) -> Statement:
     near, far = (sorted({solution.by_energy for solution in row}) for row in (example.solutions, example.touching))
     near_words, far_words = (", ".join(map(str, counts)) for counts in (near, far))
     ours = sorted({solution.iterations for solution in example.solutions})
-    holds, always = near == [PRINTED_ITERATIONS], far == [PRINTED_ITERATIONS]
-    agreement = Agreement.decide(holds, always=always)
     return Statement(
         "Section 7.2",
         "Example 2: every algorithm needs the same number of iterations, 4, to an energy norm of 1e−15; the first "
@@ -114,9 +112,8 @@ def _iteration_statement(example: Example2) -> Statement:
         f"until the energy of a step is 1e−15 of the first one, {near_words} from a disk lowered about as far as it "
         f"ends, and {far_words} from one that just touches; by our own rule, to the residual’s own roundoff, "
         f"{', '.join(map(str, ours))} from the lowered disk too",
-        agreement,
-        "",
-        "the first guess lowers the disk about as far as it ends" if agreement is Agreement.CONDITIONAL else "",
+        Agreement.decide(near == [PRINTED_ITERATIONS], always=far == [PRINTED_ITERATIONS]),
+        condition="the first guess lowers the disk about as far as it ends",
     )
 
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
 
@@ -253,7 +252,8 @@ def plot(convergence: Convergence) -> Figure:
     figure, panels = new_panels(4.0, 3)
     for axes, histories, material in zip(panels, convergence.histories, ("equal E", "master E/2"), strict=False):
         for history in histories:
-            _plot_history(axes, history)
+            style = line_style(history.formulation, 1)
+            axes.plot(np.arange(len(history.residuals)), history.residuals, **style)
         use_decades(axes, 8)
         axes.set_ylim(_LOWEST, AXIS[1])
         axes.axhspan(_LOWEST, histories[0].floor, color="0.92", zorder=0, linewidth=0)
@@ -273,10 +273,6 @@ def plot(convergence: Convergence) -> Figure:
     rates.set(xlabel="ε̂ / E (1 / length)", ylabel="rate, basic version (–)")
     add_legend(figure, FORMULATIONS, reference="spectral radius", columns=4)
     return figure
-
-
-def _plot_history(axes: Axes, history: History) -> None:
-    axes.plot(np.arange(len(history.residuals)), history.residuals, **line_style(history.formulation, 1))
 
 
 def datasets(convergence: Convergence) -> dict[str, Group]:

@@ -17,7 +17,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle, block
+from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.problems.blocks import two_blocks
 from contactverif_paper.figure_style import Series, add_legend, line_style, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, series_columns
 from contactverif_paper.paper_formulations import BALANCED, MORTAR, NTS_AR, STS, VTS_ME, VTS_PPT
@@ -54,28 +55,14 @@ def overhanging(part: float) -> Scene:
 
     The pressure acts on what overhangs of the slave too, so that the exact solution is a uniform stress.
     """
-    slave_x, layers = np.linspace(-6.0, 6.0, 7), np.linspace(0.0, 4.0, 3)
+    layers = np.linspace(0.0, 4.0, 3)
     edge = 4.0 - _SEGMENT * part  # It lies inside the slave segment from 2 to 4.
-    master_x = np.linspace(-edge, edge, 6)
-    penalty = 10 * _YOUNG / _SEGMENT
-    upper = block(
-        Rectangle(slave_x, layers, young=_YOUNG, poisson=_POISSON),
-        contact="bottom",
+    return two_blocks(
+        Rectangle(np.linspace(-6.0, 6.0, 7), layers, young=_YOUNG, poisson=_POISSON),
+        Rectangle(np.linspace(-edge, edge, 6), layers - 4.0, young=_YOUNG, poisson=_POISSON),
+        penalty=10 * _YOUNG / _SEGMENT,
         pressure=_PRESSURE,
-        lowered=_PRESSURE / penalty,
-        name="slave",
-        contact_range=(-edge, edge),
     )
-    lower = block(
-        Rectangle(master_x, layers - 4.0, young=_YOUNG, poisson=_POISSON), contact="top", approach=0.0, name="master"
-    )
-    facts = {
-        "along": np.concatenate([slave_x, master_x]),
-        "direction": np.array([1.0, 0.0]),
-        "compliance": np.array([4.0, 4.0]) / upper.oedometric_modulus,
-        "pressure": np.array(_PRESSURE),
-    }
-    return Scene((upper, lower), penalty=penalty, facts=facts)
 
 
 def statements(result: FreeEnds) -> Iterator[Statement]:

@@ -58,11 +58,14 @@ class Statement:
     result: Annotated[str, Column("", WORDS, "what was computed here")]
     agreement: Annotated[Agreement, Column("", "1", "how claim and result compare", meanings=_MEANINGS)]
     figure: Annotated[str, Column("", WORDS, "file name of the figure here; empty: none")] = ""  # Without its suffix.
+    # It is dropped unless the statement holds under a condition only.
     condition: Annotated[str, Column("", WORDS, "when the statement holds; empty: always, or not at all")] = ""
 
     def __post_init__(self) -> None:
-        if bool(self.condition) != (self.agreement is Agreement.CONDITIONAL):
-            raise ValueError(f"{self.place}: a condition and the verdict {Agreement.CONDITIONAL.words!r} go together")
+        if self.agreement is not Agreement.CONDITIONAL:
+            object.__setattr__(self, "condition", "")
+        elif not self.condition:
+            raise ValueError(f"{self.place}: the verdict {self.agreement.words!r} needs a condition")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +84,6 @@ class PageTable:
     caption: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
-    title: str = ""
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):

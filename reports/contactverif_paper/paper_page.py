@@ -36,18 +36,16 @@ LOOKS: Mapping[Agreement, tuple[str, str]] = {  # {verdict: (mark, CSS class)}
 }
 
 
-def check_folder(folder: Path, argument: str = "--out") -> None:
+def check_folder(folder: Path) -> None:
     """Make the folder, and say before anything takes long what would stop files from being written to it."""
-    made_folder(folder, argument)
+    made_folder(folder, "--out")
     for name in (NUMBERS, PAGE):
-        check_writable(folder / name, argument, f"a folder that may hold {name}")
+        check_writable(folder / name, "--out", f"a folder that may hold {name}")
 
 
-def write(
-    paper: Paper, folder: Path, report_progress: Progress = lambda _: None, argument: str = "--out"
-) -> tuple[Path, ...]:
+def write(paper: Paper, folder: Path, report_progress: Progress = lambda _: None) -> tuple[Path, ...]:
     """Write all files, each whole or not at all."""
-    check_folder(folder, argument)
+    check_folder(folder)
     paths = [folder / NUMBERS]
     with whole(folder / NUMBERS) as part:
         write_tree(tree_of(paper), part)
@@ -61,7 +59,7 @@ def write(
                 part.write_text(svg(drawing), encoding="utf-8", newline="\n")
             inlined[figure.name] = svg_inline(drawing, f"{sentence(figure.source)}. {figure.caption}")
     paths.append(folder / PAGE)
-    write_page(paths[-1], page(paper, inlined), argument)
+    write_page(paths[-1], page(paper, inlined))
     return tuple(paths)
 
 

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import IntArray
 from contactverif.contract.body import Body
 from contactverif_paper.figure_style import (
     LETTERS,
@@ -56,8 +56,10 @@ def _draw_pressures(axes: Axes, patch: PatchSolution, limits: tuple[float, float
         axes.plot(curve.x, curve.pressure, clip_on=not inside, **line_style(curve.formulation, len(curve.x)))
     axes.set(xlabel="x coordinate (length)", ylabel="contact pressure / p (–)")
     use_round_ticks(axes, 6)
-    axes.set_xticks(_printed_ticks(*patch.setup.x_axis))
-    axes.set_xlim(*patch.setup.x_axis)
+    left, right = patch.setup.x_axis
+    step = 1.0 if right - left <= _SHORT_AXIS else 2.0  # The paper's axes have a tick at every second unit.
+    axes.set_xticks(np.arange(left, right + 0.5, step))
+    axes.set_xlim(left, right)
     axes.set_ylim(low, high)
 
 
@@ -90,7 +92,10 @@ def plot_penetrations(patches: Sequence[PatchSolution]) -> Figure:
         bar = figure.colorbar(scale, ax=panels_of_scene, shrink=0.8, aspect=_BAR * rows, pad=0.01)
         bar.locator = MaxNLocator(5, steps=[1, 2, 5, 10])
         bar.outline.set_linewidth(0.5)
-    title = "\n".join(["colour: −σₙ (force / length)", *_above_and_below(list(remarks))])
+    lines = list(remarks)
+    if len(lines) == 2:
+        lines = [f"above: {lines[0]}", f"below: {lines[1]}"]
+    title = "\n".join(["colour: −σₙ (force / length)", *lines])
     figure.legend(handles=_surface_handles(), loc="outside lower center", ncols=3, title=title, title_fontsize=LETTERS)
     return figure
 
@@ -125,15 +130,6 @@ def plot_meshes(patches: Sequence[PatchSolution]) -> Figure:
 def _end_remark(curve: Curve) -> str:
     """Return how Newton's method ended, in brackets; empty for a solution."""
     return "" if curve.solution.converged else f" ({curve.end})"
-
-
-def _printed_ticks(low: float, high: float) -> FloatArray:
-    """Return the ticks of the paper's x axes: every unit on a short axis, else every second one."""
-    return np.arange(low, high + 0.5, 1.0 if high - low <= _SHORT_AXIS else 2.0)
-
-
-def _above_and_below(lines: list[str]) -> list[str]:
-    return [f"above: {lines[0]}", f"below: {lines[1]}"] if len(lines) == 2 else lines
 
 
 def edges_of(cells: IntArray) -> IntArray:

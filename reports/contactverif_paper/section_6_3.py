@@ -140,16 +140,14 @@ def _feasible_statement(terms: IntArray, result: Tangents) -> Statement:
 def _terms_statement(terms: IntArray) -> Statement:
     standard, _, consistent, _ = terms
     holds = consistent == standard
-    agreement = Agreement.decide(bool(holds.any()), always=bool(holds.all()))
     heads = [head for head, same in zip(MASTERS, holds, strict=True) if same]
     counts = "; ".join(f"{head}: {b} (standard: {a})" for head, a, b in zip(MASTERS, standard, consistent, strict=True))
     return Statement(
         "Section 6.3",
         "the consistent tangent of VTS-PPT needs as many terms as the standard formulation",
         f"terms for a virtual slave node whose area lies over {counts}",
-        agreement,
-        "",
-        f"the area of competence lies over {', '.join(heads)}" if agreement is Agreement.CONDITIONAL else "",
+        Agreement.decide(bool(holds.any()), always=bool(holds.all())),
+        condition=f"the area of competence lies over {', '.join(heads)}",
     )
 
 

@@ -44,16 +44,12 @@ class Constraints:
         """Return which multipliers (n_multipliers,) have something opposite."""
         return self.areas > 0
 
-    @property
-    def knows_inactive_areas(self) -> bool:
-        """Return whether the area of an inactive constraint is known: a second pass may be covered in part."""
-        return self.rules.penalty == "nodal" or self.rules.area is not None
-
     def errors(self, rows: FloatArray, multipliers: FloatArray, gap: float) -> FloatArray:
         """Return the errors of constraint rows (n_multipliers,) over their tolerance; infinite for a wrong sign."""
         active = self.active(multipliers, gap)
         sizes = self.tolerance * self.spreads * np.where(active, abs(gap), np.abs(multipliers))
-        known = active | self.knows_inactive_areas & (self.sees | (self.rules.penalty == "nodal"))
+        # The area of an inactive constraint may be unknown: a second pass may be covered in part.
+        known = active | (self.rules.penalty == "nodal") | (self.rules.area is not None) & self.sees
         signs = np.where(rows * multipliers > 0, 0.0, np.inf)  # The area of an inactive constraint is positive.
         errors: FloatArray = np.where(known, np.abs(rows - self.right(multipliers, gap)) / sizes, signs)
         return errors
@@ -71,31 +67,12 @@ class Constraints:
 def check_constraint_rows(
     formulation: CheckedFormulation, closed: Case, lifted: Case, rules: Rules, scale: float
 ) -> float:
-    """Compare the constraint rows of a flat interface with the contract, with its gap closed and open.
+    """Return the largest error of a constraint row of a flat interface over its tolerance u(8X/min(g, ℓ) + 4N).
 
-    A point that faces a free end exactly may lose it by roundoff as the slave is lifted. Then the open gap is not
-    judged.
-
-    Parameters
-    ----------
-    formulation : CheckedFormulation
-        A formulation with multipliers, whose scale c is `scale`.
-    closed, lifted : Case
-        A flat case whose gap is minus its parameter `penetration` everywhere, and the same with as wide a gap.
-    rules : Rules
-        The rules that the formulation states.
-    scale : float
-        The scale c, in the unit of the formulation.
-
-    Returns
-    -------
-    float
-        The largest error of a row over its tolerance u(8X/min(g, ℓ) + 4N).
-
-    Raises
-    ------
-    ContractError
-        If a row is not what the contract states; it names the row beside what is right.
+    The gap is minus the parameter `penetration` everywhere if closed, and as wide if lifted. A point that faces a free
+    end exactly may lose it by roundoff as the slave is lifted. Then the open gap is not judged. `scale` is the scale c
+    of the multipliers. A row that is not what the contract states raises a `ContractError`, which names it beside the
+    right one.
     """
     depth, count = closed.parameter("penetration"), formulation.n_multipliers(closed.interface)
     random = np.random.default_rng([closed.seed, 2])

@@ -76,21 +76,9 @@ def count_changes_in_life(
     """Ask one instance a question with all methods, then in rounds of four calls, and all methods once more.
 
     A round is a residual at the state of the question, a pairing, a tangent, and a residual at a new state. Pairing and
-    tangent are those of the question and of new states in turn, so that half of all answers must repeat.
-
-    Parameters
-    ----------
-    formulation : CheckedFormulation
-        The instance.
-    question : Question
-        The question, with the pairing that was the first answer to it.
-    states : FloatArray, shape (n_rounds, n_unknowns + n_multipliers)
-        The new states, near that of the question.
-
-    Returns
-    -------
-    tuple[float, bool]
-        How many entries of answers to the question change, and whether the pairing does.
+    tangent are those of the question and of new states (n_rounds, n) in turn, so that half of all answers must repeat.
+    The question holds the pairing that was the first answer to it. Return how many entries of answers to it change, and
+    whether its pairing does.
     """
     interface, z = question.interface, question.z
     verbs = {"residual", *formulation.provides} & {"residual", "tangent", "contact_points", BOTH}

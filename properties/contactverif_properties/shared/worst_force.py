@@ -14,21 +14,10 @@ _ASIDE = 2.0**-20  # The part of a force that may point aside by roundoff if bot
 def worst_force(
     interface: Interface, forces: FloatArray, exact: FloatArray, names: tuple[str, str] = ("force", "exact")
 ) -> Finding:
-    """Return the force at the node where it errs most, beside the exact one.
+    """Return the force at the node where it errs most, beside the exact one, in the words of `names`.
 
-    Parameters
-    ----------
-    interface : Interface
-        The mesh.
-    forces, exact : FloatArray, shape (n, 2)
-        The forces that push all nodes, or those of the slave alone.
-    names : tuple[str, str]
-        The words for both.
-
-    Returns
-    -------
-    Finding
-        Two numbers if both forces lie on one line, counted along the exact one, with their ratio; else x and y of both.
+    The forces (n, 2) push all nodes, or those of the slave alone. If both lie on one line, the finding has two numbers,
+    counted along the exact force, with their ratio; else x and y of both.
     """
     node = int(np.linalg.norm(forces - exact, axis=1).argmax())
     return _beside(describe_node(interface, node), forces[node], exact[node], names)

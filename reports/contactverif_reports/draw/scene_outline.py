@@ -17,31 +17,23 @@ from contactverif.contract.case import Case
 from contactverif_reports.draw.case_figure import make_case_figure
 from contactverif_reports.draw.strokes import MASTER, SLAVE
 
-_BODIES = "bodies_"
 _SHADES = {True: "0.88", False: "0.96"}  # The slave is darker than the master.
 _ARROW = 0.14  # Length of the longest load, as a share of the scene.
 _SUPPORT = 0.02  # Half the length of the mark of a support, as a share of the scene.
-
-
-def has_outline(case: Case) -> bool:
-    """Return whether the case holds bodies."""
-    return f"{_BODIES}nodes" in case.parameters
 
 
 def make_mesh_figure(
     case: Case, width: float, *, forces: FloatArray | None = None, exact: FloatArray | None = None
 ) -> Figure:
     """Return the figure of a case: its bodies, if it holds any, else its interface with forces."""
-    if has_outline(case):
+    if case.packed_bodies:
         return make_outline_figure(case, width)
     return make_case_figure(case, forces=forces, exact=exact, width=width)
 
 
 def make_outline_figure(case: Case, width: float) -> Figure:
     """Return a figure of the bodies in their reference configuration; a rigid body is its surface."""
-    packed = {
-        name.removeprefix(_BODIES): values for name, values in case.parameters.items() if name.startswith(_BODIES)
-    }
+    packed = case.packed_bodies
     nodes = packed["nodes"]  # (n_nodes, 2) of all bodies
     of_body = np.repeat(np.arange(len(packed["count"])), packed["count"].astype(np.int64))  # (n_nodes,)
     is_slave = packed["is_slave"] != 0

@@ -58,13 +58,9 @@ def draw_stability(panels: Sequence[SweepPanel], target: Path) -> None:
     save(make_stability_figure(panels), target)
 
 
+@matplotlib.rc_context(_STYLE)
 def make_stability_figure(panels: Sequence[SweepPanel]) -> Figure:
     """Return the figure; the legend stands in a free place of the grid, or above one row of panels."""
-    with matplotlib.rc_context(_STYLE):
-        return _make_figure(panels)
-
-
-def _make_figure(panels: Sequence[SweepPanel]) -> Figure:
     n_columns = min(_COLUMNS, len(panels))
     n_rows = ceil((len(panels) + (len(panels) > n_columns)) / n_columns)
     width, height = _LARGE_PANEL if len(panels) <= _FEW else _PANEL

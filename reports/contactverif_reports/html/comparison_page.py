@@ -45,7 +45,7 @@ def comparison_page(
         found=comparison,
         candidates=comparison.formulations[1:],
         wrong=comparison.unexpected,
-        differ=[id_ for id_ in comparison.properties if _verdicts_differ(comparison, id_)],
+        differ=[id_ for id_ in comparison.properties if len({cell.verdict for cell in _cells(comparison, id_)}) > 1],
         results=[(id_, _results(comparison, id_)) for id_ in comparison.properties],
         errors=[(id_, lines) for id_ in comparison.properties if (lines := _errors(comparison, id_, axis))],
         ticks=ticks(axis),
@@ -102,10 +102,6 @@ def _results(comparison: Comparison, id_: str) -> list[dict[str, Any] | None]:
         differs = reference is not None and cell.verdict is not reference.verdict
         results.append({"word": str(cell.result), "unexpected": cell.unexpected, "differs": differs})
     return results
-
-
-def _verdicts_differ(comparison: Comparison, id_: str) -> bool:
-    return len({cell.verdict for cell in _cells(comparison, id_)}) > 1
 
 
 def _errors(comparison: Comparison, id_: str, axis: Axis) -> list[tuple[Cell, Any, Markup]]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.case import Case
+from contactverif.contract.case import BODIES, Case
 from contactverif.contract.counterexample import Counterexample, counterexamples, named_failures, typeable
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
@@ -22,7 +22,6 @@ from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, Shar
 from contactverif_reports.netcdf.variables import codes, numbers, words
 
 _FOLDER = f"/{schema.NAMED_CASES}"
-_PREFIX = "bodies_"
 _OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, 2).
 _OF_BODIES = {"count": (), "is_slave": (), "young": (), "poisson": (), "axis": (2,), "start": (2,)}
 ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
@@ -155,7 +154,7 @@ def read_named_cases(groups: Mapping[str, Group]) -> dict[tuple[str, str], Case]
 
 def check_bodies(parameters: Mapping[str, NDArray[Any]]) -> None:
     """Check shapes, finite numbers and node numbers of the bodies of a case, if it holds any."""
-    packed = {name.removeprefix(_PREFIX): values for name, values in parameters.items() if name.startswith(_PREFIX)}
+    packed = {name.removeprefix(BODIES): values for name, values in parameters.items() if name.startswith(BODIES)}
     if not packed:
         return
     n_nodes = len(np.atleast_1d(packed["nodes"]))
@@ -163,9 +162,9 @@ def check_bodies(parameters: Mapping[str, NDArray[Any]]) -> None:
     for name, low, high in (("cells", -1, n_nodes - 1), ("contact", 0, n_nodes - 1), ("count", 1, n_nodes)):
         numbers = packed[name]
         if (numbers != np.round(numbers)).any() or not ((numbers >= low) & (numbers <= high)).all():
-            raise ValueError(f"{_PREFIX}{name} holds a number that no node has")
+            raise ValueError(f"{BODIES}{name} holds a number that no node has")
     if packed["count"].sum() != n_nodes or (packed["cells"][:, :3] < 0).any():
-        raise ValueError(f"the nodes of {_PREFIX}count or {_PREFIX}cells are not those that are there")
+        raise ValueError(f"the nodes of {BODIES}count or {BODIES}cells are not those that are there")
 
 
 def _check_shapes(packed: Mapping[str, NDArray[Any]], n_nodes: int) -> None:
@@ -175,4 +174,4 @@ def _check_shapes(packed: Mapping[str, NDArray[Any]], n_nodes: int) -> None:
     shapes |= {name: (len(np.atleast_1d(packed[name])), width) for name, width in (("cells", 4), ("contact", 2))}
     for name, shape in shapes.items():
         if packed[name].shape != shape or not np.isfinite(packed[name]).all():
-            raise ValueError(f"{_PREFIX}{name} has the shape {packed[name].shape} or NaN; needed {shape}")
+            raise ValueError(f"{BODIES}{name} has the shape {packed[name].shape} or NaN; needed {shape}")

@@ -32,9 +32,11 @@ def stability_page(run: Run, files: Mapping[str, str]) -> str:
     panels = sweep_panels(run)
     sentences = [f"- `{panel.formulation}` {sentence_of(panel)}" for panel in panels]
     sentences += [f"- `{plugin.formulation}` was not loaded: {plugin.reason}" for plugin in run.not_loaded]
-    meaning = _MEANING.format(below=sum(map(_is_below, panels)), count=len(panels))
+    n_below = sum(panel.worst is not None and panel.worst.roundings <= 1 for panel in panels)  # All errors below u κ.
+    meaning = _MEANING.format(below=n_below, count=len(panels))
     parts = ["# Error against condition number", f"`{run.provenance['command']}`", _origin(run), meaning]
-    parts += [f"![Error against condition number, one panel a formulation]({name})" for name in _pictures(files)]
+    pictures = [files[suffix] for suffix in (".svg", ".png") if suffix in files][:1]
+    parts += [f"![Error against condition number, one panel a formulation]({name})" for name in pictures]
     parts += ["## One sentence for each formulation", "\n".join(sentences)]
     parts += ["## ω, the error over u κ", "\n".join(_table(panels))]
     if ".nc" in files:
@@ -45,15 +47,6 @@ def stability_page(run: Run, files: Mapping[str, str]) -> str:
 def _origin(run: Run) -> str:
     version, commit = (run.provenance.get(name, "unknown") for name in ("contactverif_version", "commit"))
     return f"The command above wrote these files with contactverif {version}, commit {commit}."
-
-
-def _is_below(panel: SweepPanel) -> bool:
-    """Return whether all errors are below u κ."""
-    return panel.worst is not None and panel.worst.roundings <= 1
-
-
-def _pictures(files: Mapping[str, str]) -> list[str]:
-    return [files[suffix] for suffix in (".svg", ".png") if suffix in files][:1]
 
 
 def _table(panels: Sequence[SweepPanel]) -> list[str]:
