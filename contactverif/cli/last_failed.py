@@ -40,7 +40,9 @@ def _judge(job: VerifyJob, memory: FailureMemory) -> list[Row]:
     failures = memory.recall(job.options.names, job.options.properties)
     if not failures:
         needed = "a run of `verify` here in which something fails"
-        raise MisuseError("--last-failed", f"no failure of {', '.join(job.options.names)} in .contactverif", needed)
+        raise MisuseError(
+            "--last-failed", f"no failure of {', '.join(map(repr, job.options.names))} in .contactverif", needed
+        )
     plugins = job.load()
     subjects = {item.name: item for item in plugins.subjects if isinstance(item, Subject)}
     questions = {item.id: item for item in plugins.questions if isinstance(item, Property)}

@@ -8,6 +8,9 @@ that a plugin made, but for `str(error)`, which may raise.
 from __future__ import annotations
 
 import re
+from os.path import basename, dirname
+from traceback import walk_tb
+from types import TracebackType
 
 from contactverif.contract.errors import MisuseError
 
@@ -68,6 +71,18 @@ def describe_error(error: BaseException) -> str:
     except BaseException:
         return f"{kind}, whose message cannot be read"
     return f"{kind}: {one_line(message, LONGEST_MESSAGE)}"
+
+
+def place_of_error(error: BaseException) -> str:
+    """Return file and line in which a plugin's own code was when an exception arose, as ` (mine.py, line 7)`.
+
+    The first frame below the caller is the plugin's. The place is that of the last frame in a file of the same folder:
+    what lies deeper belongs to a library. It is empty where the exception arose in no code of Python.
+    """
+    trace: TracebackType | None = BaseException.__dict__["__traceback__"].__get__(error)
+    frames = [] if trace is None else [(frame.f_code.co_filename, line) for frame, line in walk_tb(trace.tb_next)]
+    places = [(file, line) for file, line in frames if dirname(file) == dirname(frames[0][0]) and file[:1] != "<"]
+    return f" ({name_line(basename(places[-1][0]))}, line {places[-1][1]})" if places else ""
 
 
 def clean(instance: object, *, names: tuple[str, ...] = (), lines: tuple[str, ...] = ()) -> None:

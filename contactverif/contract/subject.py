@@ -21,7 +21,7 @@ from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, f
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.first_answers import FirstAnswers
-from contactverif.contract.foreign_text import describe_error, name_line, one_line
+from contactverif.contract.foreign_text import describe_error, name_line, one_line, place_of_error
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
@@ -362,7 +362,7 @@ def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **o
         raise
     except BaseException as error:
         cause = "memory" if isinstance(error, MemoryError) else "exit" if isinstance(error, SystemExit) else "exception"
-        raise PluginError(f"{method}: {describe_error(error)}", cause) from error
+        raise PluginError(f"{method}: {describe_error(error)}{place_of_error(error)}", cause) from error
 
 
 def _check_forces(verb: str, forces: Any, z: Array) -> Array:

@@ -128,7 +128,8 @@ def test_the_error_of_a_class_is_the_cause() -> None:
         raise RuntimeError("no licence")
 
     with pytest.raises(
-        MisuseError, match=r"found make, which cannot be judged \(make: RuntimeError: no licence\)"
+        MisuseError,
+        match=r"found make, which cannot be judged \(make: RuntimeError: no licence \(test_verification\.py, line",
     ) as c:
         verify(make, FORCES)
     assert isinstance(c.value.__cause__, Exception)

@@ -53,7 +53,7 @@ def test_what_fails_is_kept_and_asked_first_until_it_passes(
     assert (mended.status, list(folder.iterdir())) == (0, [])
     assert mended.out.endswith("0 of 1 cases that failed in earlier runs fail again.\n")
     needed = "a run of `verify` here in which something fails"
-    message = f"--last-failed: found no failure of mine in .contactverif; needed {needed}"
+    message = f"--last-failed: found no failure of 'mine' in .contactverif; needed {needed}"
     check_mistake(ask("verify", "mine", *OPTIONS, "--last-failed"), message)
 
 
