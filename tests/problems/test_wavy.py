@@ -10,6 +10,7 @@ from subjects import load_subject
 from contactverif.contract.arrays import FloatArray
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
 from contactverif.mechanics.bulk import elasticity
+from contactverif.problems.problem import Variation
 from contactverif.problems.wavy import LOWER, UPPER, WAVY, WavyProblem, wavy_scene
 
 STEP = 1e-30
@@ -111,7 +112,7 @@ def test_either_body_may_be_the_slave() -> None:
 
 def test_displacements_of_another_code_have_the_errors_of_the_solution_that_they_are_of() -> None:
     subject = load_subject("mortar")
-    instance = WAVY.pose(2, 30.0, subject.traits)
+    instance = WAVY.pose(12, 30.0, subject.traits, Variation())
     ours = solve_for_accuracy(instance.scene, subject, instance.start, instance.step)
     theirs = Solution.from_displacements(instance.scene, ours.displacements)
     assert theirs.balanced
