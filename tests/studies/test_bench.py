@@ -32,6 +32,7 @@ from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
 from contactverif.isolation.remote_formulation import RemoteSubject
 from contactverif.mechanics.accuracy import solution_of, solve_for_accuracy, solve_in_tries
+from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.system import System
 from contactverif.mechanics.whole_system import WholeSystem
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
@@ -160,6 +161,16 @@ def test_the_whole_system_is_that_of_newtons_method_before_it_is_condensed() -> 
     )
     expected = system.stiffness + system.contact_stiffness(u, system.pair(u), tangent)
     np.testing.assert_allclose(schur, dense(expected), atol=1e-9 * np.abs(matrix).max())
+
+
+def test_the_factors_of_bodies_do_not_outlive_their_cell() -> None:
+    """The scene of a cell is remembered, and so are its stiffness and its load."""
+    subject, cell = load_subject("vts-ppt"), Cell("wavy", 32, 0)
+    solve_cell(cell, subject)
+    scene = pose(cell, 10.0, subject.traits, 0).scene
+    assert {"stiffness", "load"} <= vars(scene).keys()
+    assert "condensed_bodies" not in vars(scene)
+    assert condense.cache_info().currsize == 0
 
 
 def test_a_residual_alone_is_one_more_curve_and_its_differences_are_counted_as_such() -> None:

@@ -21,6 +21,7 @@ from scipy.sparse.linalg import splu
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import solution_of, solve_in_tries
+from contactverif.mechanics.scene import forget_bodies
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
 from contactverif.mechanics.whole_system import WholeSystem
@@ -72,6 +73,7 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool 
         if whole is not None:
             _solve_variants(cell, subject, instance, seed, whole, run)
             run.calls = evaluate(subject, instance, counted=True).calls
+    forget_bodies()
     gc.collect()
     with without_collector():
         for turn in range(TURNS):
@@ -107,6 +109,8 @@ def _solve(subject: Subject, instance: ProblemInstance, start: str, record: Solu
     formulation = add_meter(subject, instance.first_guess, meter)
     with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
         tries = solve_in_tries(instance.scene, formulation, instance.starts[start], instance.step)
+    # The scene keeps stiffness and load. The factors of its bodies may take gigabytes, and are of no further use.
+    vars(instance.scene).pop("condensed_bodies", None)
     counts = {"iterations": sum(trace.n_iterations for trace in tries), **meter.counts}
     plain = subject.for_case(instance.first_guess)
     solution = solution_of(tries[-1], plain, nodal=subject.traits.rules.penalty == "nodal")
