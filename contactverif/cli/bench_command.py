@@ -23,10 +23,10 @@ from contactverif.contract.errors import MisuseError
 if TYPE_CHECKING:
     from contactverif.isolation.limits import Limits
     from contactverif.studies.bench.bench_plan import BenchPlan
+    from contactverif_reports.bench.changes import Change
     from contactverif_reports.bench.results import BenchResults
-    from contactverif_reports.bench.slowdown import Slowdown
 
-_CALLS_OF_A_SOLUTION = 10  # A solution takes many calls; so many times the limit of one is far beyond all of them.
+_LONG_CALLS = 10  # A state of a large mesh, or all states of differences, may take so many times the limit of a call.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -39,18 +39,24 @@ def bench(
     all_: EveryFormulation = False,
     scene: Annotated[
         list[str] | None,
-        typer.Option(help="Only this scene: a problem such as wavy, or random. Repeatable.", metavar="NAME"),
+        typer.Option(help="Only this scene, a problem such as wavy. Repeatable.", metavar="NAME"),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Take the two coarsest meshes, one penalty, six random scenes.")
+        bool, typer.Option("--quick", help="Take the two coarsest meshes, five instances, two processes.")
     ] = False,
-    repeats: Annotated[int, typer.Option(help="Timed repeats of each solution.", metavar="N")] = 7,
+    instances: Annotated[
+        int | None, typer.Option(help="Instances of each mesh, 15 by default.", metavar="N", show_default=False)
+    ] = None,
+    processes: Annotated[
+        int | None,
+        typer.Option(help="Processes of each formulation, 5 by default.", metavar="N", show_default=False),
+    ] = None,
     against: Annotated[
-        Path | None, typer.Option(help="Say what became slower since this file of a bench.", metavar="OLD.nc")
+        Path | None, typer.Option(help="Say what changed since this file of a bench.", metavar="OLD.nc")
     ] = None,
     out: Annotated[
         list[Path] | None,
-        output_option("Write the results: FILE.nc all repeats, FILE.html or FILE.md a page. Repeatable."),
+        output_option("Write the results: FILE.nc all instances, FILE.html or FILE.md a page. Repeatable."),
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Draw the figures into this folder.", metavar="FOLDER")] = None,
     jobs: Annotated[
@@ -60,17 +66,18 @@ def bench(
 ) -> None:
     """Measure speed against error, on scenes whose exact solution is known.
 
-    All formulations solve the same scenes on meshes fine and coarse, at
-    penalties soft to stiff, in turns, on one thread. Runs without a
-    solution count as infinitely slow. A plugin solves in a process of its
-    own, and may take ten times --time-limit for a solution. While it runs,
+    All formulations solve the same instances of each mesh, from the same
+    start. What an error costs is three numbers: the seconds of one
+    evaluation in the plugin's process, linear systems, and the seconds of
+    one factorisation. Runs without a solution never get there. A plugin
+    may take ten times --time-limit for a call. While it runs,
     FILE.nc.journal keeps what is finished: the same command goes on where
     it was stopped.
 
     \bExit status
-      0  measured; with --against, nothing became slower
-      1  something became slower by its ratio, or a plugin crashes or does
-         not load
+      0  measured; with --against, no count grew and nothing is slower
+      1  a count grew, an evaluation is slower by its interval, or a plugin
+         crashes or does not load
       2  the command line is wrong; one line says what is needed
 
     \bExamples
@@ -85,7 +92,7 @@ def bench(
     files = OutputFiles.check(out, (REPORT, PAGE, MARKDOWN))
     folder = PictureFolder.make(pictures)
     from contactverif.studies.bench.bench_plan import make_plan
-    from contactverif_reports.bench.slowdown import slowdowns
+    from contactverif_reports.bench.changes import changes
     from contactverif_reports.netcdf.bench_file import read_bench
 
     old = read_bench(against) if against else None
@@ -93,21 +100,21 @@ def bench(
         results = read_bench(file)
     else:
         limits = isolation.limits()
-        plan = make_plan(scene or [], quick=quick, repeats=repeats)
+        plan = make_plan(scene or [], quick=quick, instances=instances, processes=processes)
         results = _run(select_names(names or [], all_, limits), plan, limits, files)
         results = _with_facts(results, pinned)
-    changes = () if old is None else slowdowns(results, old)
-    _write(results, changes, files, folder, file)
-    _show(results, changes, files, folder, compared=old is not None)
-    raise typer.Exit(_exit_status(results, changes))
+    since = () if old is None else changes(results, old)
+    _write(results, since, files, folder, file)
+    _show(results, since, files, folder, compared=old is not None)
+    raise typer.Exit(_exit_status(results, since))
 
 
-def _exit_status(results: BenchResults, changes: Sequence[Slowdown]) -> int:
-    """Return 1 if something became slower, crashed or did not load."""
+def _exit_status(results: BenchResults, changes: Sequence[Change]) -> int:
+    """Return 1 if something became worse, crashed or did not load."""
     from contactverif_reports.bench.results import Outcome
 
     crashed = bool((results.outcomes == Outcome.CRASHED).any())
-    return int(crashed or bool(results.not_loaded) or any(change.slower for change in changes))
+    return int(crashed or bool(results.not_loaded) or any(change.worse for change in changes))
 
 
 def _with_facts(results: BenchResults, pinned: bool) -> BenchResults:
@@ -139,7 +146,7 @@ def _run(names: list[str], plan: BenchPlan, limits: Limits | None, files: Output
     from contactverif.run.registry import load_formulation
     from contactverif.studies.bench.bench_study import run_bench
 
-    of_solution = None if limits is None else replace(limits, seconds=_CALLS_OF_A_SOLUTION * limits.seconds)
+    of_solution = None if limits is None else replace(limits, seconds=_LONG_CALLS * limits.seconds)
     subjects = [load_formulation(name, of_solution) for name in names]
     with Bar() as bar:
         results = run_bench(subjects, plan, output=files.paths.get(REPORT), progress=bar.update)
@@ -148,7 +155,7 @@ def _run(names: list[str], plan: BenchPlan, limits: Limits | None, files: Output
 
 
 def _write(
-    results: BenchResults, changes: tuple[Slowdown, ...], files: OutputFiles, folder: PictureFolder | None, file: str
+    results: BenchResults, changes: tuple[Change, ...], files: OutputFiles, folder: PictureFolder | None, file: str
 ) -> None:
     """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:
@@ -177,32 +184,35 @@ def _write(
 
 def _show(
     results: BenchResults,
-    changes: tuple[Slowdown, ...],
+    changes: tuple[Change, ...],
     files: OutputFiles,
     folder: PictureFolder | None,
     *,
     compared: bool,
 ) -> None:
     """Print a table for each scene, the sentences, and the names of the files."""
-    from contactverif.cli.bench_tables import slowdown_sentence, slowdown_table, targets_table
     from contactverif.cli.console import say, show
-    from contactverif_reports.bench.clocks import clock_sentences
-    from contactverif_reports.bench.work_precision import cost_sentence
 
-    for scene in results.scenes:
-        show(targets_table(results, scene))
-    if any(map(results.uses_differences, results.formulations)):
-        show("* with differences of forces where there is no tangent, or it did not help")
-    for scene in results.scenes:
-        if sentence := cost_sentence(results, scene):
-            show(sentence)
-    for sentence in clock_sentences(results):
-        show(sentence)
+    _show_costs(results)
     for name, reason in results.not_loaded.items():
         show(f"{name} did not load: {reason}")
     if compared:
-        show(slowdown_table(changes))
-        show(slowdown_sentence(changes))
+        sentences = [change.sentence for change in changes]
+        show("\n".join(sentences) or "The earlier bench has none of these formulations and cells.")
     files.announce()
     if folder is not None:
         say(f"pictures: {folder.name}")
+
+
+def _show_costs(results: BenchResults) -> None:
+    """Print a table for each scene, and the sentences."""
+    from contactverif.cli.bench_tables import costs_table
+    from contactverif.cli.console import show
+    from contactverif_reports.bench.cost_tables import cost_sentences
+
+    for scene in results.scenes:
+        show(costs_table(results, scene))
+    if any(results.uses_differences(name, scene) for name in results.formulations for scene in results.scenes):
+        show("* with differences of forces where there is no tangent, or it did not help")
+    for scene in results.scenes:
+        show("\n".join(cost_sentences(results, scene, results.targets[scene][0])))

@@ -144,17 +144,19 @@ class Host:
         z: Array | None,
         *,
         timed: bool = False,
+        counted: bool = False,
     ) -> Question:
         """Put a question into the queue and return it. `timed`: its call is timed, a short one when it is repeated.
 
-        The pairing may be the number under which the process keeps one of its answers.
+        `counted`: the methods that run in it are counted. The pairing may be the number under which the process keeps
+        one of its answers.
         """
         if sum(question is not None for _, question in self._queue) >= MOST_QUESTIONS:
             self.flush()
         of_interface = self._share(interface)
         of_pairing = self._share(pairing) if isinstance(pairing, Pairing) else pairing
         packed = None if z is None else PackedArray.pack(z)
-        ask = Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed)
+        ask = Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed, counted)
         return self._put(verb, ask, 0 if z is None else z.size)
 
     def _share(self, item: Interface | Pairing) -> int:

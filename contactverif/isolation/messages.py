@@ -72,15 +72,16 @@ class Ask(msgspec.Struct, array_like=True, tag="ask"):
     pairing: int | None
     z: PackedArray | None
     timed: bool = False
+    counted: bool = False  # The methods that run in the call are counted.
 
 
 class Answer(msgspec.Struct, array_like=True, tag="answer"):
-    """The arrays of an answer by name, and the time of the call there: by the wall clock and of the processor."""
+    """The arrays of an answer by name, the time of the call there, and the number of methods that ran in it."""
 
     question: int
     arrays: Annotated[dict[str, PackedArray], msgspec.Meta(max_length=_MOST_NAMES)]
     seconds: float
-    processor_seconds: float
+    calls: int
     count: int = 0  # The number of multipliers.
     handle: bool = False  # The pairing has a handle.
 

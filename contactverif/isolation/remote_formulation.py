@@ -104,6 +104,7 @@ class RemoteFormulation(Prefetching):
             if part not in make.provides or (part == "n_multipliers" and not counted):
                 setattr(self, part, None)
         self.timed = False  # True: the process times each call, and a short one when it is repeated.
+        self.counted = False  # True: the process counts the methods that run in each call.
         self._number, self._started = 0, -1
         self._last: Question | None = None
         self._prefetched: deque[tuple[Call, Question]] = deque()
@@ -118,7 +119,8 @@ class RemoteFormulation(Prefetching):
             self._number, self._started = host.make(self._penalty)
             weakref.finalize(self, host.forget, self._number, self._started)
         number = pairing.number_in(host) if isinstance(pairing, RemotePairing) else None
-        self._last = host.ask(verb, self._number, interface, pairing if number is None else number, z, timed=self.timed)
+        of_pairing = pairing if number is None else number
+        self._last = host.ask(verb, self._number, interface, of_pairing, z, timed=self.timed, counted=self.counted)
         return self._last
 
     def _answer(
@@ -129,7 +131,7 @@ class RemoteFormulation(Prefetching):
             self._host.flush()
         if isinstance(pairing, RemotePairing):
             pairing.check()
-        if not self.timed:
+        if not (self.timed or self.counted):
             self._last = None  # It would keep the answer.
         return answer_of(question)
 
@@ -154,17 +156,25 @@ class RemoteFormulation(Prefetching):
         self._last = question
         return self._prefetched.popleft()[1]
 
-    def seconds(self) -> tuple[float, float]:
-        """Return the seconds that the last call, which was `timed`, took there, by the wall clock and of the processor.
+    def seconds(self) -> float:
+        """Return the seconds that the last call, which was `timed`, took there.
 
         They hold neither the round trip nor any check. A plugin may say what it likes, within reason.
         """
+        answer = self._last_answer()
+        if not 0 <= answer.seconds <= _MOST_SECONDS:
+            assert self._last is not None
+            raise PluginError(f"{self._last.verb}: times that cannot be", "channel")
+        return answer.seconds
+
+    def calls(self) -> int:
+        """Return the number of methods that ran in the last call, which was `counted`."""
+        return self._last_answer().calls
+
+    def _last_answer(self) -> Answer:
         assert self._last is not None
         self._host.flush()
-        answer = answer_of(self._last)
-        if not (0 <= answer.seconds <= _MOST_SECONDS and 0 <= answer.processor_seconds <= _MOST_SECONDS):
-            raise PluginError(f"{self._last.verb}: times that cannot be", "channel")
-        return answer.seconds, answer.processor_seconds
+        return answer_of(self._last)
 
     def n_multipliers(self, interface: Interface) -> int:
         """Return the number of multipliers."""

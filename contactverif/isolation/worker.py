@@ -11,9 +11,10 @@ import faulthandler
 import mmap
 import os
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import fields
 from functools import partial
-from time import perf_counter, process_time
+from time import perf_counter
 from typing import Any
 
 import msgspec
@@ -47,6 +48,7 @@ from contactverif.isolation.messages import (
     decode_requests,
     encode,
 )
+from contactverif.isolation.method_calls import MethodCalls
 from contactverif.isolation.packed import PackedArray
 from contactverif.isolation.parent_death import die_with_parent
 from contactverif.isolation.process import MEMORY, PROGRESS
@@ -155,12 +157,12 @@ class Desk:
         interface: Interface = self._get(ask.interface)
         count = formulation.n_multipliers(interface)  # It is known from now on, so no call is timed with it.
         if ask.method == "n_multipliers":
-            return Answer(ask.question, {}, 0.0, 0.0, count)
+            return Answer(ask.question, {}, 0.0, 0, count)
         assert ask.z is not None
         arguments = interface, None if ask.pairing is None else self._get(ask.pairing), ask.z.unpack()
-        watch.runs = ask.timed
+        watch.runs, watch.counts = ask.timed, ask.counted
         for _ in range(2):
-            watch.seconds = watch.processor_seconds = 0.0
+            watch.seconds, watch.calls = 0.0, 0
             if ask.method == "pair":
                 answer: Any = formulation.own_pairing(interface, arguments[2])
                 self._store[ask.question] = answer
@@ -169,7 +171,7 @@ class Desk:
             if not ask.timed or watch.seconds > _SHORT:
                 break
         handle = ask.method == "pair" and answer.opaque
-        return Answer(ask.question, _pack(ask.method, answer), watch.seconds, watch.processor_seconds, handle=handle)
+        return Answer(ask.question, _pack(ask.method, answer), watch.seconds, watch.calls, handle=handle)
 
 
 def _plain(value: Any) -> Any:
@@ -178,22 +180,23 @@ def _plain(value: Any) -> Any:
 
 
 class Stopwatch:
-    """A plugin whose calls are timed while the clock `runs`, by the wall clock and by the clock of the processor."""
+    """A plugin whose calls are timed while the clock `runs`, and whose methods are counted while it `counts`."""
 
     def __init__(self, plugin: Any) -> None:
-        self._plugin, self.runs = plugin, False
-        self.seconds = self.processor_seconds = 0.0
+        self._plugin, self.runs, self.counts = plugin, False, False
+        self.seconds, self.calls = 0.0, 0
 
     def __getattr__(self, name: str) -> Any:
         method = getattr(self._plugin, name)
-        if not (self.runs and callable(method)):
+        if not callable(method) or not (self.runs or self.counts):
             return method
 
         def call(*arguments: Any) -> Any:
-            start, processor = perf_counter(), process_time()
-            answer = method(*arguments)
-            self.processor_seconds += process_time() - processor
-            self.seconds += perf_counter() - start
+            with MethodCalls() if self.counts else nullcontext() as counter:
+                start = perf_counter()
+                answer = method(*arguments)
+                self.seconds += perf_counter() - start
+            self.calls += 0 if counter is None else counter.count
             return answer
 
         return call

@@ -36,14 +36,24 @@ GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 ti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A solved scene, as its errors need it."""
+    """A solved scene, as its errors need it, whoever solved it."""
 
     scene: Scene  # It has the distributed penalty ε̂ that it was solved with.
     state: Case  # The positions, multipliers behind them.
     forces: FloatArray  # (n_nodes, 2), by which contact pushes the nodes
-    points: ContactPoints | None  # None if none are reported
-    nodal: bool  # Pressures of points are nodal forces (trait `penalty="nodal"`).
-    trace: Trace  # Newton's method, iterate by iterate.
+    points: ContactPoints | None = None  # None if none are reported
+    nodal: bool = False  # Pressures of points are nodal forces (trait `penalty="nodal"`).
+    trace: Trace | None = None  # Newton's method, iterate by iterate; None if another code solved the scene.
+
+    @classmethod
+    def from_displacements(cls, scene: Scene, displacements: FloatArray) -> Solution:
+        """Return the solution of another code from its displacements (n_nodes, 2) of the interface's nodes.
+
+        The forces are those that the bodies need for these displacements, supports included.
+        """
+        state = Case(scene.interface, (scene.interface.nodes + displacements).reshape(-1), scene.penalty)
+        q = scene.transformation.T @ displacements.reshape(-1)
+        return cls(scene, state, scene.nodal_forces(np.asarray(q)))
 
     @property
     def interface(self) -> Interface:
@@ -58,21 +68,21 @@ class Solution:
     @property
     def n_iterations(self) -> int:
         """The number of iterations of Newton's method."""
-        return self.trace.n_iterations
+        return self.trace.n_iterations if self.trace is not None else 0
 
     @property
     def end(self) -> str:
         """The end of Newton's method, in words."""
-        return self.trace.end.label
+        return self.trace.end.label if self.trace is not None else ""
 
     @property
     def balanced(self) -> bool:
         """True if Newton's method found a solution (up to BALANCED), or came as near to one as roundoff lets it."""
-        return self.trace.end in (End.CONVERGED, End.STAGNATED)
+        return self.trace is None or self.trace.end in (End.CONVERGED, End.STAGNATED)
 
     def is_balanced_to(self, force: float) -> bool:
         """Return whether it is a solution, or out of balance by no more than a force."""
-        return self.balanced or bool(self.trace.residuals[-1] <= force)
+        return self.balanced or (self.trace is not None and bool(self.trace.residuals[-1] <= force))
 
 
 def solve_for_accuracy(

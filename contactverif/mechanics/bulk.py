@@ -51,7 +51,7 @@ class CondensedBody:
     load: FloatArray  # (n,) The condensed load g, a force, of nodal forces and of imposed displacements.
     _interior: IntArray
     _particular: FloatArray  # (2 n_nodes,): the displacements if all unknowns are 0.
-    _influence: FloatArray  # (n_interior, n): the effect of the unknowns on the interior.
+    _influence: Callable[[FloatArray], FloatArray]  # From the unknowns (n,) to their effect on the interior.
     _gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
@@ -60,7 +60,7 @@ class CondensedBody:
         `q` (n,) are the unknowns, and `factor` is the share of loads and imposed displacements.
         """
         u = factor * self._particular
-        u[self._interior] += self._influence @ q
+        u[self._interior] += self._influence(q)
         u[self.unknowns] = q
         return u.reshape(-1, 2) @ self.body.frame.T
 
@@ -145,7 +145,8 @@ def condense(body: Body) -> CondensedBody:
     if body.rigid:
         none, unknowns = np.zeros((0, 0)), free_on_contact(body)
         interior = np.zeros(0, np.int64)
-        return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none, np.zeros((0, 1, 4, 2)))
+        gradients = np.zeros((0, 1, 4, 2))
+        return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none.__matmul__, gradients)
     matrices = _factorise(_ElasticPart.of_body(body))
     forces = body.load.reshape(-1)
     if imposed.any():
@@ -175,7 +176,7 @@ class _Matrices:
     across: Any  # (n_interior, n) The part of it that couples the interior with the unknowns.
     # Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
     solve: Callable[[FloatArray], FloatArray]
-    influence: FloatArray  # (n_interior, n) The effect of the unknowns on the interior.
+    influence: Callable[[FloatArray], FloatArray]  # From the unknowns (n,) to their effect on the interior.
     condensed: FloatArray  # (n, n) The condensed stiffness, symmetric.
     gradients: FloatArray  # (n_cells, n_points, n_corners, 2) The gradients of the shape functions.
 
@@ -205,10 +206,34 @@ def _factorise(part: _ElasticPart) -> _Matrices:
     interior = np.flatnonzero(free)
     whole, gradients = assemble_stiffness(body)
     inner = whole[interior]
-    across, solve = inner[:, unknowns], _interior_solver(body, inner[:, interior])
-    influence = -solve(dense(across))
-    condensed = dense(whole[unknowns][:, unknowns]) + across.T @ influence
+    across, (solve, order) = inner[:, unknowns], _interior_solver(body, inner[:, interior])
+    condensed = None if order is None else _last_block(whole, interior[order], unknowns)
+    effect: FloatArray | None = None
+    if condensed is None:
+        effect = -solve(dense(across))
+        condensed = dense(whole[unknowns][:, unknowns]) + across.T @ effect
+
+    def influence(q: FloatArray) -> FloatArray:
+        return -solve(across @ q) if effect is None else effect @ q
+
     return _Matrices(unknowns, interior, whole, across, solve, influence, (condensed + condensed.T) / 2, gradients)
+
+
+def _last_block(whole: Any, first: IntArray, last: IntArray) -> FloatArray | None:
+    """Return the Schur complement of the `last` components of a sparse stiffness, from its factors L and U.
+
+    What is eliminated `first` stands in an order that fills little. A shift of the last diagonal keeps a body that can
+    move regular; it is taken off again. The answer is None where SuperLU has changed the order of the last components.
+    """
+    places = np.concatenate([first, last])
+    shift = np.where(np.arange(len(places)) < len(first), 0.0, whole.diagonal().max())
+    matrix = sparse.csc_array(whole[places][:, places] + sparse.diags_array(shift))
+    factors = splu(matrix, **_SYMMETRIC | {"permc_spec": "NATURAL"})
+    end = np.arange(len(first), len(places))
+    if not ((factors.perm_c[end] == end).all() and (factors.perm_r[end] == end).all()):
+        return None
+    block: FloatArray = (factors.L[end][:, end] @ factors.U[end][:, end]).toarray() - np.diag(shift[end])
+    return block
 
 
 def forget_condensed() -> None:
@@ -217,16 +242,20 @@ def forget_condensed() -> None:
     _factorise.cache_clear()
 
 
-def _interior_solver(body: Body, matrix: Any) -> Callable[[FloatArray], FloatArray]:
-    """Factorise the stiffness (n_interior, n_interior) of the interior; return what solves for given forces."""
+def _interior_solver(body: Body, matrix: Any) -> tuple[Callable[[FloatArray], FloatArray], IntArray | None]:
+    """Factorise the stiffness (n_interior, n_interior) of the interior.
+
+    Return a function that solves for given forces, and the order (n_interior,) of elimination of a sparse matrix.
+    """
+    order = None
     if not matrix.shape[0]:
-        return lambda forces: forces
+        return lambda forces: forces, order
     if sparse.issparse(matrix):
         try:
             factors = splu(matrix.tocsc(), **_SYMMETRIC)
         except RuntimeError:  # The matrix is exactly singular.
             raise _loose_part_error(body) from None
-        pivots = np.abs(factors.U.diagonal()[factors.perm_c])
+        pivots, order = np.abs(factors.U.diagonal()[factors.perm_c]), np.argsort(factors.perm_c)
         solve: Callable[[FloatArray], FloatArray] = factors.solve
     else:
         factor, info = lapack.dpotrf(matrix, lower=1)
@@ -235,7 +264,7 @@ def _interior_solver(body: Body, matrix: Any) -> Callable[[FloatArray], FloatArr
         pivots, solve = factor.diagonal() ** 2, lambda forces: lapack.dpotrs(factor, forces, lower=1)[0]
     if not (pivots > _PIVOT_FLOOR * matrix.diagonal()).all():
         raise _loose_part_error(body)
-    return solve
+    return solve, order
 
 
 def _loose_part_error(body: Body) -> MisuseError:

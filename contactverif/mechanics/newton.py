@@ -108,7 +108,7 @@ def solve(
         end, u = _load_step(system, record, u, iterations, tolerance, keep_matrix)
         if end is not End.CONVERGED:
             break
-    return record.trace(scene, end, system.solve_seconds)
+    return record.trace(scene, end)
 
 
 def _load_step(

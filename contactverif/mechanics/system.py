@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from time import process_time
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,6 @@ class System:
     use_tangent: bool = True
     # The step of differences in positions, a length; None for the one that suits smooth residuals.
     difference_step: float | None = None
-    solve_seconds: float = 0.0  # The processor's time spent in linear systems so far.
     n_multipliers: int = field(init=False)  # The number of multipliers of the formulation on the scene's interface.
     # (n_unknowns + n_multipliers, n) The scene's transformation from unknowns to positions, with the multipliers
     # behind both.
@@ -176,10 +174,7 @@ class System:
 
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
-        start = process_time()
-        step = linear.solve_step(matrix, right, self.scene.n_free, floor)
-        self.solve_seconds += process_time() - start
-        return step
+        return linear.solve_step(matrix, right, self.scene.n_free, floor)
 
     def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
         """Return the derivative (n_unknowns, n_unknowns) of the contact forces at z, by central differences."""

@@ -91,8 +91,6 @@ class Trace:
         An estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last iterate.
     deficiencies : IntArray, shape (n_iterates,)
         The number of multipliers that were not unique in the step from the iterate; 0 where none was taken.
-    solve_seconds : float
-        The processor's time spent in linear systems.
     pairings : tuple[Pairing | None, ...]
         The pairing at each iterate; None if the formulation has none.
     forces : FloatArray, shape (n_unknowns + n_multipliers,)
@@ -121,7 +119,6 @@ class Trace:
     changes: IntArray
     conditions: FloatArray
     deficiencies: IntArray
-    solve_seconds: float
     pairings: tuple[Pairing | None, ...]
     forces: FloatArray
 
@@ -197,13 +194,13 @@ class Record:
         self.conditions.append(np.nan)
         self.deficiencies.append(0)
 
-    def trace(self, scene: Scene, end: End, solve_seconds: float) -> Trace:
+    def trace(self, scene: Scene, end: End) -> Trace:
         """Return the trace of the iterates so far."""
         names = ("factors", "residuals", "energies", "floors", "roundings", "conditions", "forces")
         arrays: dict[str, Any] = {name: freeze(getattr(self, name), np.float64) for name in names}
         arrays |= {name: freeze(getattr(self, name), np.int64) for name in ("changes", "deficiencies")}
         u = freeze(np.array(self.u), np.float64)
-        return Trace(scene, end, u, solve_seconds=solve_seconds, pairings=tuple(self.pairings), **arrays)
+        return Trace(scene, end, u, pairings=tuple(self.pairings), **arrays)
 
 
 def largest_rounding(residual: FloatArray, floor: FloatArray) -> float:

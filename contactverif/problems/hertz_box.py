@@ -12,9 +12,9 @@ that the whole force is given.
 What is left of a finite slope and of finite deformations is of the order a/R: 3e-4 in nodal forces.
 
 Rules for the next editor: no node of one body meets one of the other in the contact. On each mesh the edges of the
-contact divide segments one to two and two to one, so that errors fall evenly: with edges anywhere, they scatter by a
-factor of 3. Cells grow away from the contact by a share that falls like √h, so that the error of the mesh itself falls
-like h.
+contact divide segments one to two and two to one, so that errors fall evenly: with edges anywhere, where `mesh_scale`
+puts them, they scatter by a factor of 3. Cells grow away from the contact by a share that falls like √h, so that the
+error of the mesh itself falls like h.
 
 References
 ----------
@@ -56,6 +56,7 @@ class HertzBox:
     # Young's moduli, force per length squared, and Poisson's ratios of parabola and flat.
     young: tuple[float, float] = (1.0, 3.0)
     poisson: tuple[float, float] = (0.3, 0.2)
+    mesh_scale: float = 1.0  # The half-width that meshes are made for, over that of the contact
 
     @property
     def stiffness(self) -> float:
@@ -104,7 +105,7 @@ def hertz_body(box: HertzBox, number: int, *, penalty: float | None, across: int
     The penalty is that of the exact solution; None is that of multipliers.
     """
     pressure, a = box.pressure(penalty), box.half_width
-    x, depth, zone = (a * lines for lines in mesh_lines(number, across))
+    x, depth, zone = (a * box.mesh_scale * lines for lines in mesh_lines(number, across))
     grid = np.arange(len(x) * len(depth)).reshape(len(depth), len(x))
     along, down = (part.reshape(-1) for part in np.meshgrid(x, depth))
     load = side_forces(pressure, x, depth).reshape(-1, 2)
@@ -193,8 +194,8 @@ def _exact_displacements(box: HertzBox, penalty: float | None, number: int, plac
     moves = surface_displacements(pressure, x, young, poisson)
     if number == 1:
         lines, depth, _ = mesh_lines(1, across)
-        named = box.half_width * lines[np.abs(lines).argmin()], box.half_width * depth[-1]
-        moves -= [0, 1] * displacements(pressure, np.array(named[:1]), np.array(named[1:]), young, poisson)[0]
+        named = box.half_width * box.mesh_scale * np.array([lines[np.abs(lines).argmin()], depth[-1]])
+        moves -= [0, 1] * displacements(pressure, named[:1], named[1:], young, poisson)[0]
         return freeze(moves * [1, -1], np.float64)
     centre = np.zeros(1)
     below = exact_displacements(box, penalty, 1, centre, across)[0, 1]

@@ -40,6 +40,7 @@ from contactverif.problems.problem import (
     Problem,
     ProblemInstance,
     Studies,
+    Variation,
 )
 
 BOX = HertzBox()
@@ -56,6 +57,7 @@ class HertzStudy:
     parabola_is_slave: bool
     stiffness: float  # The penalty ε̂ over E/h, with E and the segments h of the parabola
     fixed: bool = False  # The stiffness is ε̂ over E/a instead, with the half-width a, the same on all meshes.
+    box: HertzBox = BOX
 
     @property
     def meshes(self) -> tuple[int, ...]:
@@ -68,23 +70,23 @@ class HertzStudy:
 
     def penalty(self, across: int) -> float:
         """Return the penalty ε̂ on a mesh."""
-        length = BOX.half_width if self.fixed else 2 * BOX.half_width / (across + 1 / 3)
-        return self.stiffness * BOX.young[0] / length
+        length = self.box.half_width if self.fixed else 2 * self.box.half_width / (across + 1 / 3)
+        return self.stiffness * self.box.young[0] / length
 
     def pose(self, across: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh. With a penalty, Newton's method starts at the exact displacements."""
         multipliers, role = traits.rules.enforcement == "multiplier", self.parabola_is_slave
         penalty = self.penalty(across)
         law = None if multipliers else penalty
-        scene = hertz_box(BOX, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
-        start, pressure = None, BOX.pressure(law)
+        scene = hertz_box(self.box, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
+        start, pressure = None, self.box.pressure(law)
         if not multipliers:  # Exact gaps of multipliers are 0 and do not say what is in contact; penetration does.
-            start = scene.transformation.T @ exact_moves(BOX, law, scene, role, across).reshape(-1)
+            start = scene.transformation.T @ exact_moves(self.box, law, scene, role, across).reshape(-1)
 
         def motion(places: FloatArray) -> FloatArray:
-            return exact_displacements(BOX, law, body_number("slave", role), places[:, 0], across)
+            return exact_displacements(self.box, law, body_number("slave", role), places[:, 0], across)
 
-        forces = partial(exact_forces, BOX, law, scene.interface, role)
+        forces = partial(exact_forces, self.box, law, scene.interface, role)
         return ProblemInstance(
             scene=scene,
             forces=forces,
@@ -104,18 +106,18 @@ class HertzStudy:
         ε̂ times that to pressures; multipliers are as stiff as can be.
         """
         sides = (mesh_lines(body_number(side, self.parabola_is_slave), across)[2] for side in ("slave", "master"))
-        slave, master = (BOX.half_width * nodes for nodes in sides)
+        slave, master = (self.box.half_width * nodes for nodes in sides)
         penalty = HertzStudy(self.parabola_is_slave, *PENALTIES["stiff"]).penalty(across) if multipliers else None
-        chord = (2 * BOX.half_width * self.size(across)) ** 2 / (sqrt(180) * 2 * BOX.radius)
+        chord = (2 * self.box.half_width * self.size(across)) ** 2 / (sqrt(180) * 2 * self.box.radius)
         facets = (penalty or self.penalty(across)) * chord
-        constant = pressure.constant_error(slave) * sqrt(pressure.square / (2 * BOX.half_width))
+        constant = pressure.constant_error(slave) * sqrt(pressure.square / (2 * self.box.half_width))
         return {
             FORCES[0]: pressure.linear_error(slave),
             FORCES[1]: pressure.linear_error(master),
             MOTIONS[0]: pressure.linear_error(slave),
             PEAK: pressure.linear_error(slave),
             PRESSURE: (constant + facets) / pressure.peak,
-            WIDTH: (slave[1] - slave[0]) / BOX.half_width,
+            WIDTH: (slave[1] - slave[0]) / self.box.half_width,
         }
 
     def group(self, traits: Traits) -> str:
@@ -206,11 +208,18 @@ HERTZ_STUDIES = Studies(
 )
 
 
+def _pose(across: int, stiffness: float, traits: Traits, variation: Variation) -> ProblemInstance:
+    """Return the problem with about so many segments across the contact, whose edge lies anywhere in a segment."""
+    count = max(COARSEST, round(across * variation.size))
+    box = replace(BOX, mesh_scale=1 + 2 * variation.shift / count, radius=BOX.radius / variation.load)
+    instance = HertzStudy(not variation.swapped, stiffness, box=box).pose(count, traits)
+    return replace(instance, start=None)
+
+
 HERTZ = Problem(
     label="Hertz' contact in boxes",
-    unit="E/h",
-    meshes=(COARSEST, 22, 30, 42),
-    penalties=(1.0, 10.0, 100.0),
-    pose=lambda across, stiffness, traits: HertzStudy(True, stiffness).pose(across, traits),
+    meshes=(20, 40, 80),
+    targets=(2e-2, 1e-2, 5e-3, 1e-3),
+    pose=_pose,
     rank=2,
 )

@@ -22,7 +22,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import grid_cells
-from contactverif.problems.problem import Problem, ProblemInstance
+from contactverif.problems.problem import Problem, ProblemInstance, Variation
 from contactverif.problems.uniform_stress import pose_uniform
 
 LAYERS = 2  # Layers of cells of each block.
@@ -163,21 +163,24 @@ def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
 _WIDTH, _HEIGHT = 8.0, 1.5  # Lengths of the zigzag with one tooth
 
 
-def _pose(teeth: int, stiffness: float, traits: Traits) -> ProblemInstance:
+def _pose(teeth: int, stiffness: float, traits: Traits, variation: Variation) -> ProblemInstance:
     """Return blocks on a zigzag of so many teeth: it has two normals, so that the uniform state is exact."""
+    height = _HEIGHT * (1 + variation.grading / 4)
     places = range(2 * teeth + 1)
-    problem = KinkedPatch(tuple((_WIDTH * place / (2 * teeth), _HEIGHT / teeth * (place % 2)) for place in places))
-    penalty = stiffness * problem.young
-    scene = kinked_patch(problem, penalty=penalty)
-    penetration = 0.0 if traits.rules.enforcement == "multiplier" else problem.pressure / penalty
+    line = tuple((_WIDTH * place / (2 * teeth), height / teeth * (place % 2)) for place in places)
+    problem = KinkedPatch(line, pressure=1e-6 * variation.load)
+    upper_slave = not variation.swapped
+    shares = UPPER if upper_slave else LOWER
+    segment = float(np.hypot(_WIDTH / 2, height)) / teeth / (len(shares) - 1)
+    scene = kinked_patch(problem, upper_slave=upper_slave, penalty=stiffness * problem.young / segment)
+    penetration = 0.0 if traits.rules.enforcement == "multiplier" else problem.pressure / scene.penalty
     return pose_uniform(scene, problem.pressure, exact_unknowns(problem, scene, penetration))
 
 
 KINKED = Problem(
     label="two blocks on a zigzag",
-    unit="E/ℓ",
-    meshes=(1, 2, 4),
-    penalties=(1.0, 30.0, 1e3),
+    meshes=(1,),  # The uniform state is exact on every mesh.
+    targets=(1e-2, 1e-5),
     pose=_pose,
     rank=4,
 )

@@ -33,6 +33,9 @@ FORCES = "slave forces", "master forces"
 MOTIONS = "slave displacement", "master displacement"
 PRESSURE, ITERATIONS = "pressure", "iterations"
 
+NEAR, DEEP = "near", "deep"  # The starts of Newton's method in a bench.
+DEPTH = 10  # The depth of the deep start over that of the near one.
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ProblemInstance:
@@ -46,9 +49,17 @@ class ProblemInstance:
     parts: int = 1  # The number of equal parts of a segment, in each of which displacements are smooth
     deformed: bool = True  # Forces are distributed over current lengths, not over those of the reference.
     further: Callable[[Solution], Errors] = lambda _: {}  # Further kinds of error
-    start: FloatArray | None = None  # (n_free,): the first iterate; None for the first guess of the scene
+    # (n_free,): the first iterate of a property, which asks for the solution alone; None for the guess of the scene
+    start: FloatArray | None = None
+    deep: FloatArray | None = None  # (n_free,): ten times as deep as the guess; None for ten times its displacements
     step: float | None = None  # The step of differences, a length, where a formulation has no tangent
     best: Mapping[str, float] = field(default_factory=dict)  # The least errors that the mesh allows, where known
+
+    @property
+    def starts(self) -> dict[str, FloatArray]:
+        """The first iterates (n_free,) of a bench, the same for all formulations: near is the guess of the scene."""
+        deep = DEPTH * self.scene.start if self.deep is None else self.deep
+        return {NEAR: self.scene.start, DEEP: deep}
 
     @property
     def first_guess(self) -> Case:
@@ -81,14 +92,28 @@ class ProblemInstance:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Variation:
+    """A draw of what a problem leaves open, so that no result depends on one mesh. The default is the mesh itself."""
+
+    size: float = 1.0  # The number of segments over that of the mesh, 0.8 to 1.2
+    shift: float = 0.0  # The place of an edge or of the master's nodes, −1/2 to 1/2 of a segment
+    grading: float = 0.0  # How much the master's segments grow along the surface, −1 to 1
+    load: float = 1.0  # The factor of the load
+    swapped: bool = False  # The other body is the slave.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """A problem that `contactverif bench` can solve: what an entry point of the group `contactverif.problems` names."""
+    """A problem that `contactverif bench` can solve: what an entry point of the group `contactverif.problems` names.
+
+    `pose` takes a mesh, a penalty ε̂ in E/h, the traits of a formulation, and a variation, of which it uses what it can.
+    E is Young's modulus of the softer body, h the mean segment of the mesh.
+    """
 
     label: str  # What is solved, in words: "two rings shrunk onto each other"
-    unit: str  # The unit of the penalties, as "E/h"; empty if they are ε̂ itself
     meshes: tuple[int, ...]  # From coarse to fine
-    penalties: tuple[float, ...]  # From soft to stiff, in the unit
-    pose: Callable[[int, float, Traits], ProblemInstance]  # From mesh, penalty and the traits of a formulation
+    targets: tuple[float, ...]  # The errors of forces that cost is measured at, from large to small
+    pose: Callable[[int, float, Traits, Variation], ProblemInstance]
     rank: int = 100  # Pages show problems of lower rank first.
 
 

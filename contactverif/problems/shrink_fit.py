@@ -35,7 +35,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
-from contactverif.problems.problem import Problem, ProblemInstance
+from contactverif.problems.problem import DEPTH, Problem, ProblemInstance, Variation
 
 Role = Literal["inner", "outer"]
 SEGMENTS = {"inner": 12, "outer": 16}  # Numbers of segments along the interface of a quarter, at refine = 1.
@@ -185,7 +185,9 @@ def _plane_strain(young: float, poisson: float) -> tuple[float, float]:
 
 
 @cache
-def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refine: int = 1) -> Scene:
+def shrink_fit(
+    problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refine: float = 1, grading: float = GRADE
+) -> Scene:
     """Return the scene of a quarter of both rings.
 
     Parameters
@@ -194,8 +196,10 @@ def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refin
         Radii, materials and interference.
     slave : Literal['inner', 'outer']
         The ring that is the slave.
-    refine : int
-        The number of parts that each side of each cell is divided into.
+    refine : float
+        The number of parts that each side of each cell is divided into; numbers of cells are rounded.
+    grading : float
+        The share by which the angles of the outer ring are graded.
 
     Returns
     -------
@@ -210,7 +214,7 @@ def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refin
     """
     if slave not in SEGMENTS:
         raise MisuseError("slave", repr(slave), "'inner' or 'outer'")
-    rings = {name: _ring(problem, name, refine) for name in ("inner", "outer")}
+    rings = {name: _ring(problem, name, refine, grading) for name in ("inner", "outer")}
     order = ("inner", "outer") if slave == "inner" else ("outer", "inner")
     facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
     facts["outer_slave"] = np.array(float(slave == "outer"))
@@ -218,14 +222,14 @@ def shrink_fit(problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refin
 
 
 @cache
-def _ring(problem: ShrinkFit, ring: Role, refine: int) -> Body:
+def _ring(problem: ShrinkFit, ring: Role, refine: float, grading: float) -> Body:
     """Return a quarter of a ring, nodes ring by ring from the inside, each from angle 0 to a quarter turn."""
     index = int(ring == "outer")
     contact = problem.contact_radii[index]
     limits = (contact, problem.outer_radius) if index else (problem.inner_radius, contact)
-    n_segments, n_layers = SEGMENTS[ring] * refine, LAYERS[ring] * refine
+    n_segments, n_layers = round(SEGMENTS[ring] * refine), round(LAYERS[ring] * refine)
     radii, shares = np.linspace(*limits, n_layers + 1), np.linspace(0, 1, n_segments + 1)
-    angles = pi / 2 * (shares + (GRADE if index else 0.0) * shares * (1 - shares))
+    angles = pi / 2 * (shares + (grading if index else 0.0) * shares * (1 - shares))
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     directions[-1] = 0.0, 1.0
     number = np.arange((n_layers + 1) * (n_segments + 1)).reshape(n_layers + 1, n_segments + 1)
@@ -272,13 +276,15 @@ class RingStudy:
         area: Literal["current", "reference"] = "reference" if traits.rules.area == "reference" else "current"
         return tuple(fit(self.slave, inf if multiplier else self.penalty, area) for fit in kinds)
 
-    def pose(self, refine: int, traits: Traits) -> ProblemInstance:
+    def pose(self, refine: float, traits: Traits, grading: float = GRADE) -> ProblemInstance:
         """Return the problem on a mesh.
 
         The ends of a quarter are held across their line of symmetry, and bear what contact does there.
         """
         fit, ring = self.fit(traits), int(self.slave == "outer")
-        scene = replace(shrink_fit(self.problem, slave=self.slave, refine=refine), penalty=self.penalty)
+        scene = replace(
+            shrink_fit(self.problem, slave=self.slave, refine=refine, grading=grading), penalty=self.penalty
+        )
         radius = self.problem.contact_radii[ring]
         outwards = (1 if ring else -1) * replace(self.problem, radius=radius).compliances[ring] / radius * fit.force
 
@@ -318,11 +324,32 @@ class RingStudy:
 FIT = ShrinkFit(interference=1e-2)  # The interference is larger than the height of a facet.
 
 
+def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation) -> ProblemInstance:
+    """Return the problem with about so many segments along the inner ring."""
+    problem = replace(FIT, interference=FIT.interference * variation.load)
+    refine = segments * variation.size / SEGMENTS["inner"]
+    penalty = stiffness * min(problem.young) * SEGMENTS["inner"] * refine / (pi / 2 * problem.radius)
+    study = RingStudy(problem, "outer" if variation.swapped else "inner", penalty)
+    instance = study.pose(refine, traits, GRADE + 0.1 * variation.grading)
+    return replace(instance, deep=_inflate(instance.scene, (DEPTH - 1) * problem.interference))
+
+
+def _inflate(scene: Scene, way: float) -> FloatArray:
+    """Return the unknowns (n_free,) with the inner ring's surface moved outwards by `way`, a length."""
+    nodes = scene.interface.nodes
+    radii = np.linalg.norm(nodes, axis=1)
+    inner = np.arange(len(nodes)) < scene.interface.n_slave_nodes
+    if scene.bodies[0].name == "outer":
+        inner = ~inner
+    moves = np.where(inner, way / radii, 0.0)[:, None] * nodes
+    unknowns: FloatArray = np.asarray(scene.transformation.T @ moves.reshape(-1))
+    return unknowns
+
+
 RINGS = Problem(
     label="two rings shrunk onto each other",
-    unit="",
-    meshes=(1, 2, 4, 6),
-    penalties=(1e2, 1e3, 1e4),
-    pose=lambda refine, penalty, traits: RingStudy(FIT, "inner", penalty).pose(refine, traits),
+    meshes=(15, 30, 60, 120, 240),
+    targets=(2e-1, 1e-1, 1e-2, 1e-3),
+    pose=_pose,
     rank=3,
 )

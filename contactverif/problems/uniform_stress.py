@@ -22,10 +22,9 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals
-from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.mechanics.scene import Scene
+from contactverif.problems.blocks import pressure_of
 from contactverif.problems.problem import Errors, ProblemInstance
 
 CONDITION_TOLERANCE = "1e-11 + 1e-13 κ + 5e-15/r"
@@ -126,11 +125,3 @@ def pose_uniform(scene: Scene, pressure: float, exact: FloatArray) -> ProblemIns
         deformed=False,
         further=motion_error,
     )
-
-
-def pose_blocks(case: Case, traits: Traits) -> ProblemInstance:
-    """Return the problem of two blocks under a uniform pressure, from their case."""
-    scene = scene_of(case)
-    penalty = np.inf if traits.rules.enforcement == "multiplier" else case.penalty
-    pressure = pressure_of(case, penalty)
-    return pose_uniform(scene, pressure, exact_unknowns(scene, pressure, penalty))

@@ -30,14 +30,14 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import grid_cells
-from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, Problem, ProblemInstance, Studies
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, Problem, ProblemInstance, Studies, Variation
 
 UPPER, LOWER = 0, 1
 COLUMNS = (6, 8)  # The number of cells along the upper and the lower surface of the coarsest mesh.
 MESHES = (1, 2, 4, 8)  # The refinements r of a study.
 # The cells along both surfaces where one mesh is four times finer, and r. No inner node meets a node for these r.
 CONTRAST_COLUMNS, CONTRAST_MESHES = (4, 1), (6, 9, 13, 18)
-GRADING = 0.15  # The nodes of the lower body lie at W (t + GRADING t (1 − t)): no node meets one of the upper body.
+GRADING = 0.15  # The nodes of the lower body lie at W (t + grading t (1 − t)): no node meets one of the upper body.
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,22 +143,28 @@ def _into(body: int) -> float:
 
 
 @lru_cache(maxsize=128)  # The bodies of a scene are condensed once.
-def wavy_scene(problem: WavyProblem, refine: int = 1, slave: int = UPPER, columns: tuple[int, int] = COLUMNS) -> Scene:
+def wavy_scene(
+    problem: WavyProblem,
+    refine: int = 1,
+    slave: int = UPPER,
+    columns: tuple[int, int] = COLUMNS,
+    grading: float = GRADING,
+) -> Scene:
     """Return two wavy bodies of quadrilaterals whose meshes do not match, the upper body first.
 
     `columns` are the numbers of cells along the upper and the lower surface at refine = 1. Those of the upper body have
     equal widths, those of the lower one become narrower. The penalty is 1 if that of the problem is infinite.
     """
-    bodies = tuple(_wavy_body(problem, body, columns[body] * refine) for body in (UPPER, LOWER))
+    bodies = tuple(_wavy_body(problem, body, columns[body] * refine, grading) for body in (UPPER, LOWER))
     penalty = problem.penalty if np.isfinite(problem.penalty) else 1.0
     return Scene(bodies, (slave,), (1 - slave,), penalty=penalty, name="wavy")
 
 
 @lru_cache(maxsize=128)
-def _wavy_body(problem: WavyProblem, body: int, n_columns: int) -> Body:
+def _wavy_body(problem: WavyProblem, body: int, n_columns: int, grading: float) -> Body:
     """Return one of the bodies, the same for both choices of the slave: cells are about square, edges move exactly."""
     t = np.linspace(0.0, 1.0, n_columns + 1)
-    x = problem.wavelength * (t if body == UPPER else t + GRADING * t * (1 - t))
+    x = problem.wavelength * (t if body == UPPER else t + grading * t * (1 - t))
     into, rows = _into(body), max(1, round(problem.height * (len(x) - 1) / problem.wavelength))
     depth = np.linspace(0.0, problem.height, rows + 1)
     levels = into * (depth if body == UPPER else depth[::-1])  # From bottom to top
@@ -195,10 +201,15 @@ class WavyStudy:
     stiffness: float  # The penalty ε̂h/E, with E of the upper body and the mean cell h of the coarser mesh
     amplitude: float = 0.0  # That of the interface where the bodies meet, a length
     contrast: bool = False  # The mesh of the upper body is four times finer than that of the lower one.
+    own_columns: tuple[int, int] = (0, 0)  # The numbers of cells along both surfaces at r = 1, if they are others
+    grading: float = GRADING  # That of the lower body
+    load: float = 1.0  # The factor of the mean pressure
 
     @property
     def columns(self) -> tuple[int, int]:
         """The numbers of cells along both surfaces at r = 1."""
+        if all(self.own_columns):
+            return self.own_columns
         return CONTRAST_COLUMNS if self.contrast else COLUMNS
 
     @property
@@ -220,7 +231,8 @@ class WavyStudy:
         penalty = self.penalty(refine)
         multipliers = traits.rules.enforcement == "multiplier"
         problem = WavyProblem(penalty=inf if multipliers else penalty, amplitude=self.amplitude)
-        scene = wavy_scene(problem, refine, self.slave, self.columns)
+        problem = replace(problem, mean=self.load * problem.mean)
+        scene = wavy_scene(problem, refine, self.slave, self.columns, self.grading)
         if multipliers:
             scene = replace(scene, penalty=penalty)
 
@@ -336,11 +348,23 @@ CURVED_STUDIES = Studies(
 )
 
 
+def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation) -> ProblemInstance:
+    """Return the problem with about so many segments along the upper body, and a third more along the lower one."""
+    columns = round(segments * variation.size), round(segments * variation.size * COLUMNS[LOWER] / COLUMNS[UPPER])
+    study = WavyStudy(
+        LOWER if variation.swapped else UPPER,
+        stiffness,
+        own_columns=columns,
+        grading=GRADING + 0.1 * variation.grading,
+        load=variation.load,
+    )
+    return study.pose(1, traits)
+
+
 WAVY = Problem(
     label="two wavy half-planes in full contact",
-    unit="E/h",
-    meshes=(1, 2, 3, 4, 6),
-    penalties=(1.0, 30.0, 1e3),
-    pose=lambda refine, stiffness, traits: WavyStudy(UPPER, stiffness).pose(refine, traits),
+    meshes=(8, 16, 32, 64, 128, 256),
+    targets=(1e-2, 1e-3, 1e-4, 1e-5),
+    pose=_pose,
     rank=1,
 )

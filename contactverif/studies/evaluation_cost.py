@@ -101,6 +101,6 @@ def _seconds(plugin: Any, call: Callable[[], Any]) -> float:
     """Return the seconds of a call; where the plugin has a process of its own, those that it took there."""
     start = perf_counter()
     call()
-    there = plugin.seconds()[0] if isinstance(plugin, RemoteFormulation) else nan
+    there = plugin.seconds() if isinstance(plugin, RemoteFormulation) else nan
     here = perf_counter() - start
     return there if 0 <= there <= here else here  # A plugin's process may say what it likes.

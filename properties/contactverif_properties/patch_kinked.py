@@ -205,7 +205,7 @@ def _add_three_normals(
         penalty = stiffness * problem.young
         scene = kinked_patch(stiff, upper_slave=upper_slave, penalty=penalty)
         solution = solve_for_accuracy(scene, subject)
-        if not solution.balanced:
+        if solution.trace is None or not solution.balanced:
             break
         errors.append(_stress_error(stiff, scene, solution.trace.solution))
         floors.append(_floor(stiff, solution.state, stiff.pressure / penalty))

@@ -33,7 +33,7 @@ Five times eight such mistakes were asked so far, and 38 were caught. A decision
 segments is shown as `nodal-push` failing without a promise. Averages of the gap that are interpolated like nodal gaps
 break no promise: that formulation passes the patch test, and converges like others. When they were asked for the first
 time, place and kind were named of 1, 1, 2, 3 and 1 of the eight, and three were called by a wrong name. Rules for the
-others were added each time, so what is said below is no measure of what is said of a mistake that nobody has thought of.
+others were added each time, so what is said below is no measure of what is said of a mistake that nobody thought of.
 `tests/bugs/bugs_campaign.py` wrote this page. Seconds are those of a machine with two cores on which a loop of ten
 million turns in Python takes {loop:.2g} s.
 

@@ -95,8 +95,8 @@ COMMANDS = {
          "--out", "report.nc"), ("compare", "--resume", "report.nc"), share=0.1,
     ),
     "bench": Command(
-        ("bench", "nts-ar", "--scene", "wavy", "--quick", "--repeats", "1", "--out", "report.nc"),
-        ("bench", "nts-ar", "--scene", "wavy", "--quick", "--repeats", "1", "--out", "report.nc"),
+        ("bench", "nts-ar", "--scene", "wavy", "--quick", "--instances", "1", "--out", "report.nc"),
+        ("bench", "nts-ar", "--scene", "wavy", "--quick", "--instances", "1", "--out", "report.nc"),
         share=0.1, read=_read_data, compare=_same_bench,
     ),
     "paper": Command(

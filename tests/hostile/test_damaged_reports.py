@@ -116,7 +116,9 @@ def test_a_damaged_file_of_a_bench_is_read_or_refused_in_one_line(kind: str, tmp
     [
         ("outcome", lambda values: values + 7, "a code without a meaning"),
         ("scene", lambda values: values - 9, "a code without a meaning"),
-        ("stiffness", lambda values: values * np.nan, "a penalty is no finite number"),
+        ("penalty", lambda values: 2 * values, "its penalties and starts are others"),
+        ("instance", lambda values: values // 2, "an instance is not there on every mesh"),
+        ("target", lambda values: -values, "a scene has no targets, or none that fall"),
         ("formulation", lambda values: np.full_like(values, values[0]), "two formulations have one name"),
         ("error", lambda values: values[:, :, :1], "errors has the shape"),
     ],

@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from subjects import load_subject
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
 from contactverif.mechanics.bulk import elasticity
-from contactverif.problems.wavy import LOWER, UPPER, WavyProblem, wavy_scene
+from contactverif.problems.problem import Variation
+from contactverif.problems.wavy import LOWER, UPPER, WAVY, WavyProblem, wavy_scene
 
 STEP = 1e-30
 BODIES = pytest.mark.parametrize("body", [UPPER, LOWER])
@@ -105,3 +108,14 @@ def test_either_body_may_be_the_slave() -> None:
     assert scene.slave == (LOWER,)
     assert len(scene.interface.slave) == 8
     assert wavy_scene(PROBLEM, 1, LOWER) is scene
+
+
+def test_displacements_of_another_code_have_the_errors_of_the_solution_that_they_are_of() -> None:
+    subject = load_subject("mortar")
+    instance = WAVY.pose(12, 30.0, subject.traits, Variation())
+    ours = solve_for_accuracy(instance.scene, subject, instance.start, instance.step)
+    theirs = Solution.from_displacements(instance.scene, ours.displacements)
+    assert theirs.balanced
+    errors = instance.errors(ours)
+    del errors["pressure"]  # Displacements say nothing of reported pressures.
+    assert instance.errors(theirs) == {kind: pytest.approx(error, rel=1e-2) for kind, error in errors.items()}

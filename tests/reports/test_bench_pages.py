@@ -1,111 +1,204 @@
-"""Conclusions from a bench, its file, pictures and pages: fronts, times to reach an error, profiles, slowdowns."""
+"""Conclusions from a bench, its file, pictures and pages: costs of an error, intervals, sentences, changes."""
 
 import re
+from dataclasses import replace
 from math import inf, isnan
 from pathlib import Path
 
 import numpy as np
 import pytest
 from page_reader import complaints
-from studies.bench_results import make_results
+from studies.bench_results import make_cells, make_results
 
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench.bench_text import bench_markdown
-from contactverif_reports.bench.clocks import clock_sentences
-from contactverif_reports.bench.results import Cell
-from contactverif_reports.bench.slowdown import slowdowns
-from contactverif_reports.bench.work_precision import (
+from contactverif_reports.bench.changes import changes
+from contactverif_reports.bench.cost_tables import cost_sentences, cost_table, format_seconds, starts_table
+from contactverif_reports.bench.costs import (
+    BODIES,
+    best_of,
+    cost_of,
     cost_ratio,
-    cost_sentence,
-    figure_sentence,
-    harness_sentence,
-    harness_share,
-    pair_profiles,
-    pareto_front,
-    time_to_reach,
+    curve,
+    rank,
+    runtimes,
+    total_ratio,
 )
-from contactverif_reports.draw.bench_figures import draw_bench, make_work_precision_figure
+from contactverif_reports.bench.intervals import Ratio, ratio_of
+from contactverif_reports.bench.results import DEEP, VARIANTS, Outcome
+from contactverif_reports.draw.bench_figures import draw_bench, highlights
 from contactverif_reports.html.bench_page import bench_page
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
-CELLS = [
-    Cell("wavy", 1, 10.0),
-    Cell("wavy", 2, 10.0),
-    Cell("wavy", 2, 1e3),
-    Cell("random", 0, 1.0),
-    Cell("random", 1, 1.0),
-]
 RUNS = {
-    "vts-ppt": [(1.0, 0.05), (2.0, 0.004), (9.0, 0.004), (1.0, 1e-9), (3.0, 1e-9)],
-    "quick": [(0.5, 0.2), (1.0, 0.009), (3.0, 0.009), (2.0, 1e-9), (1.0, 0.5)],
-    "poor": [(0.1, 0.3), (0.2, 0.25), (0.2, inf), (0.1, inf), (1.0, 1e-9)],
+    "vts-ppt": {8: (1e-3, 0.02, 2), 16: (2e-3, 0.004, 3)},
+    "exact": {8: (3e-3, 0.008, 4), 16: (6e-3, 9e-4, 5)},
+    "poor": {8: (1e-4, 0.3, 2), 16: (2e-4, inf, 9)},
 }
-RESULTS = make_results(CELLS, RUNS)
+RESULTS = make_results(make_cells(), RUNS, noise=0.02)
 
 
-def test_a_run_on_the_front_is_beaten_by_none() -> None:
-    times, errors = np.array([1.0, 2.0, 2.0, 3.0, 4.0, inf]), np.array([0.3, 0.2, 0.1, 0.1, np.nan, 0.01])
-    assert pareto_front(times, errors).tolist() == [True, False, True, False, False, False]
+def test_the_coarsest_mesh_that_reaches_an_error_counts_and_a_failure_never_does() -> None:
+    reference, exact, poor = (cost_of(RESULTS, name, "wavy", 1e-2) for name in RUNS)
+    assert (reference.middle("segments"), exact.middle("segments"), poor.middle("segments")) == (16, 8, inf)
+    assert exact.evaluation.shape == (6, 3)
+    assert exact.middle("evaluation") == pytest.approx(3e-3, rel=0.02)
+    assert (exact.middle("systems"), exact.middle("factorisation")) == (4, 8e-3)
+    assert cost_ratio(exact, reference, "evaluation").middle == pytest.approx(1.5, rel=0.02)
+    assert cost_ratio(exact, reference, "factorisation").middle == pytest.approx(0.5)
+    assert cost_ratio(poor, reference, "evaluation").middle == inf
+    assert isnan(cost_ratio(reference, poor, "evaluation").middle)
 
 
-def test_the_cheapest_run_that_reaches_an_error_counts_and_a_failure_is_infinite() -> None:
-    assert time_to_reach(RESULTS, "vts-ppt", "wavy", 1e-1) == 1.0
-    assert time_to_reach(RESULTS, "vts-ppt", "wavy", 1e-2) == 2.0
-    assert time_to_reach(RESULTS, "vts-ppt", "wavy", 1e-3) == inf
-    assert time_to_reach(RESULTS, "poor", "wavy", 1e-1) == inf
-    assert cost_ratio(RESULTS, "quick", "wavy") == 0.5
-    assert cost_ratio(RESULTS, "poor", "wavy") == inf
-    assert isnan(cost_ratio(RESULTS, "quick", "rings"))
+def test_a_formulation_that_brings_half_of_the_instances_there_is_compared_on_those() -> None:
+    results = make_results(make_cells(), RUNS)
+    errors = results.errors.copy()
+    errors[0, [6, 7]] = 0.5  # Two of six instances on the finer mesh.
+    reference = cost_of(replace(results, errors=errors), "vts-ppt", "wavy", 1e-2)
+    assert reference.reached.sum() == 4
+    assert reference.is_usual
+    errors[0, [8, 9]] = 0.5
+    assert not cost_of(replace(results, errors=errors), "vts-ppt", "wavy", 1e-2).is_usual
 
 
-def test_the_sentence_names_who_costs_what_and_who_never_gets_there() -> None:
-    assert cost_sentence(RESULTS, "wavy") == (
-        "On wavy, at an error of 1 % in the forces, the time over that of vts-ppt is: quick 0.5; poor never gets there."
-    )
-    assert "does not reach" in cost_sentence(RESULTS, "rings")
+def test_the_best_penalty_afterwards_is_told_from_that_of_the_rule() -> None:
+    results = make_results(make_cells(), RUNS)
+    errors = results.errors.copy()
+    errors[0, :6, len(VARIANTS) - 1] = 1e-3  # At the stiffest penalty the coarse mesh is enough.
+    errors[0, :6, VARIANTS.index(DEEP)] = 1e-9  # Another start is no other penalty.
+    changed = replace(results, errors=errors)
+    assert cost_of(changed, "vts-ppt", "wavy", 1e-2).middle("segments") == 16
+    assert best_of(changed, "vts-ppt", "wavy", 1e-2).middle("segments") == 8
+    assert best_of(changed, "vts-ppt", "wavy", 1e-4).middle("segments") == inf
+    (head, *_), (row, *_) = cost_table(changed, "wavy", 1e-2)
+    assert head == "reached"
+    assert row[:4] == ["vts-ppt", "6/6", "16", "8"]
 
 
-def test_profiles_compare_pairs_alone_and_an_inexact_solution_is_a_failure() -> None:
-    quick, poor = pair_profiles(RESULTS)
-    assert quick.factors.tolist() == [2.0, inf]
-    assert quick.reference_factors.tolist() == [1.0, 1.0]
-    assert (quick.share(1), quick.share(2), quick.share_solved, quick.median_ratio) == (0, 0.5, 0.5, 2.0)
-    assert poor.factors.tolist() == [inf, 1.0]
-    assert poor.reference_factors.tolist() == [1.0, 3.0]
+def test_whole_solutions_go_from_evaluations_to_factorisations_as_bodies_get_dearer() -> None:
+    """`exact` takes 4/3 of the systems, 3/2 of an evaluation and half of a factorisation of vts-ppt."""
+    exact, reference = (cost_of(RESULTS, name, "wavy", 1e-2) for name in ("exact", "vts-ppt"))
+    ratios = [total_ratio(exact, reference, share).middle for share in (0.0, *BODIES.values(), 1e6)]
+    assert ratios[0] == pytest.approx(4 / 3 * 3 / 2, rel=0.02)
+    assert ratios[-1] == pytest.approx(4 / 3 / 2, rel=0.02)
+    assert ratios == sorted(ratios)[::-1]
 
 
-def test_a_slowdown_is_a_ratio_to_the_yardstick() -> None:
-    """A machine that is three times slower makes nothing slower; a formulation that is, is told."""
-    slower = make_results(CELLS, RUNS, slower=1.5)
-    changes = {change.formulation: change for change in slowdowns(slower, RESULTS)}
-    assert changes["quick"].ratio == pytest.approx(1.5)
-    assert changes["quick"].slower
-    assert changes["quick"].parts["pair"] == pytest.approx(1.5)
-    machine = make_results(CELLS, RUNS, slower=3.0)
-    machine.yardstick[:] *= 3
-    assert not any(change.slower for change in slowdowns(machine, RESULTS))
+def test_an_interval_holds_the_ratio_and_is_wider_with_more_noise_and_with_fewer_processes() -> None:
+    dice = np.random.default_rng(3)
+    of_process, of_instance = dice.normal(0, 0.05, (200, 1, 5)), dice.normal(0, 0.02, (200, 15, 1))
+    n_inside = 0
+    for process, instance in zip(of_process, of_instance, strict=True):
+        ratio = ratio_of(1.2 * np.exp(process + instance), np.ones((15, 5)))
+        n_inside += ratio.low <= 1.2 <= ratio.high
+    assert 0.7 < n_inside / 200 < 0.99  # Five processes are few: a percentile interval is somewhat too narrow.
+    narrow, wide = (ratio_of(np.exp(noise * of_instance[0]), np.ones((15, 1))) for noise in (1, 3))
+    assert wide.high - wide.low > 2 * (narrow.high - narrow.low) > 0
+    within_one = ratio_of(np.exp(of_process[0][:, :1] + of_instance[0]), np.ones((15, 1)))
+    several = ratio_of(np.exp(of_process[0] + of_instance[0]), np.ones((15, 5)))
+    assert several.high / several.low > within_one.high / within_one.low
 
 
 @pytest.mark.parametrize(
-    ("wall", "words"), [(1.0, ""), (1.9, ""), (3.0, "works in other processes"), (0.5, "uses several threads")]
+    ("ratio", "word", "text"),
+    [
+        (Ratio(1.01, 0.97, 1.04), "as fast", "1.01 [0.97, 1.04]"),
+        (Ratio(1.02, 1.01, 1.03), "as fast", "1.02 [1.01, 1.03]"),
+        (Ratio(1.2, 1.1, 1.3), "slower", "1.20 [1.10, 1.30]"),
+        (Ratio(0.8, 0.7, 0.9), "faster", "0.80 [0.70, 0.90]"),
+        (Ratio(1.1, 0.9, 1.3), "not told apart", "1.10 [0.90, 1.30]"),
+        (Ratio(2.0), "not told apart", "2.00"),
+        (Ratio(12.34, 11.0, 14.0), "slower", "12.3 [11.0, 14.0]"),
+        (Ratio(inf), "never", "∞"),
+        (Ratio(float("nan")), "", "–"),
+    ],
 )
-def test_what_the_clock_of_the_processor_does_not_show_is_said(wall: float, words: str) -> None:
-    """One undisturbed repeat is enough to tell a busy machine from a plugin that waits."""
-    results = make_results(CELLS, RUNS)
-    results.wall[:] *= wall
-    assert [words in sentence for sentence in clock_sentences(results)] == [True] * len(RUNS) * bool(words)
-    if wall > 1:
-        results.wall[:, 0, 0] /= wall
-        assert clock_sentences(results) == []
+def test_a_ratio_says_only_what_its_interval_allows(ratio: Ratio, word: str, text: str) -> None:
+    assert (ratio.word, ratio.text) == (word, text)
+
+
+def test_few_instances_and_numbers_that_are_missing_give_no_interval() -> None:
+    assert isnan(ratio_of(np.ones((4, 3)), np.ones((4, 3))).low)
+    values = np.ones((6, 3))
+    values[0, 1] = np.nan
+    assert ratio_of(values, 2 * np.ones((6, 3))).text == "0.50 [0.50, 0.50]"
+    assert isnan(ratio_of(np.full((6, 3), np.nan), values).middle)
+
+
+def test_a_sentence_has_ratios_whose_interval_excludes_1_alone() -> None:
+    runs = {"vts-ppt": RUNS["vts-ppt"], "alike": RUNS["vts-ppt"], **RUNS}
+    first, second = cost_sentences(make_results(make_cells(), runs, noise=0.02), "wavy", 1e-2)
+    words = (
+        "On wavy, at an error of 1 % in the forces, seconds of one evaluation over those of vts-ppt: more: exact 1.5"
+    )
+    assert first.startswith(words)
+    assert first.endswith("; alike within 5 %: alike; never there: poor.")
+    assert "more: exact 1.33 [1.33, 1.33]; alike within 5 %: alike" in second
+    noisy = cost_sentences(make_results(make_cells(), runs, noise=0.5), "wavy", 1e-2)[0]
+    assert "not told apart: alike" in noisy
+    (none,) = cost_sentences(RESULTS, "wavy", 1e-3)
+    assert none.endswith("there is no ratio, since vts-ppt does not get there.")
+    assert cost_sentences(make_results(make_cells(), {"poor": RUNS["poor"]}), "wavy", 1e-2) == []
+
+
+def test_runtimes_are_infinite_where_a_target_is_not_reached() -> None:
+    seconds = runtimes(RESULTS, "exact", "wavy", "factorisation")
+    assert seconds.tolist() == pytest.approx([4 * 8e-3] * 6 + [5 * 16e-3] * 6)
+    assert np.isinf(runtimes(RESULTS, "poor", "wavy", "evaluation")).all()
+
+
+def test_who_reaches_the_smallest_error_comes_first_and_at_most_six_have_a_colour() -> None:
+    assert rank(RESULTS, "wavy") == ["exact", "vts-ppt", "poor"]
+    assert list(highlights(RESULTS)) == ["vts-ppt", "exact", "poor"]
+    many = make_results(make_cells(), {f"f{n}": RUNS["exact"] for n in range(8)} | {"vts-ppt": RUNS["vts-ppt"]})
+    assert list(highlights(many))[:2] == ["vts-ppt", "f0"]
+    assert len(highlights(many)) == 6
+
+
+def test_a_curve_has_medians_and_failures_are_infinite() -> None:
+    seconds, errors = curve(RESULTS, "poor", "wavy", "forces", "evaluation")
+    assert seconds.tolist() == pytest.approx([1e-4, 2e-4], rel=0.02)
+    assert errors.tolist() == [0.3, inf]
+
+
+def test_the_table_of_starts_tells_failures_and_ranges() -> None:
+    results = make_results(make_cells(), RUNS)
+    results.counts[0, 0, 0, 0] = 7
+    heads, rows = starts_table(results, "wavy")
+    assert heads == ["near, 8", "near, 16", "deep, 8", "deep, 16"]
+    assert rows[0] == ["vts-ppt", "2–7", "3", "2", "3"]
+    assert rows[2] == ["poor", "2", "6 fail", "2", "6 fail"]
+
+
+def test_counts_are_compared_exactly_and_seconds_in_factorisations() -> None:
+    """A machine that is three times slower makes nothing slower; a formulation that is, is told."""
+    slower = make_results(make_cells(), {**RUNS, "exact": {8: (3.6e-3, 0.008, 4), 16: (7.2e-3, 9e-4, 5)}}, noise=0.02)
+    machine = replace(slower, evaluation=3 * slower.evaluation, factorisation=3 * slower.factorisation)
+    for results in (slower, machine):
+        reference, exact, _ = changes(results, RESULTS)
+        assert (reference.evaluation.word, exact.evaluation.word) == ("as fast", "slower")
+        assert (reference.worse, exact.worse) == (False, True)
+        assert exact.evaluation.middle == pytest.approx(1.2, rel=0.01)
+        assert exact.counts_text == "all counts are equal"
+    more = replace(RESULTS, counts=RESULTS.counts.copy())
+    more.counts[1, 0, 0, 2] += 1  # One residual in one run.
+    _, exact, _ = changes(more, RESULTS)
+    assert exact.worse
+    assert "residuals: 217 instead of 216" in exact.sentence
+    assert not changes(RESULTS, more)[1].worse  # Fewer are no slowdown, and are told.
+    assert changes(RESULTS, more)[1].counts
+    assert changes(make_results(make_cells("rings"), RUNS), RESULTS) == ()
 
 
 def test_the_file_holds_everything(tmp_path: Path) -> None:
     write_bench(RESULTS, tmp_path / "a.nc")
     again = read_bench(tmp_path / "a.nc")
-    for name in ("formulations", "cells", "remarks", "not_loaded", "provenance"):
-        assert getattr(again, name) == getattr(RESULTS, name), name
-    for name in ("segments", "unknowns", "outcomes", "errors", "counts", "seconds", "wall", "yardstick"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(RESULTS, name), name)
+    for name in RESULTS.__slots__:
+        old, new = getattr(RESULTS, name), getattr(again, name)
+        if isinstance(old, np.ndarray):
+            np.testing.assert_array_equal(new, old, name)
+        else:
+            assert new == old, name
 
 
 def test_another_file_is_no_bench(tmp_path: Path) -> None:
@@ -116,76 +209,29 @@ def test_another_file_is_no_bench(tmp_path: Path) -> None:
         read_bench(tmp_path / "a.nc")
 
 
-def test_a_run_without_a_solution_is_drawn_at_the_edge() -> None:
-    figure = make_work_precision_figure(RESULTS, "wavy")
-    panel = figure.axes[1]  # The stiff penalty, at which `poor` finds no solution.
-    (edge,) = [
-        line.get_ydata()[0]
-        for line in panel.lines
-        if line.get_linestyle() == "-" and len(set(line.get_ydata())) == 1 and len(line.get_ydata()) == 2
-    ]
-    crosses = [line for line in panel.lines if line.get_marker() == "x" and len(line.get_xdata())]
-    assert [line.get_ydata().tolist() for line in crosses] == [[edge]]
-    assert edge > 0.25
-
-
-def test_many_formulations_have_a_panel_each_with_their_failures_at_the_edge() -> None:
-    many = make_results(
-        CELLS, {f"f{n}": RUNS["poor" if n == 1 else "quick"] for n in range(7)} | {"vts-ppt": RUNS["vts-ppt"]}
-    )
-    figure = make_work_precision_figure(many, "wavy")
-    panels = [axes for axes in figure.axes if axes.get_visible()]
-    assert [axes.get_title() for axes in panels] == list(many.formulations)
-    (edge,) = {
-        line.get_ydata()[0]
-        for axes in panels
-        for line in axes.lines
-        if line.get_marker() == "None" and len(set(line.get_ydata())) == 1
-    }
-    crosses = {
-        axes.get_title(): line.get_ydata().tolist()
-        for axes in panels
-        for line in axes.lines
-        if line.get_marker() == "x" and len(line.get_xdata())
-    }
-    assert crosses == {"f1": [edge]}
-
-
-def test_sentences_about_many_formulations_stay_short() -> None:
-    many = make_results(CELLS, {f"f{n}": RUNS["quick"] for n in range(8)} | {"vts-ppt": RUNS["vts-ppt"]})
-    assert "f4 0.5, 3 more up to 0.5." in cost_sentence(many, "wavy")
-    none = make_results(CELLS, {f"f{n}": RUNS["poor"] for n in range(8)} | {"vts-ppt": RUNS["vts-ppt"]})
-    assert cost_sentence(none, "wavy").endswith("in the forces; 8 of 9 formulations never get there.")
-
-
-def test_the_caption_says_who_is_exact_and_who_is_first() -> None:
-    assert figure_sentence(RESULTS, "wavy") == (
-        "The smallest error of the forces is 0.004, by vts-ppt; quick is the first of 2 to reach 1 %, after 1e+03 ms."
-    )
-    poor = make_results(CELLS, {"poor": RUNS["poor"]})
-    assert (
-        figure_sentence(poor, "wavy") == "The smallest error of the forces is 0.2, by poor; no formulation reaches 1 %."
-    )
-    nothing = make_results(CELLS, {"poor": [(1.0, inf)] * len(CELLS)})
-    assert figure_sentence(nothing, "wavy") == "No formulation has an error of the forces on wavy."
-
-
 def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) -> None:
     draw_bench(RESULTS, tmp_path)
-    assert {file.name for file in tmp_path.iterdir()} == {"wavy.svg", "cost.svg", "profiles.svg"}
-    page = bench_page(RESULTS, slowdowns(make_results(CELLS, RUNS, slower=2.0), RESULTS))
+    assert {file.name for file in tmp_path.iterdir()} == {"wavy.svg", "cost.svg", "runtimes.svg"}
+    assert (RESULTS.outcomes == Outcome.NOT_SOLVED).any()
+    page = bench_page(RESULTS, changes(RESULTS, RESULTS))
     assert not complaints(page)
     assert not re.search(r'(src|href)="http', page)
-    assert "poor never gets there" in page
+    assert "never there: poor" in page
     assert "absent did not load: no such module" in page
     text = bench_markdown(RESULTS, "bench.nc", with_pictures=True)
-    assert set(re.findall(r"\]\(([^)]+)\)", text)) == {"cost.svg", "wavy.svg", "profiles.svg"}
-    assert "| `poor` | ∞ | ∞ | ∞ | ∞ |" in text
+    assert set(re.findall(r"\]\(([^)]+)\)", text)) == {"cost.svg", "wavy.svg", "runtimes.svg"}
+    assert "| `poor` | 0/6 | ∞ |" in text
 
 
-def test_the_share_of_the_harness_is_what_no_part_of_a_solution_takes() -> None:
-    """The search takes a quarter of each time, and no other part takes any."""
-    assert harness_share(RESULTS, "vts-ppt") == 0.75
-    assert harness_sentence(RESULTS).startswith("Of the time of vts-ppt, 25 % goes into its own calls")
-    assert harness_sentence(make_results(CELLS, {"poor": RUNS["poor"]})) == ""
-    assert isnan(harness_share(make_results(CELLS, {"nobody": [(1.0, inf)] * len(CELLS)}), "nobody"))
+def test_many_formulations_have_a_picture_with_a_panel_each_and_one_mesh_has_no_curve(tmp_path: Path) -> None:
+    many = {f"f{n}": RUNS["exact"] for n in range(7)}
+    cells = (*make_cells(), *make_cells("kinked", meshes=(8,)))
+    draw_bench(make_results(cells, many), tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"wavy.svg", "wavy-each.svg", "cost.svg", "runtimes.svg"}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(inf, "∞"), (np.nan, "–"), (2e-6, "2 µs"), (0.0123, "12.3 ms"), (2.0, "2 s")]
+)
+def test_seconds_have_a_unit(seconds: float, text: str) -> None:
+    assert format_seconds(seconds) == text

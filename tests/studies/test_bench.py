@@ -23,54 +23,96 @@ from msgspec import structs
 from subjects import Changed, alone, load_subject
 
 from contactverif import MisuseError, Subject, Traits
+from contactverif.contract.arrays import dense
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import remote_formulation
 from contactverif.isolation.host import answer_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
-from contactverif.mechanics.accuracy import solve_for_accuracy, solve_in_tries
-from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance
+from contactverif.isolation.remote_formulation import RemoteSubject
+from contactverif.mechanics.accuracy import solution_of, solve_for_accuracy, solve_in_tries
+from contactverif.mechanics.bulk import condense
+from contactverif.mechanics.system import System
+from contactverif.mechanics.whole_system import WholeSystem
+from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
 from contactverif.run import registry
 from contactverif.run.journal import JournalKey, RecordFile, journal_folder, read_messages, record_files
 from contactverif.run.keys import remove_key
 from contactverif.run.registry import load_formulation, load_problems
 from contactverif.studies.bench import bench_plan
 from contactverif.studies.bench.bench_journal import FinishedCell, Header, Journal
-from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose
+from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose, vary
 from contactverif.studies.bench.bench_study import run_bench
-from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, run_cell
-from contactverif_reports.bench.results import COUNTS, PARTS, Cell, Outcome
+from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, SolutionRecord, run_cell
+from contactverif_reports.bench.results import COUNTS, VARIANTS, Cell, Outcome
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
-WAVY = Cell("wavy", 1, 30.0)
+WAVY = Cell("wavy", 8, 0)
 PROBLEMS = {name: problem for name, problem in load_problems().items() if isinstance(problem, Problem)}
-ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "wavy", "--scene", "kinked", "--repeats", "2"]
+ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "kinked", "--instances", "2", "--processes", "2"]
+VARIATIONS = [Variation(), *(vary(Cell("any", 1, number), 0) for number in range(2))]
+
+
+def solve_cell(cell: Cell, subject: Subject) -> list[SolutionRecord]:
+    """Return the solutions of a cell by one formulation, by variant."""
+    return run_cell(cell, [subject], 0).runs[subject.name].solutions
+
+
+@pytest.mark.parametrize("variation", VARIATIONS, ids=["mesh itself", *"01"])
+@pytest.mark.parametrize("scene", PROBLEMS)
+def test_errors_are_small_from_both_starts_and_fall_on_a_finer_mesh(scene: str, variation: Variation) -> None:
+    """On the zigzag the exact solution is in the space of the meshes, so that only roundoff is left."""
+    subject, problem = load_subject("vts-ppt"), PROBLEMS[scene]
+    errors: list[list[float]] = []
+    for mesh in problem.meshes[:3:2]:
+        instance = problem.pose(mesh, 10.0, subject.traits, variation)
+        assert list(instance.starts) == ["near", "deep"]
+        formulation = subject.for_case(instance.first_guess)
+        errors.append([])
+        for start in instance.starts.values():
+            (trace,) = solve_in_tries(instance.scene, formulation, start, instance.step)
+            assert trace.n_iterations <= 20
+            of_solution = instance.errors(solution_of(trace, formulation, nodal=False))
+            errors[-1].append(max(of_solution[kind] for kind in FORCES))
+        assert errors[-1][0] == pytest.approx(errors[-1][1], rel=1e-5, abs=1e-8)
+    assert errors[-1][0] < 0.9 * errors[0][0] or errors[0][0] < 1e-5
 
 
 @pytest.mark.parametrize("scene", PROBLEMS)
-def test_errors_are_small_where_vts_ppt_solves_and_fall_on_a_finer_mesh(scene: str) -> None:
-    """On the zigzag the exact solution is in the space of the meshes, so that only roundoff is left."""
-    problem = PROBLEMS[scene]
-    cells = [Cell(scene, mesh, problem.penalties[1]) for mesh in problem.meshes[:3:2]]
-    records = [run_cell(cell, [load_subject("vts-ppt")], 1, 0) for cell in cells]
-    runs = [record.runs["vts-ppt"] for record in records]
-    assert [run.outcome for run in runs] == [Outcome.SOLVED, Outcome.SOLVED]
-    assert {"forces", "pressure"} <= set(runs[0].errors)
-    for kind in runs[0].errors.keys() - {"iterations"}:
-        coarse, fine = (run.errors[kind] for run in runs)
-        assert fine < 0.8 * coarse or coarse < 1e-5, kind
-    assert set(runs[0].seconds) == set(PARTS)
-    assert all(seconds[0] >= 0 for seconds in runs[0].seconds.values())
-    assert runs[0].seconds["total"][0] > sum(runs[0].seconds[part][0] for part in PARTS if part != "total")
+def test_a_deep_start_is_ten_times_as_deep_and_no_start_is_the_solution(scene: str) -> None:
+    subject, problem = load_subject("sts"), PROBLEMS[scene]
+    instance = problem.pose(problem.meshes[0], 10.0, subject.traits, Variation())
+    formulation, scene_ = subject.for_case(instance.first_guess), instance.scene
+    depths = []
+    for start in instance.starts.values():
+        z = scene_.positions(start)
+        points = formulation.contact_points(scene_.interface, formulation.pair(scene_.interface, z), z)
+        depths.append(-np.nanmin(points.gap))
+        (trace,) = solve_in_tries(scene_, formulation, start, instance.step)
+        assert trace.n_iterations >= 1
+    assert depths[1] == pytest.approx(10 * depths[0], rel=0.3)
+
+
+def test_instances_differ_in_all_that_a_problem_leaves_open_and_are_the_same_for_the_same_seed() -> None:
+    variations = [vary(Cell("wavy", 8, number), 0) for number in range(15)]
+    assert len({item.grading for item in variations}) == 15
+    assert {item.swapped for item in variations} == {False, True}
+    assert all(0.8 <= item.size <= 1.2 and 0.8 <= item.load <= 1.2 for item in variations)
+    assert all(abs(item.shift) <= 0.5 and abs(item.grading) <= 1 for item in variations)
+    assert variations == [vary(Cell("wavy", 16, number), 0) for number in range(15)]
+    assert variations != [vary(Cell("wavy", 8, number), 1) for number in range(15)]
+    assert variations != [vary(Cell("rings", 8, number), 0) for number in range(15)]
+    meshes = {pose(Cell("hertz", 20, number), 10.0, Traits(), 0).scene.interface.nodes.tobytes() for number in range(5)}
+    assert len(meshes) == 5
 
 
 def test_errors_are_those_of_the_properties() -> None:
     """Properties keep the matrix of Newton's method, a bench does not: both are out of balance by 1e-9 at most."""
-    subject = load_subject("nts-ar")
-    instance = PROBLEMS["hertz"].pose(16, 10.0, subject.traits)
+    subject, cell = load_subject("nts-ar"), Cell("hertz", 20, 0)
+    instance = pose(cell, 10.0, subject.traits, 0)
     expected = instance.errors(solve_for_accuracy(instance.scene, subject, instance.start, instance.step))
-    errors = run_cell(Cell("hertz", 16, 10.0), [subject], 1, 0).runs["nts-ar"].errors
+    errors = solve_cell(cell, subject)[0].errors
     assert errors["forces"] == pytest.approx(max(expected[kind] for kind in FORCES), rel=1e-6)
     assert errors["pressure"] == pytest.approx(expected[PRESSURE], rel=1e-6)
     assert errors["displacement"] == pytest.approx(expected[MOTIONS[0]], rel=1e-6)
@@ -78,25 +120,70 @@ def test_errors_are_those_of_the_properties() -> None:
 
 def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
     subject = load_subject("vts-ppt")
-    instance = pose(WAVY, subject, 0)
-    (trace,) = solve_in_tries(instance.scene, subject.for_case(instance.first_guess), instance.start, instance.step)
-    counts = run_cell(WAVY, [subject], 1, 0).runs["vts-ppt"].counts
+    instance = pose(WAVY, 10.0, subject.traits, 0)
+    (trace,) = solve_in_tries(instance.scene, subject.for_case(instance.first_guess), None, instance.step)
+    counts = solve_cell(WAVY, subject)[0].counts
     assert list(counts) == list(COUNTS)
     assert counts["iterations"] == trace.n_iterations
-    assert counts["pairs"] == len(trace.residuals)
-    assert counts["tangents"] >= trace.n_iterations
+    assert counts["pairs"] == counts["residuals"] == len(trace.residuals)
+    assert counts["tangents"] == trace.n_iterations
     assert counts["differences"] == 0
 
 
+def test_counts_and_nonzeros_are_the_same_in_every_run_and_in_every_place() -> None:
+    """A plugin in a process of its own has the same outcomes, errors and counts; no process tells them."""
+    far = load_formulation("vts-ppt", Limits())
+    assert isinstance(far, Subject)
+    runs = [run_cell(WAVY, [subject], 0).runs["vts-ppt"] for subject in (load_subject("vts-ppt"), far, far)]
+    assert runs[0].solutions == runs[1].solutions == runs[2].solutions
+    assert runs[0].nonzeros == runs[1].nonzeros == runs[2].nonzeros
+    assert runs[0].calls == runs[1].calls == runs[2].calls > 0
+    assert [solution.outcome for solution in runs[0].solutions] == [Outcome.SOLVED] * len(VARIANTS)
+    assert all(run.evaluation > 0 and run.factorisation > 0 for run in runs)
+
+
+def test_the_whole_system_is_that_of_newtons_method_before_it_is_condensed() -> None:
+    subject = load_subject("mortar-lm")
+    instance = pose(Cell("rings", 12, 0), 10.0, subject.traits, 0)
+    scene, formulation = instance.scene, subject.for_case(instance.first_guess)
+    system, whole = System(scene, formulation), WholeSystem(scene)
+    u = np.append(scene.start, np.full(system.n_multipliers, 1e-2))
+    tangent = system.tangent(u, system.pair(u))
+    matrix = whole.matrix(tangent).toarray()
+    assert matrix.shape == (whole.size + system.n_multipliers,) * 2
+    free = [np.flatnonzero(~body.fixed.reshape(-1)) for body in scene.bodies]
+    starts = np.cumsum([0, *map(len, free)])
+    outer = np.concatenate([np.searchsorted(free[k], scene.unknowns[k]) + starts[k] for k in range(2)])
+    outer = np.append(outer, np.arange(whole.size, len(matrix)))
+    inner = np.setdiff1d(np.arange(len(matrix)), outer)
+    schur = matrix[np.ix_(outer, outer)] - matrix[np.ix_(outer, inner)] @ np.linalg.solve(
+        matrix[np.ix_(inner, inner)], matrix[np.ix_(inner, outer)]
+    )
+    expected = system.stiffness + system.contact_stiffness(u, system.pair(u), tangent)
+    np.testing.assert_allclose(schur, dense(expected), atol=1e-9 * np.abs(matrix).max())
+
+
+def test_the_factors_of_bodies_do_not_outlive_their_cell() -> None:
+    """The scene of a cell is remembered, and so are its stiffness and its load."""
+    subject, cell = load_subject("vts-ppt"), Cell("wavy", 32, 0)
+    solve_cell(cell, subject)
+    scene = pose(cell, 10.0, subject.traits, 0).scene
+    assert {"stiffness", "load"} <= vars(scene).keys()
+    assert "condensed_bodies" not in vars(scene)
+    assert condense.cache_info().currsize == 0
+
+
 def test_a_residual_alone_is_one_more_curve_and_its_differences_are_counted_as_such() -> None:
-    record = run_cell(WAVY, [alone("vts-ppt"), load_subject("vts-ppt")], 1, 0)
+    record = run_cell(WAVY, [alone("vts-ppt"), load_subject("vts-ppt")], 0)
     single, whole = (record.runs[name] for name in ("alone", "vts-ppt"))
-    assert single.outcome == Outcome.SOLVED
-    assert single.errors["forces"] == pytest.approx(whole.errors["forces"], rel=1e-6)
-    assert (single.counts["pairs"], single.counts["tangents"]) == (0, 0)
-    assert single.counts["differences"] >= 2 * record.unknowns * single.counts["iterations"]
-    assert single.seconds["differences"][0] > 0
-    assert single.seconds["tangent"] == [0.0]
+    assert single.solutions[0].outcome == Outcome.SOLVED
+    assert single.solutions[0].errors["forces"] == pytest.approx(whole.solutions[0].errors["forces"], rel=1e-6)
+    counts = single.solutions[0].counts
+    assert (counts["pairs"], counts["tangents"]) == (0, 0)
+    n_unknowns = pose(WAVY, 10.0, Traits(), 0).scene.interface.n_unknowns
+    assert counts["differences"] == 2 * n_unknowns * counts["iterations"]
+    assert single.evaluation > whole.evaluation
+    assert single.nonzeros[0] > 0
 
 
 def test_a_failure_is_kept_and_stops_no_one() -> None:
@@ -109,46 +196,41 @@ def test_a_failure_is_kept_and_stops_no_one() -> None:
 
     subjects = [Subject("broken", make_broken), Subject("pulling", make_pulling), load_subject("vts-ppt")]
     absent = NotLoaded("absent", "no such module")
-    results = run_bench([absent, *subjects], BenchPlan((WAVY,), repeats=2))
-    assert [int(outcome) for outcome in results.outcomes[:, 0]] == [Outcome.CRASHED, Outcome.NOT_SOLVED, Outcome.SOLVED]
-    assert "ZeroDivisionError" in results.remarks["broken", 0]
-    assert results.remarks["pulling", 0]
-    assert np.isinf(results.times("broken")).all()
-    assert np.isinf(results.errors_of("pulling")).all()
-    assert np.isfinite(results.seconds[1:]).all()
+    results = run_bench([absent, *subjects], BenchPlan((WAVY,), processes=2))
+    outcomes = [int(outcome) for outcome in results.outcomes[:, 0, 0]]
+    assert outcomes == [Outcome.CRASHED, Outcome.NOT_SOLVED, Outcome.SOLVED]
+    assert "ZeroDivisionError" in results.remarks["broken", 0, 0]
+    assert results.remarks["pulling", 0, 0]
+    assert np.isinf(results.errors_of("broken")).all()
+    assert np.isinf(results.errors_of("pulling")[:, 0]).all()
+    assert np.isfinite(results.evaluation[1:]).all()
+    assert results.work[:2, :, 1:].sum() == 0
     assert results.not_loaded == {"absent": "no such module"}
-
-
-def test_a_plugin_in_a_process_of_its_own_has_the_same_outcome_errors_and_counts() -> None:
-    far = load_formulation("vts-ppt", Limits())
-    assert isinstance(far, Subject)
-    runs = [run_cell(WAVY, [subject], 2, 0).runs["vts-ppt"] for subject in (load_subject("vts-ppt"), far)]
-    assert runs[0].errors == runs[1].errors
-    assert runs[0].counts == runs[1].counts
-    assert [run.outcome for run in runs] == [Outcome.SOLVED, Outcome.SOLVED]
-    assert all(len(seconds) == 2 for seconds in runs[1].seconds.values())
+    assert results.provenance["isolation"] == "inline"
 
 
 @pytest.mark.parametrize("seconds", [-1.0, float("nan"), 1e300])
-def test_times_that_cannot_be_are_a_crash(seconds: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_times_that_cannot_be_are_no_times(seconds: float, monkeypatch: pytest.MonkeyPatch) -> None:
     def lie(question: Question) -> Answer:
-        return structs.replace(answer_of(question), processor_seconds=seconds)
+        return structs.replace(answer_of(question), seconds=seconds)
 
     monkeypatch.setattr(remote_formulation, "answer_of", lie)
-    run = run_cell(WAVY, [load_formulation("vts-ppt", Limits())], 1, 0).runs["vts-ppt"]
-    assert run.outcome == Outcome.CRASHED
-    assert "times that cannot be" in run.remark
+    assert np.isnan(run_cell(WAVY, [load_formulation("vts-ppt", Limits())], 0, solve=False).runs["vts-ppt"].evaluation)
 
 
-def test_random_scenes_are_the_same_for_the_same_seed() -> None:
-    subject, cell = load_subject("vts-ppt"), Cell("random", 1, 1.0)
-    scenes = [pose(cell, subject, seed).scene for seed in (0, 0, 1)]
-    assert scenes[0] is scenes[1]
-    assert scenes[0].interface.nodes.tolist() != scenes[2].interface.nodes.tolist()
+def test_each_process_of_a_formulation_is_another_one() -> None:
+    far = load_formulation("vts-ppt", Limits(seconds=31.0))  # Its host is that of no other test.
+    assert isinstance(far, RemoteSubject)
+    before = far.host.n_started
+    results = run_bench([far], BenchPlan((Cell("kinked", 1, 0),), processes=3))
+    assert far.host.n_started - before >= 2
+    assert results.evaluation.shape == (1, 1, 3)
+    assert results.provenance["isolation"] == "process"
 
 
 HEADER = Header(make_plan(["wavy"], quick=True), ("a",), {"numpy_version": "2"})
-RECORD = CellRecord(4, 10, [0.5], {"a": RunRecord(0, "", {"error": np.float64(1.5)}, {"steps": 3}, {"all": [0.25]})})
+SOLUTION = SolutionRecord(0, "", {"error": np.float64(1.5)}, {"steps": 3})
+RECORD = CellRecord(4, 10, {"a": RunRecord([SOLUTION], (5, 6), 7, 0.5, 0.25)})
 
 
 def note(output: Path, *cells: tuple[int, CellRecord]) -> None:
@@ -207,7 +289,7 @@ def test_a_damaged_journal_is_one_line(tmp_path: Path, header: bytes) -> None:
 
 def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One entry point is all that it takes; the results say in words what it is."""
-    stranger = replace(PROBLEMS["kinked"], label="a stranger's zigzag", unit="E/m", meshes=(1, 2), rank=7)
+    stranger = replace(PROBLEMS["kinked"], label="a stranger's zigzag", meshes=(1, 2), rank=7)
     module = ModuleType("a_strangers_problems")
     module.__dict__.update(ZIGZAG=stranger, NUMBER=3)
     monkeypatch.setitem(sys.modules, module.__name__, module)
@@ -220,7 +302,7 @@ def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(registry, "entry_points", lambda *, group: {**installed, registry.PROBLEMS: entries}[group])
     problems = PROBLEMS | {"zigzag": stranger}
     assert list(load_problems()) == [*sorted(problems, key=lambda name: problems[name].rank), "number"]
-    plan = make_plan(["number", "zigzag"], quick=True, repeats=1)
+    plan = make_plan(["number", "zigzag"], instances=1, processes=1)
     results = run_bench([load_subject("vts-ppt")], plan)
     assert results.not_loaded == {"number": "the entry point gives a int, not a contactverif.problems.problem.Problem"}
     assert [cell.scene for cell in results.cells] == ["zigzag", "zigzag"]
@@ -230,24 +312,24 @@ def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, 
     again = read_bench(tmp_path / "a.nc")
     assert again.cells == results.cells
     assert again.label("zigzag") == "a stranger's zigzag"
-    assert again.penalty_name("zigzag", 30.0) == "ε̂ = 30 E/m"
+    assert again.targets == {"zigzag": stranger.targets}
     with pytest.raises(MisuseError, match="--scene: found number: the entry point gives a int"):
         make_plan(["number"])
 
 
-def _fail(mesh: int, penalty: float, traits: Traits) -> ProblemInstance:
+def _fail(mesh: int, penalty: float, traits: Traits, variation: Variation) -> ProblemInstance:
     raise ValueError(f"no mesh {mesh}")
 
 
-def _pose_flat_forces(mesh: int, penalty: float, traits: Traits) -> ProblemInstance:
-    instance = PROBLEMS["kinked"].pose(mesh, penalty, traits)
+def _pose_flat_forces(mesh: int, penalty: float, traits: Traits, variation: Variation) -> ProblemInstance:
+    instance = PROBLEMS["kinked"].pose(mesh, penalty, traits, variation)
     return replace(instance, forces=lambda positions: instance.forces(positions).reshape(-1))
 
 
 @pytest.mark.parametrize(
     ("pose", "message"),
     [
-        (_fail, "pose of the problem mine: found ValueError: no mesh 1, on mesh 1 at the penalty 30; needed a Problem"),
+        (_fail, "pose of the problem mine: found ValueError: no mesh 1, on mesh 1 at the penalty 10; needed a Problem"),
         (lambda *arguments: 3, "pose of the problem mine: found a int; needed a ProblemInstance"),
         (_pose_flat_forces, r"ProblemInstance.forces: found shape \(.*,\); needed \(.*, 2\), a force for each node"),
     ],
@@ -258,16 +340,15 @@ def test_a_strangers_mistake_in_a_problem_is_named(
     monkeypatch.setattr(bench_plan, "_problem", lambda name: replace(PROBLEMS["kinked"], pose=pose))
     subject = load_subject("vts-ppt")
     with pytest.raises(MisuseError, match=message):
-        run_cell(Cell("mine", 1, 30.0), [subject], 1, 0)
+        run_cell(Cell("mine", 1, 0), [subject], 0)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"scenes": ["disk"]}, "--scene: found 'disk'; needed one of " + ", ".join([*PROBLEMS, "random"])),
-        ({"repeats": 0}, "--repeats: found 0; needed at least 1, at most 1000"),
-        ({"n_random": -1}, "--random: found -1; needed at least 0"),
-        ({"scenes": ["random"], "n_random": 0}, "--random: found 0 random scenes and no other"),
+        ({"scenes": ["disk"]}, "--scene: found 'disk'; needed one of " + ", ".join(PROBLEMS)),
+        ({"instances": 0}, "--instances: found 0; needed at least 1, at most 1000"),
+        ({"processes": 1001}, "--processes: found 1001; needed at least 1, at most 1000"),
     ],
 )
 def test_a_plan_of_nothing_is_refused(options: dict[str, Any], message: str) -> None:
@@ -277,7 +358,7 @@ def test_a_plan_of_nothing_is_refused(options: dict[str, Any], message: str) -> 
 
 def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_seconds(tmp_path: Path) -> None:
     environment = {**os.environ, "NO_COLOR": "1"}
-    arguments = [*MAIN, *ARGUMENTS, "--quick", "--out"]
+    arguments = [*MAIN, *ARGUMENTS, "--out"]
     killed, unbroken = tmp_path / "killed.nc", tmp_path / "unbroken.nc"
     process = subprocess.Popen([*arguments, str(killed)], env=environment, stdout=subprocess.DEVNULL)
     journal, deadline = journal_folder(killed), time.monotonic() + 120
@@ -294,7 +375,7 @@ def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_secon
     assert not journal.exists()
     with xr.open_datatree(killed, engine="netcdf4") as resumed, xr.open_datatree(unbroken, engine="netcdf4") as other:
         xr.testing.assert_identical(resumed.to_dataset().drop_attrs(), other.to_dataset().drop_attrs())
-        assert resumed["timing/seconds"].shape == other["timing/seconds"].shape
         record = msgspec.msgpack.decode(first)["record"]
-        stored = resumed["timing/yardstick_seconds"].values[0].tolist()
-    assert stored == record["yardstick"]  # What was measured before the kill was not measured again.
+        stored = resumed["timing/evaluation_seconds"].values[:, 0, 0].tolist()
+    expected = [run["evaluation"] for run in record["runs"].values()]
+    assert stored == expected  # What was measured before the kill was not measured again.

@@ -1,5 +1,5 @@
-"""Speed against error: formulations on scenes with an exact solution, meshes fine and coarse, penalties soft to stiff.
+"""Speed against error: what an error costs formulations, in evaluations and in linear systems.
 
-`bench_study` is the job, `bench_scenes` the scenes with their errors, `meter` the clock, and `journal` is what survives
-a kill.
+`bench_study` is the job, `bench_plan` the cells and their problems, `cell_runs` what is solved and timed in one of
+them, `meter` counters and clock, and `bench_journal` is what survives a kill.
 """

@@ -36,7 +36,7 @@ class Header(msgspec.Struct, frozen=True):
 class FinishedCell(msgspec.Struct, frozen=True):
     """The record of a cell that is finished."""
 
-    number: int
+    number: int  # Process × number of cells + cell
     record: CellRecord
 
 

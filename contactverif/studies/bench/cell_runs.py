@@ -1,112 +1,178 @@
-"""One cell of the bench: all formulations solve it in turns, again and again, each repeat timed.
+"""One cell of the bench: all formulations solve it in all variants, and their evaluations are timed in turns.
 
-The first turn is not timed: kernels compile, bodies are condensed, errors and counts are taken. Then all formulations
-take turns, and who begins changes, so that whatever disturbs the machine disturbs all. In each repeat a fixed piece of
-work, the yardstick, is timed too.
-
-Seconds are those of the processor: on two cores beside four other programs they grew by a quarter at most, where the
-wall clock showed eight times as many. They do not hold the work that a plugin leaves to other processes, so the wall
-clock is kept beside them.
+Errors, counts and nonzeros come from solutions that no clock looks at; they are the same in every run. An evaluation is
+timed at the near start, where all formulations see the same positions, and again in further processes of the plugins.
+Who begins a turn changes, so that whatever disturbs the machine disturbs all, and the least time counts.
 """
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from time import process_time
+from math import nan
+from time import perf_counter
+from typing import Any
 
 import numpy as np
+from scipy.sparse.linalg import splu
 
 from contactverif.contract.errors import ContractError
-from contactverif.contract.subject import Subject
-from contactverif.mechanics.accuracy import solution_of
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.accuracy import solution_of, solve_in_tries
+from contactverif.mechanics.scene import forget_bodies
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import Trace
+from contactverif.mechanics.whole_system import WholeSystem
+from contactverif.problems.problem import ProblemInstance
 from contactverif.studies.bench.bench_plan import is_solved, largest_errors, pose
-from contactverif.studies.bench.timed_solution import solve_with_clock, without_collector
-from contactverif_reports.bench.results import PARTS, Cell, Outcome
+from contactverif.studies.bench.meter import Meter, add_meter
+from contactverif_reports.bench.results import RULE, VARIANTS, Cell, Outcome
+
+TURNS = 5  # The number of timed evaluations in each process, and of timed factorisations.
+_LONG = 1.0  # Seconds. A factorisation that takes longer is timed once.
+
+
+@dataclass(slots=True)
+class SolutionRecord:
+    """One formulation in one cell and one variant."""
+
+    outcome: int = int(Outcome.CRASHED)  # The outcome, see `Outcome`.
+    remark: str = ""  # How it ended, if it is no solution.
+    errors: dict[str, float] = field(default_factory=dict)  # The errors by kind; empty without a solution.
+    counts: dict[str, int] = field(default_factory=dict)  # The counts by name; empty after a crash.
 
 
 @dataclass(slots=True)
 class RunRecord:
     """One formulation in one cell."""
 
-    outcome: int = int(Outcome.CRASHED)  # The outcome, see `Outcome`.
-    remark: str = ""  # How it ended, if it is no solution.
-    errors: dict[str, float] = field(default_factory=dict)  # The errors by kind; empty without a solution.
-    counts: dict[str, int] = field(default_factory=dict)  # The counts by name; empty after a crash.
-    # The seconds of the processor in each repeat by part; empty after a crash.
-    seconds: dict[str, list[float]] = field(default_factory=dict)
-    wall: list[float] = field(default_factory=list)  # The seconds of the wall clock in each repeat.
+    solutions: list[SolutionRecord] = field(default_factory=list)  # By variant; none in further processes
+    nonzeros: tuple[int, int] = (0, 0)  # Those of the tangent and of the factors, 0 without a solution
+    calls: int = 0  # Methods that run in one evaluation; 0 in further processes
+    factorisation: float = nan  # The least seconds of one factorisation
+    evaluation: float = nan  # The least seconds of one evaluation in this process; NaN if it crashed
 
 
 @dataclass(slots=True)
 class CellRecord:
-    """All formulations in one cell, as the journal keeps it."""
+    """All formulations in one cell and one process of each, as the journal keeps it."""
 
-    segments: int  # The numbers of slave segments and of unknowns of the scene.
-    unknowns: int
-    yardstick: list[float]  # The seconds of the yardstick in each repeat.
-    runs: dict[str, RunRecord]  # The runs by formulation.
+    segments: int  # The number of slave segments
+    unknowns: int  # The number of free components of all bodies; 0 in further processes
+    runs: dict[str, RunRecord]  # The runs by formulation
 
 
-def run_cell(cell: Cell, subjects: Sequence[Subject], repeats: int, seed: int) -> CellRecord:
-    """Solve a cell with all formulations, in turns."""
-    runners = [_Runner(subject, cell, seed) for subject in subjects]
-    scene = runners[0].instance.scene
-    for runner in runners:
-        runner.warm_up()
-    yardstick = []
+def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True) -> CellRecord:
+    """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns."""
+    instances = [pose(cell, RULE.penalty, subject.traits, seed) for subject in subjects]
+    whole = WholeSystem(instances[0].scene) if solve else None
+    runs = [RunRecord() for _ in subjects]
+    for subject, instance, run in zip(subjects, instances, runs, strict=True):
+        if whole is not None:
+            _solve_variants(cell, subject, instance, seed, whole, run)
+            run.calls = evaluate(subject, instance, counted=True).calls
+    forget_bodies()
     gc.collect()
     with without_collector():
-        for turn in range(repeats):
-            yardstick.append(time_yardstick())
-            for place in range(len(runners)):
-                runners[(place + turn) % len(runners)].take_turn()
-    runs = {runner.subject.name: runner.record for runner in runners}
-    return CellRecord(len(scene.interface.slave), scene.n_free, yardstick, runs)
+        for turn in range(TURNS):
+            for place in range(len(runs)):
+                number = (place + turn) % len(runs)
+                seconds = evaluate(subjects[number], instances[number], timed=True).seconds
+                runs[number].evaluation = float(np.fmin(runs[number].evaluation, seconds))
+    names = (subject.name for subject in subjects)
+    size = 0 if whole is None else whole.size
+    return CellRecord(len(instances[0].scene.interface.slave), size, dict(zip(names, runs, strict=True)))
 
 
-def time_yardstick() -> float:
-    """Return the seconds that a fixed piece of work takes: small steps of numpy and a linear system, as in Newton's."""
-    values, matrix = np.linspace(1.0, 2.0, 64), np.eye(64) + 1 / np.add.outer(np.arange(1.0, 65.0), np.arange(64.0))
-    start = process_time()
-    for _ in range(100):
-        values = np.sqrt(values * values[::-1])
-    np.linalg.solve(matrix, values)
-    return process_time() - start
-
-
-class _Runner:
-    """One formulation in one cell, with its record so far."""
-
-    def __init__(self, subject: Subject, cell: Cell, seed: int) -> None:
-        self.subject, self.instance, self.record = subject, pose(cell, subject, seed), RunRecord()
-
-    def warm_up(self) -> None:
-        """Solve once without the clock, and record outcome, errors and counts."""
+def _solve_variants(
+    cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeSystem, run: RunRecord
+) -> None:
+    """Solve all variants of a cell, and measure the whole system at the solution of the rule."""
+    for variant in VARIANTS:
+        if variant.penalty != RULE.penalty:
+            instance = pose(cell, variant.penalty, subject.traits, seed)
+        record = SolutionRecord()
+        run.solutions.append(record)
         try:
-            timed, tries = solve_with_clock(self.subject, self.instance)
-            formulation = self.subject.for_case(self.instance.first_guess)
-            solution = solution_of(tries[-1], formulation, nodal=self.subject.traits.rules.penalty == "nodal")
-            solved = is_solved(solution)
-            self.record.errors = largest_errors(self.instance, solution) if solved else {}
+            trace = _solve(subject, instance, variant.start, record)
+            if variant == RULE and record.outcome == Outcome.SOLVED:
+                _measure_system(subject, instance, trace, whole, run)
         except ContractError as error:
-            self.record.remark = str(error)
-            return
-        self.record.counts = timed.counts
-        self.record.outcome = int(Outcome.SOLVED if solved else Outcome.NOT_SOLVED)
-        self.record.remark = "" if solved else tries[-1].end.label
-        self.record.seconds = {part: [] for part in PARTS}
+            record.remark = str(error)
 
-    def take_turn(self) -> None:
-        """Solve once with the clock; a formulation that crashed takes no turn."""
-        if self.record.outcome == Outcome.CRASHED:
-            return
+
+def _solve(subject: Subject, instance: ProblemInstance, start: str, record: SolutionRecord) -> Trace:
+    """Solve one variant; record how that ended, its errors and its counts."""
+    meter = Meter()
+    formulation = add_meter(subject, instance.first_guess, meter)
+    with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
+        tries = solve_in_tries(instance.scene, formulation, instance.starts[start], instance.step)
+    # The scene keeps stiffness and load. The factors of its bodies may take gigabytes, and are of no further use.
+    vars(instance.scene).pop("condensed_bodies", None)
+    counts = {"iterations": sum(trace.n_iterations for trace in tries), **meter.counts}
+    plain = subject.for_case(instance.first_guess)
+    solution = solution_of(tries[-1], plain, nodal=subject.traits.rules.penalty == "nodal")
+    solved = is_solved(solution)
+    record.errors = largest_errors(instance, solution) if solved else {}
+    record.counts, record.remark = counts, "" if solved else tries[-1].end.label
+    record.outcome = int(Outcome.SOLVED if solved else Outcome.NOT_SOLVED)
+    return tries[-1]
+
+
+def _measure_system(
+    subject: Subject, instance: ProblemInstance, trace: Trace, whole: WholeSystem, run: RunRecord
+) -> None:
+    """Count the nonzeros of the tangent at the solution and of the factors, and time the factorisation."""
+    formulation: CheckedFormulation = subject.for_case(instance.first_guess)
+    system = System(instance.scene, formulation, difference_step=instance.step)
+    u = trace.u[-1]
+    tangent = system.tangent(u, system.pair(u))
+    matrix = whole.matrix(tangent)
+    n_tangent = int(np.count_nonzero(tangent)) if isinstance(tangent, np.ndarray) else int(tangent.nnz)
+    for _ in range(TURNS):
+        start = perf_counter()
         try:
-            timed, _ = solve_with_clock(self.subject, self.instance)
-        except ContractError as error:  # A plugin with a memory may fail later.
-            self.record = RunRecord(remark=str(error))
+            factors = splu(matrix)
+        except RuntimeError:  # The matrix is exactly singular: multipliers that are not unique.
+            run.nonzeros = n_tangent, 0
             return
-        for part, seconds in timed.seconds.items():
-            self.record.seconds[part].append(seconds)
-        self.record.wall.append(timed.wall)
+        run.factorisation = float(np.fmin(run.factorisation, perf_counter() - start))
+        if run.factorisation > _LONG:
+            break
+    run.nonzeros = n_tangent, int(factors.L.nnz + factors.U.nnz)
+
+
+def evaluate(subject: Subject, instance: ProblemInstance, *, timed: bool = False, counted: bool = False) -> Meter:
+    """Return the meter of one evaluation, search, forces and tangent or differences; its seconds are NaN after a crash.
+
+    It is timed or counted, since an interpreter that counts is slower.
+    """
+    meter = Meter(timed=timed, counted=counted)
+    formulation: Any = add_meter(subject, instance.first_guess, meter)
+    interface = instance.scene.interface
+    try:
+        z = np.concatenate([instance.first_guess.z, np.zeros(formulation.n_multipliers(interface))])
+        pairing = formulation.pair(interface, z)
+        if "tangent" in subject.provides:
+            formulation.residual_and_tangent(interface, pairing, z)
+        else:
+            formulation.residual(interface, pairing, z)
+            steps = np.diag(np.full(z.size, 1e-6 if instance.step is None else instance.step))
+            formulation.residual(interface, pairing, np.concatenate([z + steps, z - steps]))
+    except ContractError:
+        meter.seconds = nan
+    return meter
+
+
+@contextmanager
+def without_collector() -> Iterator[None]:
+    """Keep Python's collector of garbage out of the times, as `timeit` does."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

@@ -1,15 +1,15 @@
-"""The clock and the counters around a plugin, while Newton's method calls it.
+"""The counters and the clock around a plugin, between the harness and the plugin's process.
 
-The plugin itself is timed, without the checks of the harness and without the way to its process, which times each call
-itself. The clock is that of the processor, because a program beside this one may take the core away in the middle of a
-call. The wall clock is read too.
+Counts are of what the harness asks, so that no plugin tells them. Seconds are those of the plugin's own process, which
+times each call itself, without the checks of the harness and without the way there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
-from time import perf_counter, process_time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -19,50 +19,54 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.isolation.method_calls import MethodCalls
 from contactverif.isolation.remote_formulation import RemoteFormulation
+from contactverif_reports.bench.results import COUNTS
 
-# {verb of a plugin: the part of the time that it belongs to}. A verb that is not here is not timed by itself.
-PART_OF_VERB = {"pair": "pair", "residual": "residual", "tangent": "tangent", "residual_and_tangent": "tangent"}
+_COUNTS_OF_VERB = {
+    "pair": ("pairs",),
+    "residual": ("residuals",),
+    "tangent": ("tangents",),
+    "residual_and_tangent": ("residuals", "tangents"),
+}
 
 
 class Meter:
-    """Seconds and counts of one solution."""
+    """The counts of one solution by name, and the seconds, or the methods that run, of all calls where wanted."""
 
-    def __init__(self) -> None:
-        parts = ("pair", "residual", "tangent", "differences")
-        self.seconds, self.states = dict.fromkeys(parts, 0.0), dict.fromkeys(parts, 0)
+    def __init__(self, *, timed: bool = False, counted: bool = False) -> None:
+        self.timed, self.counted = timed, counted
+        self.seconds, self.calls = 0.0, 0
+        self.counts = dict.fromkeys(tuple(COUNTS)[1:], 0)  # All but the iterations
         self.differencing = False
-        self.wall_excess = self.excess = 0.0  # Seconds of calls here that the calls there did not take.
 
-    def call(self, part: str, plugin: Any, verb: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a verb of the plugin and book its time and its states."""
-        wall, start = perf_counter(), process_time()
-        answer = verb(*arguments)
-        if isinstance(plugin, RemoteFormulation):
-            wall_there, elapsed = plugin.seconds()
-            if part == "pair":
-                len(answer)  # A pairing comes from its process when it is looked into, which is no part of the time.
-            self.wall_excess += perf_counter() - wall - wall_there
-            self.excess += process_time() - start - elapsed
-        else:
-            elapsed = process_time() - start
-        part = "differences" if self.differencing else part
-        self.seconds[part] += elapsed
-        state = np.shape(arguments[-1])  # Forces may be wanted at a batch of states z (..., n_unknowns).
-        self.states[part] += int(np.prod(state[:-1]))
+    def call(self, verb: str, plugin: Any, method: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a method of the plugin, and count its states and its seconds."""
+        with MethodCalls() if self.counted else nullcontext() as counter:
+            start = perf_counter()
+            answer = method(*arguments)
+            seconds = perf_counter() - start
+        calls = 0 if counter is None else counter.count
+        if isinstance(plugin, RemoteFormulation) and (self.timed or self.counted):
+            seconds, calls = plugin.seconds(), plugin.calls()
+        self.seconds += seconds
+        self.calls += calls
+        n_states = int(np.prod(np.shape(arguments[-1])[:-1]))  # Forces may be wanted at a batch z (..., n_unknowns).
+        for name in ("differences",) if self.differencing else _COUNTS_OF_VERB[verb]:
+            self.counts[name] += n_states
         return answer
 
 
 class MeteredPlugin:
-    """A plugin whose verbs are timed; everything else is the plugin's own."""
+    """A plugin whose verbs are counted; everything else is the plugin's own."""
 
     def __init__(self, plugin: Any, meter: Meter) -> None:
         self._plugin, self._meter = plugin, meter
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(self._plugin, name)
-        part = PART_OF_VERB.get(name)
-        return value if part is None or not callable(value) else partial(self._meter.call, part, self._plugin, value)
+        is_counted = name in _COUNTS_OF_VERB and callable(value)
+        return partial(self._meter.call, name, self._plugin, value) if is_counted else value
 
 
 class MeteredFormulation:
@@ -84,9 +88,9 @@ class MeteredFormulation:
 
 
 def add_meter(subject: Subject, case: Case, meter: Meter) -> Any:
-    """Return the formulation with the penalty of a case, as Newton's method needs it, timed by the meter."""
+    """Return the formulation with the penalty of a case, as Newton's method needs it, with the meter around it."""
     plugin = subject.for_case(case).plugin
     if isinstance(plugin, RemoteFormulation):
-        plugin.timed = True
+        plugin.timed, plugin.counted = meter.timed, meter.counted
     metered = MeteredPlugin(plugin, meter)
     return MeteredFormulation(CheckedFormulation(metered, subject.traits, subject.provides), meter)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from math import isinf, isnan
-
-from contactverif_reports.bench.clocks import clock_sentences
-from contactverif_reports.bench.results import BenchResults
-from contactverif_reports.bench.work_precision import (
-    REFERENCE,
-    TARGETS,
-    cost_ratio,
-    cost_sentence,
-    figure_sentence,
-    harness_sentence,
-    pair_profiles,
-    time_to_reach,
+from contactverif_reports.bench.cost_tables import (
+    Table,
+    cost_sentences,
+    cost_table,
+    format_share,
+    starts_table,
+    totals_table,
 )
+from contactverif_reports.bench.costs import REFERENCE
+from contactverif_reports.bench.results import RULE, BenchResults
 
-COST_PICTURE, PROFILE_PICTURE = "cost.svg", "profiles.svg"
+COST_PICTURE, RUNTIME_PICTURE = "cost.svg", "runtimes.svg"
+MOST_CURVES = 6  # More curves in one panel cannot be told apart.
 
 
 def picture_of(scene: str) -> str:
@@ -25,81 +22,75 @@ def picture_of(scene: str) -> str:
     return f"{scene}.svg"
 
 
+def picture_of_each(scene: str) -> str:
+    """Return the file name of the figure with a panel for each formulation."""
+    return f"{scene}-each.svg"
+
+
+HOW_TO_READ = (
+    f"The penalty is {RULE.penalty:g} E/h, fixed beforehand; dashed lines and the column “best” have the best of three "
+    "penalties, chosen afterwards. All start from the same guess. A point is the median over the instances of a mesh: "
+    "the other body is the slave, the master is graded, the edge shifted, the size changed by up to a fifth."
+)
+THREE_NUMBERS = (
+    "An error costs three numbers, and they are not added up, since what a linear system costs depends on the bodies. "
+    "One evaluation is search, forces and tangent, timed by the plugin's process. Linear systems are counted. One "
+    "factorisation is that of the whole system with all bodies, by SuperLU. The coarsest mesh that reaches the error "
+    "counts. A ratio is a geometric mean over instances and processes, with an interval of 95 % that resamples both."
+)
+TOTALS = (
+    "The ratio of whole solutions if one linear system costs the reader a tenth of an evaluation of "
+    f"{REFERENCE} (cheap bodies), as much (even), or ten times as much (dear)."
+)
+STARTS = "Linear systems from the guess (near), and from ten times its depth (deep), on each mesh."
+
+
 def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> str:
     """Return the page."""
     facts = results.provenance
     version, commit = (facts.get(name, "unknown") for name in ("contactverif_version", "commit"))
-    n_repeats = results.seconds.shape[-1]
-    costs = filter(None, (cost_sentence(results, scene) for scene in results.scenes))
     parts = [
         "# Speed against error",
         f"`{facts.get('command', '')}`",
-        f"The command above wrote these files with contactverif {version}, commit {commit}.",
-        "Each formulation solves the same scenes, whose exact solution is known, on meshes fine and coarse and at "
-        f"penalties soft to stiff. All take turns, {n_repeats} times, on one thread; the least time of a run counts, "
-        "in seconds of the processor. The time is that of a whole solution by Newton's method, from the first iterate "
-        "to the last. Bodies are condensed before.",
-        "\n".join(f"- {text}" for text in [*costs, *clock_sentences(results)]),
-        harness_sentence(results),
+        f"The command above wrote these files with contactverif {version}, commit {commit}: {results.settings}.",
+        THREE_NUMBERS,
     ]
     if with_pictures:
-        parts.append(f"![Time to an error of 1 % in the forces, over that of {REFERENCE}]({COST_PICTURE})")
-    parts += ["## Error against time", _HOW_TO_READ]
+        parts.append(f"![What an error costs: evaluation, linear systems, factorisation]({COST_PICTURE})")
+    parts.append(HOW_TO_READ)
     for scene in results.scenes:
-        label = results.label(scene)
-        parts.append(f"### {label[:1].upper()}{label[1:]}")
-        if with_pictures:
-            parts.append(f"![Error of the forces against time: {label}]({picture_of(scene)})")
-        parts += [figure_sentence(results, scene), _table(results, scene)]
-    parts.append(_profiles(results, with_pictures))
+        parts += _scene(results, scene, with_pictures)
+    if with_pictures:
+        parts += ["## Runtimes", f"![Share of targets that are reached within a time]({RUNTIME_PICTURE})"]
     if report:
         parts.append(
-            f"`{report}` holds every repeat; `contactverif bench {report} --out bench.html` makes a page of it, and "
+            f"`{report}` holds every instance; `contactverif bench {report} --out bench.html` makes a page of it, and "
             f"`contactverif bench NAME … --against {report}` says what became slower."
         )
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-_HOW_TO_READ = (
-    "A line is one formulation at one penalty on finer and finer meshes. A run without a solution is a cross at the "
-    "upper edge. The grey steps are the Pareto front of all formulations. The tables say how long the cheapest run "
-    "takes whose error of the nodal forces is at most the number above, in milliseconds; ∞ where no run gets there."
-)
+def _scene(results: BenchResults, scene: str, with_pictures: bool) -> list[str]:
+    """Return the part of a scene."""
+    label = results.label(scene)
+    parts = [f"## {label[:1].upper()}{label[1:]}"]
+    if with_pictures and len(results.meshes_of(scene)) > 1:
+        parts.append(f"![Errors against one evaluation and one factorisation: {label}]({picture_of(scene)})")
+        if len(results.formulations) > MOST_CURVES:
+            parts.append(f"[Each formulation in a panel of its own]({picture_of_each(scene)})")
+    for target in results.targets[scene]:
+        sentences = cost_sentences(results, scene, target)
+        parts += [f"### {format_share(target)} on {scene}", "\n".join(f"- {sentence}" for sentence in sentences)]
+        parts.append(_markdown(cost_table(results, scene, target)))
+    heads, rows = totals_table(results, scene, results.targets[scene][0])
+    if rows:
+        parts += [f"### Whole solutions on {scene}", TOTALS, _markdown((heads, rows))]
+    return [*parts, f"### Starts on {scene}", STARTS, _markdown(starts_table(results, scene))]
 
 
-def _table(results: BenchResults, scene: str) -> str:
-    heads = ["", *(f"{target:g}" for target in TARGETS), f"at 0.01 over {REFERENCE}"]
-    lines = [f"| {' | '.join(heads)} |", f"|---|{'--:|' * (len(heads) - 1)}"]
-    for name in results.formulations:
-        times = [_milliseconds(time_to_reach(results, name, scene, target)) for target in TARGETS]
-        lines.append(f"| `{name}` | {' | '.join(times)} | {format_ratio(cost_ratio(results, name, scene))} |")
+def _markdown(table: Table) -> str:
+    """Return a table in Markdown."""
+    heads, rows = table
+    lines = [f"| | {' | '.join(heads)} |", f"|---|{'--:|' * len(heads)}"]
+    lines += [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]
     return "\n".join(lines)
-
-
-def _profiles(results: BenchResults, with_pictures: bool) -> str:
-    profiles = pair_profiles(results)
-    if not profiles:
-        return ""
-    lines = [
-        f"## Random scenes, in pairs with {REFERENCE}",
-        "",
-        "Blocks with random meshes, materials and penalties under a uniform pressure. A scene counts as solved if the "
-        "forces are exact up to 1 %. The ratio is the median over the scenes that both solve.",
-        "",
-    ]
-    if with_pictures:
-        lines += [f"![Performance profiles in pairs]({PROFILE_PICTURE})", ""]
-    lines += ["| | solved | faster | within twice | ratio |", "|---|--:|--:|--:|--:|"]
-    for pair in profiles:
-        shares = (f"{share:.0%}" for share in (pair.share_solved, pair.share(1), pair.share(2)))
-        lines.append(f"| `{pair.formulation}` | {' | '.join(shares)} | {format_ratio(pair.median_ratio)} |")
-    return "\n".join(lines)
-
-
-def _milliseconds(seconds: float) -> str:
-    return "∞" if isinf(seconds) else f"{1e3 * seconds:.3g}"
-
-
-def format_ratio(ratio: float) -> str:
-    """Return a ratio with two digits; ∞ for a formulation that never gets there, a dash where there is no ratio."""
-    return "–" if isnan(ratio) else "∞" if isinf(ratio) else f"{ratio:.2g}"

@@ -1,7 +1,9 @@
-"""The results of a bench: formulations on cells, each with outcome, errors, counts and the seconds of every repeat.
+"""The results of a bench: three numbers of each formulation beside its errors, never their sum.
 
-A cell is one scene on one mesh at one penalty. Rules for the next editor: nothing is solved here, a failed solution is
-an entry like any other, and no number is averaged before it is stored.
+They are the seconds of one evaluation, what a solution takes (linear systems, nonzeros), and the seconds of one
+factorisation. The harness takes part in none of them. A cell is one instance of one scene on one mesh; each is solved
+in all `VARIANTS`. Rules for the next editor: nothing is solved here, a failed solution is an entry like any other, and
+no number is averaged before it is stored.
 """
 
 from __future__ import annotations
@@ -15,19 +17,10 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.foreign_text import LONGEST_FACT, name_line, one_line
 
-RANDOM = "random"  # The scene of the performance profiles.
 ERRORS = {
     "forces": "E_F of nodal forces, the larger one of slave and master",
     "displacement": "L2 error of displacements of the interface over the exact ones",
     "pressure": "root mean square error of reported pressures",
-}
-PARTS = {
-    "pair": "the search",
-    "residual": "forces",
-    "tangent": "the tangent, with the forces if the plugin computes both at once",
-    "differences": "forces at states beside, for a tangent that the plugin does not have or that did not help",
-    "solve": "linear systems",
-    "total": "everything from the first iterate to the last, the harness included",
 }
 COUNTS = {
     "iterations": "linear systems solved",
@@ -35,6 +28,11 @@ COUNTS = {
     "residuals": "states at which forces were computed, those for differences not counted",
     "tangents": "tangents computed by the plugin",
     "differences": "states at which forces were computed for differences",
+}
+WORK = {
+    "calls": "methods of formulations that run in one evaluation, also those that a formulation calls itself",
+    "tangent_nonzeros": "entries of the tangent at the solution",
+    "factor_nonzeros": "entries of the LU factors of the whole system there: all bodies, contact, multipliers",
 }
 
 
@@ -51,13 +49,32 @@ class Outcome(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """The penalty and the start of a solution."""
+
+    penalty: float  # ε̂ in E/h
+    start: str  # "near" or "deep", as the problem declares them
+
+    @property
+    def label(self) -> str:
+        """The variant in words."""
+        return f"{self.penalty:g} E/h from {self.start}"
+
+
+RULE = Variant(10.0, "near")  # The penalty that is fixed beforehand.
+DEEP = Variant(10.0, "deep")
+VARIANTS = (RULE, DEEP, Variant(1.0, "near"), Variant(100.0, "near"))
+BEST = tuple(number for number, variant in enumerate(VARIANTS) if variant.start == RULE.start)  # The best afterwards.
+
+
 @dataclass(frozen=True, slots=True, order=True)
 class Cell:
-    """One scene on one mesh at one penalty."""
+    """One instance of one scene on one mesh."""
 
-    scene: str  # The name of a problem, or `RANDOM`
-    mesh: int  # The fineness, as the problem counts it; the number of a random scene
-    stiffness: float  # The penalty ε̂ in the unit of the problem
+    scene: str  # The name of a problem
+    mesh: int  # The fineness, as the problem counts it
+    instance: int  # The number of the variation, the same on all meshes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,24 +83,21 @@ class BenchResults:
 
     formulations: tuple[str, ...]  # The formulations, as on the command line.
     cells: tuple[Cell, ...]
-    labels: Mapping[str, str]  # {scene: what is solved, in words}; a file of an earlier version has none
-    units: Mapping[str, str]  # {scene: unit of its penalties}; empty where they are ε̂ itself
-    segments: IntArray  # (n_cells,) The numbers of slave segments and of the unknowns of the scene.
+    labels: Mapping[str, str]  # {scene: what is solved, in words}
+    targets: Mapping[str, tuple[float, ...]]  # {scene: errors that cost is measured at, from large to small}
+    segments: IntArray  # (n_cells,) The numbers of slave segments and of free unknowns of all bodies.
     unknowns: IntArray
-    outcomes: IntArray  # (n_formulations, n_cells) The outcomes, see `Outcome`.
-    # (n_formulations, n_cells, n_errors) The errors, in the order of `ERRORS`; NaN where nothing is solved, or nothing
-    # is reported.
+    outcomes: IntArray  # (n_formulations, n_cells, n_variants) The outcomes, see `Outcome`.
+    # (n_formulations, n_cells, n_variants, n_errors) The errors, in the order of `ERRORS`; NaN where nothing is solved,
+    # or nothing is reported.
     errors: FloatArray
-    counts: IntArray  # (n_formulations, n_cells, n_counts) The counts, in the order of `COUNTS`.
-    # (n_formulations, n_cells, n_parts, n_repeats) The processor's time of each part in each repeat, in the order of
-    # `PARTS`; NaN where the plugin crashed.
-    seconds: FloatArray
-    # (n_formulations, n_cells, n_repeats) The time of each repeat by the wall clock; NaN where the plugin crashed, or
-    # an old file has none.
-    wall: FloatArray
-    yardstick: FloatArray  # (n_cells, n_repeats) The time of a fixed piece of work that was done in the same repeats.
-    # {(formulation, number of the cell): how a run ended that gave no solution}.
-    remarks: Mapping[tuple[str, int], str]
+    counts: IntArray  # (n_formulations, n_cells, n_variants, n_counts) The counts, in the order of `COUNTS`.
+    work: IntArray  # (n_formulations, n_cells, n_work) `WORK` of the variant `RULE`; entries are 0 without a solution.
+    # (n_formulations, n_cells, n_processes) The least seconds of one evaluation (pair, residual and tangent, or
+    # differences) in each process of the plugin, by the clock there; NaN where it crashed.
+    evaluation: FloatArray
+    factorisation: FloatArray  # (n_formulations, n_cells) The least seconds of one factorisation; NaN without one.
+    remarks: Mapping[tuple[str, int, int], str]  # {(formulation, cell, variant): how a run ended without a solution}
     not_loaded: Mapping[str, str]  # {formulation: why it did not load}.
     provenance: Mapping[str, str]  # Versions, machine, time and command.
 
@@ -91,8 +105,7 @@ class BenchResults:
         cleaned = {
             "formulations": tuple(map(name_line, self.formulations)),
             "labels": {name_line(name): one_line(text) for name, text in self.labels.items()},
-            "units": {name_line(name): name_line(text) for name, text in self.units.items()},
-            "remarks": {(name_line(name), cell): one_line(text) for (name, cell), text in self.remarks.items()},
+            "remarks": {(name_line(name), *run): one_line(text) for (name, *run), text in self.remarks.items()},
             "not_loaded": {name_line(name): one_line(text) for name, text in self.not_loaded.items()},
             "provenance": {name_line(name): one_line(text, LONGEST_FACT) for name, text in self.provenance.items()},
         }
@@ -101,47 +114,46 @@ class BenchResults:
 
     @property
     def scenes(self) -> tuple[str, ...]:
-        """The scenes that have cells, without the random ones, as the cells follow one another."""
-        return tuple(dict.fromkeys(cell.scene for cell in self.cells if cell.scene != RANDOM))
+        """The scenes, as the cells follow one another."""
+        return tuple(dict.fromkeys(cell.scene for cell in self.cells))
+
+    @property
+    def settings(self) -> str:
+        """The numbers of instances and processes, in words."""
+        n_instances, n_processes = len({cell.instance for cell in self.cells}), self.evaluation.shape[-1]
+        return f"{n_instances} instances of each mesh, {n_processes} processes of each formulation"
 
     def label(self, scene: str) -> str:
         """Return what a scene is, in words; its name if the file does not say."""
         return self.labels.get(scene, scene)
 
-    def penalty_name(self, scene: str, stiffness: float) -> str:
-        """Return a penalty of a scene with its unit."""
-        return f"ε̂ = {stiffness:g} {self.units.get(scene, '')}".rstrip()
+    def meshes_of(self, scene: str) -> tuple[int, ...]:
+        """Return the meshes of a scene, coarse ones first."""
+        return tuple(sorted({cell.mesh for cell in self.cells if cell.scene == scene}))
 
-    @property
-    def fastest(self) -> FloatArray:
-        """The least time (n_formulations, n_cells, n_parts) of all repeats, in seconds."""
-        least: FloatArray = self.seconds.min(axis=-1)
-        return least
-
-    def times(self, formulation: str, part: str = "total") -> FloatArray:
-        """Return the least time (n_cells,) of a part, in seconds; infinite where there is no solution."""
-        row = self.formulations.index(formulation)
-        least = self.fastest[row, :, list(PARTS).index(part)]
-        return np.where(self.outcomes[row] == Outcome.SOLVED, least, np.inf)
+    def ladders(self, scene: str) -> IntArray:
+        """Return the numbers of the cells (n_instances, n_meshes) of a scene, coarse meshes first."""
+        cells = sorted((cell, number) for number, cell in enumerate(self.cells) if cell.scene == scene)
+        numbers = np.array([number for _, number in cells], np.int64)
+        return numbers.reshape(len(self.meshes_of(scene)), -1).T
 
     def errors_of(self, formulation: str, kind: str = "forces") -> FloatArray:
-        """Return the errors (n_cells,) of a kind; infinite where there is no solution, NaN where none is reported."""
+        """Return the errors (n_cells, n_variants); infinite where there is no solution, NaN where none is reported."""
         row = self.formulations.index(formulation)
-        values = self.errors[row, :, list(ERRORS).index(kind)]
+        values = self.errors[row, :, :, list(ERRORS).index(kind)]
         return np.where(self.outcomes[row] == Outcome.SOLVED, values, np.inf)
 
-    def cells_of(self, scene: str, stiffness: float | None = None) -> BoolArray:
-        """Return which cells (n_cells,) belong to a scene, if wanted at one penalty alone."""
-        selection: BoolArray = np.array(
-            [cell.scene == scene and stiffness in (None, cell.stiffness) for cell in self.cells], dtype=np.bool_
-        )
+    def counts_of(self, formulation: str, kind: str) -> IntArray:
+        """Return a count (n_cells, n_variants)."""
+        counts: IntArray = self.counts[self.formulations.index(formulation), :, :, list(COUNTS).index(kind)]
+        return counts
+
+    def failures(self, formulation: str, scene: str) -> BoolArray:
+        """Return which runs (n_cells of the scene, n_variants) gave no solution."""
+        failed = self.outcomes[self.formulations.index(formulation)] != Outcome.SOLVED
+        selection: BoolArray = failed[self.ladders(scene).reshape(-1)]
         return selection
 
-    def stiffnesses_of(self, scene: str) -> tuple[float, ...]:
-        """Return the penalties of a scene, soft ones first."""
-        return tuple(sorted({cell.stiffness for cell in self.cells if cell.scene == scene}))
-
-    def uses_differences(self, formulation: str) -> bool:
-        """Return whether some solution needed differences of forces instead of a tangent."""
-        row = self.formulations.index(formulation)
-        return bool(self.counts[row, :, list(COUNTS).index("differences")].any())
+    def uses_differences(self, formulation: str, scene: str) -> bool:
+        """Return whether some solution of a scene at the rule's penalty needed differences instead of a tangent."""
+        return bool(self.counts_of(formulation, "differences")[self.ladders(scene), VARIANTS.index(RULE)].any())

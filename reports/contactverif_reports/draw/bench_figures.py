@@ -1,212 +1,212 @@
-"""The figures of a bench: error against time, cost at an error of 1 %, performance profiles. Slow to import.
+"""The figures of a bench: errors against the numbers, what an error costs, runtimes. Slow to import.
 
-Failed runs are drawn at the upper edge, and formulations that never reach an error in a column of their own: nothing is
-left out. Formulations differ by colour, marker and line, the same in all figures of a bench.
+At most six formulations have a colour and a name, the reference among them; the others are grey. Solid lines have the
+penalty of the rule, dashed ones the best afterwards.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from math import ceil, inf
+from math import ceil, inf, isnan
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from contactverif_reports.bench.bench_text import COST_PICTURE, PROFILE_PICTURE, picture_of
-from contactverif_reports.bench.results import BenchResults, Outcome
-from contactverif_reports.bench.work_precision import (
-    REFERENCE,
-    SENTENCE_TARGET,
-    PairProfile,
-    cost_ratio,
-    pair_profiles,
-    pareto_front,
+from contactverif_reports.bench.bench_text import (
+    COST_PICTURE,
+    MOST_CURVES,
+    RUNTIME_PICTURE,
+    picture_of,
+    picture_of_each,
 )
-from contactverif_reports.draw.bench_multiples import hide_empty_panels, make_multiples_figure
+from contactverif_reports.bench.cost_tables import costs_at, format_share, ratios_at
+from contactverif_reports.bench.costs import REFERENCE, curve, rank, runtimes
+from contactverif_reports.bench.results import BEST, ERRORS, BenchResults
 from contactverif_reports.draw.case_figure import save
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8B4513")  # Okabe and Ito's, and brown.
-_MARKERS = "os^vDPX"
-_DASHES = ("-", "--", ":")
-_LEAST_ERROR = 1e-12  # Errors below are roundoff, and are drawn here.
-_MOST_IN_A_PANEL = 6  # More curves than these cannot be told apart.
-_EDGE = 0.07  # Failed runs are drawn above the largest error, by this share of the range of log errors, and a half.
-_COST_TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-_STYLE: dict[Any, Any] = {"font.size": 8.0, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 4.0}
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#8B4513")  # Okabe and Ito's, and brown.
+_MARKERS = "os^vDP"
+_AXES = {"evaluation": "one evaluation / ms", "factorisation": "one factorisation / ms"}
+_GREY: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 0}
+_STYLE: dict[Any, Any] = {"font.size": 8.5, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 3.5}
+_N_COLUMNS = 3
 
 
 def draw_bench(results: BenchResults, folder: Path) -> None:
-    """Draw all figures of a bench as SVG into a folder: one for each scene, the cost, and the profiles."""
+    """Draw all figures of a bench as SVG into a folder."""
     for scene in results.scenes:
-        save(make_work_precision_figure(results, scene), folder / picture_of(scene))
-    if results.scenes and len(results.formulations) > 1 and REFERENCE in results.formulations:
-        save(make_cost_figure(results), folder / COST_PICTURE)
-    profile = make_profile_figure(results)
-    if profile is not None:
-        save(profile, folder / PROFILE_PICTURE)
+        if len(results.meshes_of(scene)) > 1:
+            save(make_scene_figure(results, scene), folder / picture_of(scene))
+            if len(results.formulations) > MOST_CURVES:
+                save(make_each_figure(results, scene), folder / picture_of_each(scene))
+    save(make_cost_figure(results), folder / COST_PICTURE)
+    save(make_runtime_figure(results), folder / RUNTIME_PICTURE)
 
 
-def make_work_precision_figure(results: BenchResults, scene: str, kind: str = "forces") -> Figure:
-    """Return error against time of one scene with the Pareto front.
+def highlights(results: BenchResults) -> dict[str, dict[str, Any]]:
+    """Return {formulation: its pen}: the reference, and those that are the most exact on the first scene."""
+    order = rank(results, results.scenes[0])
+    order.sort(key=lambda name: name != REFERENCE)
+    return {
+        name: {"color": colour, "marker": marker}
+        for name, colour, marker in zip(order, _COLOURS, _MARKERS, strict=False)
+    }
 
-    There is a panel for each penalty; of many formulations there is a panel for each instead.
-    """
-    stiffnesses, n_names = results.stiffnesses_of(scene), len(results.formulations)
-    low, high = _error_range(results, scene, kind)
-    edge = 1.5 * high * (high / low) ** _EDGE
-    if n_names > _MOST_IN_A_PANEL:
-        penalties = {stiffness: results.penalty_name(scene, stiffness) for stiffness in stiffnesses}
-        return make_multiples_figure(results, scene, kind, (low / 2, edge, edge**2 / high), penalties)
+
+def _label_plainly(axis: Axis) -> None:
+    """Write the numbers of a logarithmic axis at 1, 2 and 5 of each power of ten where there is room, else at 1."""
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60 * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_locator(NullLocator())
+
+
+def _legend(figure: Figure, results: BenchResults, pens: dict[str, dict[str, Any]], *more: Line2D) -> None:
+    """Name the formulations that have a colour above the panels."""
+    handles = [Line2D([], [], label=name, markerfacecolor="none", **pen) for name, pen in pens.items()]
+    if len(pens) < len(results.formulations):
+        more = (*more, Line2D([], [], label="others", **_GREY))
+    figure.legend(handles=[*handles, *more], loc="outside upper center", ncols=3, frameon=False)
+
+
+def make_scene_figure(results: BenchResults, scene: str) -> Figure:
+    """Return the three errors of a scene, each against one evaluation and against one factorisation."""
+    pens = highlights(results)
     with matplotlib.rc_context(_STYLE):
-        n_columns = min(6, max(2, 2 * len(stiffnesses)))
-        legend = 0.19 * ceil(n_names / n_columns) + 0.2
-        figure = Figure(figsize=(1 + 2.7 * len(stiffnesses), 2.9 + legend), layout="constrained")
-        panels = figure.subplots(1, len(stiffnesses), squeeze=False, sharey=True)[0]
-        for axes, stiffness in zip(panels, stiffnesses, strict=True):
-            axes.set(xscale="log", yscale="log", ylim=(low / 2, edge**2 / high), xlabel="time of the solution / ms")
-            axes.set_title(results.penalty_name(scene, stiffness))
-            axes.axhline(edge, color="0.8", linewidth=0.6)
-            _draw_runs(axes, results, results.cells_of(scene, stiffness), kind, edge)
-            _label_times(axes)
-            axes.grid(color="0.92", linewidth=0.5)
-        panels[0].set_ylabel(f"error of the {kind}")
-        panels[0].annotate(
-            "no solution", (0.01, edge), xycoords=("axes fraction", "data"), va="bottom", fontsize=6.5, color="0.4"
-        )
-        handles = [Line2D([], [], label=name, **pen) for name, pen in _pens(results)]
-        handles.append(Line2D([], [], color="0.75", linewidth=4, label="Pareto front"))
-        figure.legend(handles=handles, loc="outside lower center", ncols=n_columns, frameon=False, fontsize=7.5)
+        figure = Figure(figsize=(4.6, 6.6), layout="constrained")
+        panels = figure.subplots(len(ERRORS), len(_AXES), sharex="col", sharey="row")
+        for row, kind in zip(panels, ERRORS, strict=True):
+            for axes, number in zip(row, _AXES, strict=True):
+                axes.set(xscale="log", yscale="log")
+                for name in sorted(results.formulations, key=lambda name: name in pens):
+                    _draw_curve(axes, results, scene, (name, kind, number), pens.get(name))
+                axes.grid(color="0.93", linewidth=0.5)
+            row[0].set_ylabel(f"error of the {kind}")
+        for axes, label in zip(panels[-1], _AXES.values(), strict=True):
+            axes.set_xlabel(label)
+        for axes in panels.reshape(-1):
+            _label_plainly(axes.xaxis)
+            _label_plainly(axes.yaxis)
+        _legend(figure, results, pens, Line2D([], [], color="0.4", linestyle="--", label="best penalty"))
+    return figure
+
+
+def _draw_curve(
+    axes: Axes, results: BenchResults, scene: str, series: tuple[str, str, str], pen: dict[str, Any] | None
+) -> None:
+    """Draw a formulation, error and number: with the penalty of the rule, and with a colour at the best one too."""
+    name, kind, number = series
+    x, errors = curve(results, name, scene, kind, number)
+    finite = np.isfinite(errors) & np.isfinite(x)
+    if pen is None:
+        axes.plot(1e3 * x[finite], errors[finite], **_GREY)
+        return
+    axes.plot(1e3 * x[finite], errors[finite], linewidth=1.1, markerfacecolor="none", **pen)
+    _, best = curve(results, name, scene, kind, number, BEST)
+    finite = np.isfinite(best) & np.isfinite(x)
+    axes.plot(1e3 * x[finite], best[finite], color=pen["color"], linewidth=0.8, linestyle="--")
+
+
+def make_each_figure(results: BenchResults, scene: str) -> Figure:
+    """Return the error of the forces against one evaluation, a panel for each formulation, the reference in each."""
+    with matplotlib.rc_context(_STYLE):
+        n_rows = ceil(len(results.formulations) / _N_COLUMNS)
+        figure = Figure(figsize=(5.0, 0.7 + 1.25 * n_rows), layout="constrained")
+        panels = figure.subplots(n_rows, _N_COLUMNS, squeeze=False, sharex=True, sharey=True).reshape(-1)
+        for axes, name in zip(panels, results.formulations, strict=False):
+            axes.set(xscale="log", yscale="log")
+            if REFERENCE in results.formulations:
+                _draw_curve(axes, results, scene, (REFERENCE, "forces", "evaluation"), None)
+            _draw_curve(axes, results, scene, (name, "forces", "evaluation"), {"color": "#C2410C", "marker": "o"})
+            axes.set_title(name, fontsize=8, pad=2)
+            axes.grid(color="0.93", linewidth=0.5)
+        for axis in (panels[0].xaxis, panels[0].yaxis):
+            _label_plainly(axis)
+        for axes in panels[len(results.formulations) :]:
+            axes.set_visible(False)
+        figure.supxlabel(f"one evaluation / ms; grey: {REFERENCE}, dashed: best penalty", fontsize=8)
+        figure.supylabel("error of the forces", fontsize=8)
     return figure
 
 
 def make_cost_figure(results: BenchResults) -> Figure:
-    """Return the time to an error of 1 % in the forces over that of the reference, by formulation and scene."""
-    names = [name for name in results.formulations if name != REFERENCE]
-    ratios = _cost_ratios(results, names)
-    low, high = _cost_range(ratios)
-    order = sorted(names, key=lambda name: _rank([row[name] for row in ratios.values()]), reverse=True)
-    with matplotlib.rc_context(_STYLE | {"font.size": 10.0, "lines.markersize": 6.5}):
-        figure = Figure(figsize=(5.4, 1.5 + 0.25 * len(order)), layout="constrained")
-        axes = figure.subplots()
-        width = (high / low) ** 0.03  # One place in the column of those that never get there.
-        places = [high * width ** (2 + place) for place in range(len(ratios))]
-        end = places[-1] * width**2
-        axes.axvspan(high * width**0.5, end, color="0.93")
-        axes.axvline(1.0, color="0.35", linewidth=0.9)
-        for (scene, row), never, marker, colour in zip(ratios.items(), places, _MARKERS, _COLOURS, strict=False):
-            values = np.array([row[name] for name in order])  # NaN, where the reference fails, is not drawn.
-            values = np.where(values == inf, never, values)
-            hollow: dict[str, Any] = {"markerfacecolor": "none", "linestyle": "none", "label": scene}
-            axes.plot(values, range(len(order)), marker=marker, color=colour, **hollow)
-        axes.set(xscale="log", xlim=(low, end), ylim=(-0.7, len(order) - 0.3))
-        ticks = [tick for tick in _COST_TICKS if low <= tick <= high]
-        axes.set_xticks([*ticks, (places[0] * places[-1]) ** 0.5], [*map("{:g}".format, ticks), "never"])
-        axes.minorticks_off()
-        axes.set_yticks(range(len(order)), order, parse_math=False)
-        axes.grid(color="0.92", linewidth=0.5)
-        axes.set_xlabel(f"time to an error of {SENTENCE_TARGET:.0%} in the forces, {REFERENCE} = 1")
-        figure.legend(loc="outside upper center", ncols=4, frameon=False, handletextpad=0.1, columnspacing=1.2)
-    return figure
-
-
-def make_profile_figure(results: BenchResults) -> Figure | None:
-    """Return the performance profile of each formulation beside the reference on random scenes; None without any."""
-    profiles = pair_profiles(results)
-    if not profiles:
-        return None
-    n_columns = min(3, len(profiles))
-    n_rows = ceil(len(profiles) / n_columns)
+    """Return what two errors on the first scene cost: ratios of evaluation and factorisation, and linear systems."""
+    scene = results.scenes[0]
+    targets = results.targets[scene][:2]
+    order = rank(results, scene)[::-1]
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(0.5 + 1.5 * n_columns, 0.7 + 1.25 * n_rows), layout="constrained")
-        panels = figure.subplots(n_rows, n_columns, squeeze=False, sharex=True, sharey=True)
-        furthest = _furthest(profiles)
-        for axes, profile in zip(panels.reshape(-1), profiles, strict=False):
-            for factors, style in ((profile.reference_factors, "k--"), (profile.factors, "C3-")):
-                axes.step(*_steps(factors, furthest), style, where="post", linewidth=1.2)
-            axes.set(xscale="log", xlim=(0.95, furthest), ylim=(-0.03, 1.05))
-            axes.set_title(profile.formulation, fontsize=7.5)
-            axes.grid(color="0.92", linewidth=0.5)
-        hide_empty_panels(panels.reshape(-1), len(profiles), n_columns)
-        figure.supxlabel("within this factor of the faster one", fontsize=8)
-        figure.supylabel("share of the random scenes", fontsize=8)
-        handles = [Line2D([], [], color="C3", label="formulation"), Line2D([], [], color="k", ls="--", label=REFERENCE)]
+        figure = Figure(figsize=(5.2, 1.3 + 0.22 * len(order)), layout="constrained")
+        panels = figure.subplots(1, 3, sharey=True)
+        for target, colour, marker in zip(targets, _COLOURS, _MARKERS, strict=False):
+            for axes, number in zip(panels[[0, 2]], _AXES, strict=True):
+                _draw_ratios(axes, results, (scene, target, number), order, {"color": colour, "marker": marker})
+            counts = [cost.middle("systems") for cost in map(costs_at(results, scene, target).get, order) if cost]
+            finite = [(count, place) for place, count in enumerate(counts) if count < inf]
+            panels[1].plot(*zip(*finite, strict=True), color=colour, marker=marker, linestyle="none", mfc="none")
+        panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        panels[1].set_xlim(left=0)
+        titles = (f"one evaluation,\n{REFERENCE} = 1", "linear systems", f"one factorisation,\n{REFERENCE} = 1")
+        for axes, title in zip(panels, titles, strict=True):
+            axes.set_title(title)
+            axes.grid(color="0.93", linewidth=0.5)
+        panels[0].set_yticks(range(len(order)), order, parse_math=False)
+        panels[0].set_ylim(-0.6, len(order) - 0.4)
+        handles = [
+            Line2D(
+                [], [], color=colour, marker=marker, mfc="none", linestyle="none", label=f"error of {format_share(t)}"
+            )
+            for t, colour, marker in zip(targets, _COLOURS, _MARKERS, strict=False)
+        ]
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 
-def _cost_ratios(results: BenchResults, names: list[str]) -> dict[str, dict[str, float]]:
-    """Return {scene: {formulation: time over that of the reference}}."""
-    return {scene: {name: cost_ratio(results, name, scene) for name in names} for scene in results.scenes}
-
-
-def _cost_range(ratios: dict[str, dict[str, float]]) -> tuple[float, float]:
-    """Return the range of the axis, which holds all finite ratios and 1."""
-    finite = [ratio for row in ratios.values() for ratio in row.values() if np.isfinite(ratio)] or [1.0]
-    return min(0.5, min(finite) / 1.3), max(2.0, max(finite) * 1.3)
-
-
-def _draw_runs(axes: Axes, results: BenchResults, cells: Any, kind: str, edge: float) -> None:
-    """Draw all runs of a panel, those without a solution at the edge, and the Pareto front behind them."""
-    times_of_all, errors_of_all = [], []
-    for row, (name, pen) in enumerate(_pens(results)):
-        times = 1e3 * results.fastest[row, cells, -1]
-        solved = results.outcomes[row, cells] == Outcome.SOLVED
-        errors = results.errors_of(name, kind)[cells]
-        clipped = np.clip(errors, _LEAST_ERROR, None)
-        axes.plot(times[solved], clipped[solved], linewidth=0.8, **pen)
-        cross = {**pen, "marker": "x", "linestyle": "none"}
-        crashed = 1e3 * np.nanmax(results.fastest[:, cells, -1], initial=1e-3)  # A plugin that crashed has no time.
-        axes.plot(np.where(np.isnan(times), crashed, times)[~solved], np.full((~solved).sum(), edge), **cross)
-        times_of_all.append(np.where(solved, times, inf))
-        errors_of_all.append(np.where(np.isnan(errors), inf, clipped))
-    times, errors = np.concatenate(times_of_all), np.concatenate(errors_of_all)
-    front = np.flatnonzero(pareto_front(times, errors))
-    front = front[np.argsort(times[front])]
-    axes.step(times[front], errors[front], where="post", color="0.82", linewidth=4, zorder=0)
-
-
-def _label_times(axes: Axes) -> None:
-    """Write times as plain numbers, at 1, 2 and 5 of each power of ten where there is room."""
+def _draw_ratios(
+    axes: Axes, results: BenchResults, place: tuple[str, float, str], order: list[str], pen: dict[str, Any]
+) -> None:
+    """Draw the ratios of a scene, target and number with their intervals."""
+    ratios = ratios_at(results, *place)
+    axes.set_xscale("log")
+    axes.axvline(1.0, color="0.35", linewidth=0.8)
+    for height, name in enumerate(order):
+        ratio = ratios.get(name)
+        if ratio is None or not np.isfinite(ratio.middle):
+            continue
+        low, high = (ratio.middle if isnan(end) else end for end in (ratio.low, ratio.high))
+        axes.plot([low, high], [height, height], color=pen["color"], linewidth=1.2)
+        axes.plot([ratio.middle], [height], markerfacecolor="none", **pen)
     low, high = axes.get_xlim()
-    steps = (1.0, 2.0, 5.0) if high < 30 * low else (1.0, 3.0) if high < 300 * low else (1.0,)
-    axes.xaxis.set_major_locator(LogLocator(subs=steps))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(min(low, 0.5), max(high, 2.0))
+    _label_plainly(axes.xaxis)
 
 
-def _pens(results: BenchResults) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the name of each formulation with its colour, marker and line."""
-    n = len(_COLOURS)
-    for place, name in enumerate(results.formulations):
-        look = {"color": _COLOURS[place % n], "marker": _MARKERS[(place + place // n) % n]}
-        yield name, {**look, "linestyle": _DASHES[place // n % len(_DASHES)], "markerfacecolor": "none"}
-
-
-def _error_range(results: BenchResults, scene: str, kind: str) -> tuple[float, float]:
-    errors = np.array([results.errors_of(name, kind)[results.cells_of(scene)] for name in results.formulations])
-    finite = errors[np.isfinite(errors)]
-    return (max(_LEAST_ERROR, float(finite.min())), float(finite.max())) if len(finite) else (1e-3, 1.0)
-
-
-def _rank(ratios: list[float]) -> tuple[int, float]:
-    """Return what formulations are sorted by: how often they never get there, then the mean of log ratio."""
-    there = [ratio for ratio in ratios if np.isfinite(ratio)]
-    return sum(ratio == inf for ratio in ratios), float(np.log(there).mean()) if there else inf
-
-
-def _furthest(profiles: tuple[PairProfile, ...]) -> float:
-    factors = np.concatenate([part for p in profiles for part in (p.factors, p.reference_factors)])
-    return max(3.0, 1.5 * float(factors[np.isfinite(factors)].max(initial=1.0)))
-
-
-def _steps(factors: Any, furthest: float) -> tuple[list[float], list[float]]:
-    """Return the places and heights of the steps of a profile."""
-    finite = np.sort(factors[np.isfinite(factors)])
-    heights = np.arange(1, len(finite) + 1) / len(factors)
-    return [0.9, *finite, furthest], [0.0, *heights, heights[-1] if len(heights) else 0.0]
+def make_runtime_figure(results: BenchResults) -> Figure:
+    """Return the share of targets and instances that are reached within all evaluations, or factorisations, so long."""
+    scenes = results.scenes
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(4.6, 1.3 + 1.5 * len(scenes)), layout="constrained")
+        panels = figure.subplots(len(scenes), 2, squeeze=False, sharey=True)
+        pens = highlights(results)
+        for row, scene in zip(panels, scenes, strict=True):
+            for axes, number in zip(row, _AXES, strict=True):
+                axes.set(xscale="log", ylim=(-0.03, 1.03))
+                for name in sorted(results.formulations, key=lambda name: name in pens):
+                    seconds = np.sort(1e3 * runtimes(results, name, scene, number))
+                    finite = seconds[np.isfinite(seconds)]
+                    pen = {"color": pens[name]["color"], "linewidth": 1.2} if name in pens else _GREY
+                    axes.step(finite, np.arange(1, len(finite) + 1) / len(seconds), where="post", **pen)
+                axes.grid(color="0.93", linewidth=0.5)
+                _label_plainly(axes.xaxis)
+            row[0].set_ylabel(scene)
+        for axes, label in zip(panels[-1], ("all evaluations / ms", "all factorisations / ms"), strict=True):
+            axes.set_xlabel(label)
+        figure.supylabel("share of errors and instances that are reached", fontsize=8.5)
+        _legend(figure, results, {name: {"color": pen["color"]} for name, pen in pens.items()})
+    return figure
