@@ -7,6 +7,7 @@ from contactverif_reports.bench.cost_tables import (
     cost_sentences,
     cost_table,
     format_share,
+    split_targets,
     starts_table,
     totals_table,
 )
@@ -78,10 +79,12 @@ def _scene(results: BenchResults, scene: str, with_pictures: bool) -> list[str]:
         parts.append(f"![Errors against one evaluation and one factorisation: {label}]({picture_of(scene)})")
         if len(results.formulations) > MOST_CURVES:
             parts.append(f"[Each formulation in a panel of its own]({picture_of_each(scene)})")
-    for target in results.targets[scene]:
+    reached, words = split_targets(results, scene)
+    for target in reached:
         sentences = cost_sentences(results, scene, target)
         parts += [f"### {format_share(target)} on {scene}", "\n".join(f"- {sentence}" for sentence in sentences)]
         parts.append(_markdown(cost_table(results, scene, target)))
+    parts.append(words)
     heads, rows = totals_table(results, scene, results.targets[scene][0])
     if rows:
         parts += [f"### Whole solutions on {scene}", TOTALS, _markdown((heads, rows))]

@@ -64,6 +64,19 @@ def cost_table(results: BenchResults, scene: str, target: float) -> Table:
     return heads, rows
 
 
+def split_targets(results: BenchResults, scene: str) -> tuple[list[float], str]:
+    """Return the errors that a formulation reaches, at the fixed penalty or the best, and a sentence of the rest."""
+    reached = [target for target in results.targets[scene] if _is_reached(results, scene, target)]
+    others = [format_share(target) for target in results.targets[scene] if target not in reached]
+    words = f"No formulation comes to an error of {' or '.join(others)} on the meshes of {scene}."
+    return reached, words if others else ""
+
+
+def _is_reached(results: BenchResults, scene: str, target: float) -> bool:
+    costs = costs_at(results, scene, target)
+    return any(cost.is_usual or best_of(results, name, scene, target).is_usual for name, cost in costs.items())
+
+
 def totals_table(results: BenchResults, scene: str, target: float) -> Table:
     """Return the ratios of whole solutions to the reference, for bodies that are cheap, even and dear."""
     costs = costs_at(results, scene, target)

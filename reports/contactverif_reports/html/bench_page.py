@@ -11,6 +11,7 @@ from contactverif_reports.bench.cost_tables import (
     cost_sentences,
     cost_table,
     format_share,
+    split_targets,
     starts_table,
     totals_table,
 )
@@ -46,13 +47,14 @@ def _scene(results: BenchResults, scene: str) -> dict[str, Any]:
         figures.append(svg_inline(make_scene_figure(results, scene), f"errors, {scene}"))
         if len(results.formulations) > MOST_CURVES:
             figures.append(svg_inline(make_each_figure(results, scene), f"each formulation, {scene}"))
+    reached, words = split_targets(results, scene)
     targets = [
         {
             "title": f"an error of {format_share(target)} in the forces",
             "sentences": cost_sentences(results, scene, target),
             "table": cost_table(results, scene, target),
         }
-        for target in results.targets[scene]
+        for target in reached
     ]
     totals = totals_table(results, scene, results.targets[scene][0])
     return {
@@ -60,6 +62,7 @@ def _scene(results: BenchResults, scene: str) -> dict[str, Any]:
         "label": results.label(scene),
         "figures": figures,
         "targets": targets,
+        "out_of_reach": words,
         "totals": totals if totals[1] else None,
         "starts": starts_table(results, scene),
     }
