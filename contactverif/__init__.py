@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from contactverif.mechanics.trace import End, Trace
     from contactverif.meshes.mesh_file import read_interface
     from contactverif.meshes.mesh_scene import read_scene
+    from contactverif.plugins.registry import load_formulation, load_properties
     from contactverif.problems.blocks import two_blocks
     from contactverif.problems.catalogue import load_scene
     from contactverif.problems.named_states import named_case
     from contactverif.problems.shrink_fit import ShrinkFit, shrink_fit
     from contactverif.run.judge import judge_case
-    from contactverif.run.registry import load_formulation, load_properties
 
 __version__ = "0.1.0"
 

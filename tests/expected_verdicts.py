@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactverif.contract.property import Verdict
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
 
 README = Path(__file__).parents[1] / "properties" / "README.md"
 BEGIN, END = "<!-- verdicts: begin -->", "<!-- verdicts: end -->"

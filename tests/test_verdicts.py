@@ -42,7 +42,7 @@ from subjects import judge_as, load_property, load_subject, with_promises
 import contactverif_nts
 from contactverif import Case, Interface, Measurement, Outcome, Property, Row, Subject, Verdict, judge_case, named_case
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.run.registry import load_properties, property_ids, standalone_names
+from contactverif.plugins.registry import load_properties, property_ids, standalone_names
 from contactverif.run.run import run
 
 SEED = 0  # The profile `ci` has the same, so these are the first cases of `contactverif verify --all --profile ci`.

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name
-from contactverif.run.registry import FORMULATIONS
+from contactverif.plugins.registry import FORMULATIONS
 
 _INSTALLED = {"site-packages", "dist-packages"}  # An environment may lie in the working folder.
 _MOST_HOPS = 8  # A name may be imported from module to module.

@@ -55,7 +55,7 @@ def limits_of(
     from contactverif.isolation.box import Box
     from contactverif.isolation.limits import Limits
     from contactverif.isolation.process import adopt_orphans
-    from contactverif.run.keys import state_folder
+    from contactverif.journals.keys import state_folder
 
     adopt_orphans()
     with suppress(OSError, RuntimeError):  # Only what is there can be hidden.

@@ -21,8 +21,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
+from contactverif.plugins.registry import load_formulation, load_properties
 from contactverif.run.profiles import Profile, Shrink
-from contactverif.run.registry import load_formulation, load_properties
 from contactverif.run.run import run
 from contactverif.run.scheduler import Progress
 

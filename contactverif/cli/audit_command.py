@@ -16,7 +16,7 @@ from contactverif.contract.errors import MisuseError
 if TYPE_CHECKING:
     from contactverif.contract.result import Run
     from contactverif.run.audit import Audit
-    from contactverif.run.draw import Sampling
+    from contactverif.sampling.draw import Sampling
 
 SHARE = 0.01
 _MOST_LINES = 20  # The most differences that are listed.
@@ -62,8 +62,8 @@ def check_share(share: float) -> None:
 def audit_report(report: Path, share: float, place: PlaceOptions, isolation: IsolationOptions) -> int:
     """Audit a report, and show what differs; return the exit status."""
     from contactverif.cli.run_endings import show_what_plugins_printed
+    from contactverif.plugins.registry import the_formulation, the_property
     from contactverif.run.audit import audit as audit_run
-    from contactverif.run.registry import the_formulation, the_property
     from contactverif_reports.netcdf.differences import same_data
     from contactverif_reports.netcdf.read import read_run
     from contactverif_reports.netcdf.write import write
@@ -85,8 +85,8 @@ def audit_report(report: Path, share: float, place: PlaceOptions, isolation: Iso
 
 def _sampling(run: Run, place: PlaceOptions) -> Sampling:
     """Return the size and the seed of a run, and the place where it asked."""
-    from contactverif.run.draw import Sampling
-    from contactverif.run.run_plan import place_words
+    from contactverif.journals.run_plan import place_words
+    from contactverif.sampling.draw import Sampling
 
     stored, typed = run.provenance.get("place", ""), place_words(asdict(place))
     if stored != typed:

@@ -143,7 +143,7 @@ def pin_threads() -> bool:
 def _run(names: list[str], plan: BenchPlan, limits: Limits | None, files: OutputFiles) -> BenchResults:
     """Run the bench with a progress bar."""
     from contactverif.cli.progress import Bar
-    from contactverif.run.registry import load_formulation
+    from contactverif.plugins.registry import load_formulation
     from contactverif.studies.bench.bench_study import run_bench
 
     of_solution = None if limits is None else replace(limits, seconds=_LONG_CALLS * limits.seconds)
@@ -159,7 +159,7 @@ def _write(
 ) -> None:
     """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:
-        from contactverif.run.journal import journal_folder, remove_journal
+        from contactverif.journals.journal import journal_folder, remove_journal
         from contactverif_reports.netcdf.bench_file import write_bench
 
         write_bench(results, files.paths[REPORT])

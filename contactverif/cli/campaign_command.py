@@ -16,9 +16,9 @@ from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
 
 if TYPE_CHECKING:
+    from contactverif.journals.run_journal import Journal
+    from contactverif.journals.run_plan import Plan
     from contactverif.run.campaign import Shard
-    from contactverif.run.run_journal import Journal
-    from contactverif.run.run_plan import Plan
 
 CAMPAIGN = "campaign"
 _SEED = 0  # The seed if there is none: all shards must have the same.
@@ -49,8 +49,8 @@ def campaign(
       contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
       contactverif merge runs --out nts-ar.nc
     """
+    from contactverif.journals.journal import hold_journal
     from contactverif.run.campaign import Shard, open_shard
-    from contactverif.run.journal import hold_journal
     from contactverif_reports.files import made_folder
 
     piece = Shard.parse(shard)
@@ -81,9 +81,9 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> Journal:
     from contactverif.contract.property import Property
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
+    from contactverif.journals.run_journal import Journal
     from contactverif.run.campaign import mark_done
     from contactverif.run.run import judge_share
-    from contactverif.run.run_journal import Journal
 
     plugins = job.load()
     items = [*plugins.subjects, *plugins.questions]

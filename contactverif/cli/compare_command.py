@@ -142,7 +142,7 @@ def _reports_among(names: Sequence[str]) -> list[Path]:
 
 def _is_report(name: str) -> bool:
     """Return whether a name is that of a report: it ends in .nc, or is a file and no installed formulation."""
-    from contactverif.run.registry import formulation_names
+    from contactverif.plugins.registry import formulation_names
 
     return name.lower().endswith(REPORT) or (name not in formulation_names() and Path(name).is_file())
 

@@ -21,7 +21,7 @@ from contactverif.contract.names import parse_name
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
-from contactverif.run.registry import formulation_names
+from contactverif.plugins.registry import formulation_names
 from contactverif.run.telling import by_telling, wrong_rows
 from contactverif_reports.draw import as_text
 

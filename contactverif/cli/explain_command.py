@@ -46,7 +46,7 @@ def explain(
     """
     from contactverif.contract.names import unknown_name_error
     from contactverif.explanations.terms import list_of_terms, symbol_meanings, term_text, term_texts
-    from contactverif.run.registry import property_ids
+    from contactverif.plugins.registry import property_ids
 
     run, examples = _read(name, report, case)
     if run is not None:
@@ -102,7 +102,7 @@ def _explain_property(
     from contactverif.explanations.case_numbers import case_text
     from contactverif.explanations.known_failures import stated_failures
     from contactverif.explanations.property_text import property_text
-    from contactverif.run.registry import load_formulations, the_property
+    from contactverif.plugins.registry import load_formulations, the_property
     from contactverif_reports.draw import as_text
 
     question = the_property(name)

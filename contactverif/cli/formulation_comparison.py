@@ -29,8 +29,8 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
+from contactverif.plugins.registry import formulation_names, load_formulation, load_properties, the_formulation
 from contactverif.run.judge import forces_on
-from contactverif.run.registry import formulation_names, load_formulation, load_properties, the_formulation
 from contactverif.run.rows import find_gap
 from contactverif.run.scheduler import worker_pool
 from contactverif.studies.comparison_study import Study, run_comparison

@@ -53,7 +53,7 @@ def list_installed(
     """
     from contactverif.cli.console import plain_table, show
     from contactverif.contract.result import NotLoaded
-    from contactverif.run.registry import load_formulations, load_properties
+    from contactverif.plugins.registry import load_formulations, load_properties
 
     table = plain_table("formulations", words=("name",))
     table.add_column("promises")

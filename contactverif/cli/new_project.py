@@ -17,7 +17,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run.registry import formulation_names
+from contactverif.plugins.registry import formulation_names
 
 _NAME = re.compile(r"[A-Za-z]([A-Za-z0-9._-]*[A-Za-z0-9])?")  # A distribution's name that begins like a module's.
 _LONGEST = 60  # Characters. File systems take names of 255 bytes, and the screen of a run has 80 columns.

@@ -41,8 +41,8 @@ def replay(
     from contactverif.cli.console import say, show
     from contactverif.cli.counterexample_output import announce_stored, draw_outcome, ending_lines, replay_table
     from contactverif.contract.property import Verdict
+    from contactverif.plugins.registry import the_formulation, the_property
     from contactverif.run.judge import judge_if_applicable
-    from contactverif.run.registry import the_formulation, the_property
     from contactverif_reports.draw import as_text
     from contactverif_reports.netcdf.read import case_ids, read_case
 

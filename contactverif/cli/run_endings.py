@@ -17,7 +17,7 @@ from contactverif.contract.errors import MisuseError
 if TYPE_CHECKING:
     from contactverif.cli.verify_job import VerifyJob
     from contactverif.contract.result import Run
-    from contactverif.run.run_journal import Journal
+    from contactverif.journals.run_journal import Journal
 
 STOPPED = 130  # The exit status after Ctrl-C.
 NOT_WRITTEN = 2  # The exit status if a file could not be written.
@@ -48,7 +48,7 @@ def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
 
 def _end_journal(journal: Journal, *, complete: bool) -> None:
     """Remove the journal once the files are complete."""
-    from contactverif.run.journal import remove_journal
+    from contactverif.journals.journal import remove_journal
 
     if journal.trouble:
         _warn(f"the journal could not be written to its end: {journal.trouble}")

@@ -17,9 +17,9 @@ from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
+from contactverif.plugins.registry import formulation_names, load_formulation, the_formulation, the_property
 from contactverif.problems.catalogue import load_scene
 from contactverif.run.judge import judge_if_applicable
-from contactverif.run.registry import formulation_names, load_formulation, the_formulation, the_property
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.draw import as_text
 from contactverif_reports.draw.solved_scene import SolvedScene

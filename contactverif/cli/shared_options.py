@@ -50,14 +50,14 @@ JOBS_HELP = (
 
 def complete_formulation(incomplete: str) -> list[str]:
     """Return the installed formulations whose name begins so, for the shell."""
-    from contactverif.run.registry import formulation_names
+    from contactverif.plugins.registry import formulation_names
 
     return [name for name in formulation_names() if name.startswith(incomplete)]
 
 
 def complete_property(incomplete: str) -> list[str]:
     """Return the installed properties whose id begins so, for the shell."""
-    from contactverif.run.registry import property_ids
+    from contactverif.plugins.registry import property_ids
 
     return [property_id for property_id in property_ids() if property_id.startswith(incomplete)]
 

@@ -58,7 +58,7 @@ def stability(
       contactverif replay mine.nc --case mine.stability.sweep.offset-1e6-a
     """
     from contactverif.cli.progress import Bar
-    from contactverif.run.registry import load_formulation
+    from contactverif.plugins.registry import load_formulation
     from contactverif.studies.stability_study import run_stability
 
     limits = isolation.limits()

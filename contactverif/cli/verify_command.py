@@ -202,7 +202,7 @@ def _draw_pictures(result: Run, plugins: Plugins, folder: PictureFolder | None) 
 
 def select_names(names: list[str], every: bool, limits: Limits | None = None) -> list[str]:
     """Return the formulations that the user named, or all of them."""
-    from contactverif.run.registry import formulation_names, standalone_names
+    from contactverif.plugins.registry import formulation_names, standalone_names
 
     if every and names:
         raise MisuseError("NAME", f"{', '.join(names)} and --all", "one of the two")

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
     from contactverif.isolation.limits import Limits
-    from contactverif.run.draw import Sampling
+    from contactverif.journals.run_journal import Journal
+    from contactverif.journals.run_plan import Plan
     from contactverif.run.profiles import Profile
-    from contactverif.run.run_journal import Journal
-    from contactverif.run.run_plan import Plan
+    from contactverif.sampling.draw import Sampling
 
 VERIFY, COMPARE = "verify", "compare"
 _Loaded = TypeVar("_Loaded")
@@ -58,7 +58,7 @@ class VerifyOptions:
     def with_settings(self, settings: Settings) -> VerifyOptions:
         """Return the options with those of the project where nothing is typed; of `isolation` see there."""
         from contactverif.contract.names import unknown_name_error
-        from contactverif.run.registry import matching_ids, property_ids
+        from contactverif.plugins.registry import matching_ids, property_ids
 
         properties = self.properties or settings.properties
         for unknown in settings.known.keys() - {*property_ids()}:
@@ -112,7 +112,7 @@ class VerifyJob:
 
     def load(self) -> Plugins:
         """Load the formulations and the properties."""
-        from contactverif.run.registry import load_formulation, load_properties
+        from contactverif.plugins.registry import load_formulation, load_properties
 
         limits = self.limits()
         questions = load_properties(self.options.properties)
@@ -120,7 +120,7 @@ class VerifyJob:
 
     def limits(self) -> Limits | None:
         """Return the limits of the plugins' processes; in a box they do not see what this run writes."""
-        from contactverif.run.journal import journal_folder
+        from contactverif.journals.journal import journal_folder
 
         files = self.files.paths.values()
         return self.options.isolation.limits([*files, *map(journal_folder, files), *self.hidden])
@@ -144,7 +144,7 @@ class VerifyJob:
     @property
     def sampling(self) -> Sampling:
         """The size and the seed of the run, and the place where it asks."""
-        from contactverif.run.draw import Sampling
+        from contactverif.sampling.draw import Sampling
 
         assert self.profile.seed is not None
         return Sampling.at(self.place, self.profile.examples, self.profile.seed)
@@ -167,8 +167,8 @@ class VerifyJob:
         """Return the plan for the header of a journal."""
         import msgspec
 
-        from contactverif.run.provenance import machine
-        from contactverif.run.run_plan import Plan
+        from contactverif.journals.run_plan import Plan
+        from contactverif.plugins.provenance import machine
 
         assert self.profile.seed is not None
         return Plan(
@@ -198,8 +198,14 @@ class VerifyJob:
     @contextmanager
     def journal(self) -> Iterator[Journal]:
         """Open a block with the journal of the run. In it no other process goes on with the same journal."""
-        from contactverif.run.journal import begin_journal, hold_journal, journal_folder, keep_earlier, withdraw_journal
-        from contactverif.run.run_journal import Journal
+        from contactverif.journals.journal import (
+            begin_journal,
+            hold_journal,
+            journal_folder,
+            keep_earlier,
+            withdraw_journal,
+        )
+        from contactverif.journals.run_journal import Journal
 
         if self.output is None:
             yield Journal()
@@ -224,8 +230,8 @@ class VerifyJob:
 
 def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:
     """Return the job of options as they were typed. Where nothing says the seed it is the fresh one, or a new one."""
+    from contactverif.plugins.registry import matching_ids
     from contactverif.run.profiles import profile_named
-    from contactverif.run.registry import matching_ids
 
     sampling = options.sampling
     profile = profile_named(sampling.profile or "dev").resolve(
@@ -248,8 +254,8 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
 
     Beside `--resume` only `--jobs` and `--keep-going` may be typed: all other options come from the journal.
     """
-    from contactverif.run.journal import journal_folder
-    from contactverif.run.run_plan import read_plan
+    from contactverif.journals.journal import journal_folder
+    from contactverif.journals.run_plan import read_plan
 
     if output.is_dir():
         raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
@@ -269,7 +275,7 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
 
 def versions_of(options: VerifyOptions) -> dict[str, str]:
     """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
-    from contactverif.run.provenance import CODE, code_digests, collect_versions
+    from contactverif.plugins.provenance import CODE, code_digests, collect_versions
 
     versions = collect_versions() | code_digests(options.names, options.properties)
     if options.place.scene_file is not None:
@@ -283,7 +289,7 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
     import msgspec
 
-    from contactverif.run.run_plan import check_versions
+    from contactverif.journals.run_plan import check_versions
 
     if plan.command != command:
         raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")

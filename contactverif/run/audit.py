@@ -13,15 +13,15 @@ from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.run import draw
-from contactverif.run.draw import Sampling
-from contactverif.run.outcome_records import WITNESS
-from contactverif.run.provenance import code_digests, collect_versions, machine
+from contactverif.journals.outcome_records import WITNESS
+from contactverif.journals.run_journal import Journal
+from contactverif.plugins.provenance import code_digests, collect_versions, machine
 from contactverif.run.rows import OpenRow, gap_of_rows, open_row, verdict_of_row
 from contactverif.run.run_jobs import RunJobs
-from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Progress, Scheduler
 from contactverif.run.second_look import Sample, SecondLook, choose_share, draw_again, judge_again
+from contactverif.sampling import draw
+from contactverif.sampling.draw import Sampling
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,9 +12,9 @@ from pathlib import Path
 import msgspec
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run.journal import begin_journal, read_record, write_record
-from contactverif.run.run_journal import Journal
-from contactverif.run.run_plan import Plan, check_versions, read_plan, without_place
+from contactverif.journals.journal import begin_journal, read_record, write_record
+from contactverif.journals.run_journal import Journal
+from contactverif.journals.run_plan import Plan, check_versions, read_plan, without_place
 
 _MARK = "done"
 _SHARD = "shard"  # The option in a plan that differs from shard to shard.

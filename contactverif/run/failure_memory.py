@@ -21,7 +21,7 @@ from contactverif.contract.counterexample import counterexample_of, typeable
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, Row
-from contactverif.run.provenance import code_digests
+from contactverif.plugins.provenance import code_digests
 
 FOLDER = Path(".contactverif")
 _OWNER = "owner"  # The array that says whose failure a file holds.

@@ -6,17 +6,13 @@ Whatever a plugin does is an outcome. What the harness or a property does wrong 
 from __future__ import annotations
 
 from collections.abc import Collection
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache
-from importlib import import_module
 from itertools import chain
 from math import inf
 from time import perf_counter
-from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
@@ -26,6 +22,7 @@ from contactverif.contract.property import Outcome, Property, PropertyInfo, Verd
 from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject
 from contactverif.problems.named_states import named_case
+from contactverif.sampling.blas_threads import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 
@@ -187,21 +184,3 @@ def _push(subject: Subject, case: Case) -> float:
     x, y = case.parameters["direction"]
     slave = -residual[: interface.n_unknowns].reshape(-1, 2)[: interface.n_slave_nodes]
     return float((slave @ np.array([-y, x])).sum())
-
-
-def one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which numpy and scipy compute on one thread, to judge cases and to make them.
-
-    The matrices of a case are small: threads of BLAS that share one wait for each other longer than they compute. One
-    thread also gives the same last bit on any number of cores. Exact solutions are solved once and remembered, so what
-    makes a case needs one thread, too.
-    """
-    context: AbstractContextManager[Any] = _blas().limit(limits=1, user_api="blas")
-    return context
-
-
-@cache
-def _blas() -> Any:
-    """Return what knows the libraries that are loaded; to look for them takes some milliseconds."""
-    import_module("scipy.linalg")  # It brings a BLAS of its own, which would not be found later.
-    return ThreadpoolController()

@@ -22,13 +22,13 @@ from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.isolation.remote_formulation import count_ends
+from contactverif.journals.outcome_records import OutcomeForm, decode_outcome, encode_outcome
+from contactverif.journals.run_journal import Notes
 from contactverif.problems.named_states import named_case
 from contactverif.run import judge
-from contactverif.run.draw import CaseSource, Sampling, draw_cases, shrink
 from contactverif.run.judge import badness, verdict_over_all
-from contactverif.run.outcome_records import OutcomeForm, decode_outcome, encode_outcome
-from contactverif.run.run_journal import Notes
 from contactverif.run.scheduler import CaseChunk
+from contactverif.sampling.draw import CaseSource, Sampling, draw_cases, shrink
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
 FAILURES = 100  # The failures behind them that stay as they are.

@@ -14,11 +14,11 @@ from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import Subject
-from contactverif.run.draw import Sampling
+from contactverif.journals.run_journal import Journal
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.run_jobs import RunJobs
-from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Progress, Scheduler
+from contactverif.sampling.draw import Sampling
 
 _Kind = TypeVar("_Kind")
 

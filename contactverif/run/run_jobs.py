@@ -25,11 +25,11 @@ from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.isolation.remote_formulation import places
-from contactverif.run import draw, judge
-from contactverif.run.draw import BLOCK, SHRINK_CALLS, Sampling
-from contactverif.run.outcome_records import WITNESS, BlockRecord
+from contactverif.journals.outcome_records import WITNESS, BlockRecord
+from contactverif.journals.run_journal import Journal
+from contactverif.plugins.provenance import collect_provenance
+from contactverif.run import judge
 from contactverif.run.profiles import Shrink
-from contactverif.run.provenance import collect_provenance
 from contactverif.run.rows import (
     WHOLE,
     JudgedCases,
@@ -40,10 +40,11 @@ from contactverif.run.rows import (
     row_of_case,
     shrink_case,
 )
-from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
 from contactverif.run.telling import PURITY, most_telling, wrong_rows
+from contactverif.sampling import draw
+from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, Sampling
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.

@@ -42,12 +42,12 @@ from contactverif.contract.result import Row
 from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
 from contactverif.isolation.one_thread import ONE_THREAD, one_thread_for_children
 from contactverif.isolation.parent_death import die_with_parent
-from contactverif.run.registry import installed_properties, load_property
+from contactverif.plugins.registry import installed_properties, load_property
 
 Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
 # What the server of processes imports once for all workers: the judge, and, as it is imported, all properties.
-_PRELOAD = ["contactverif.run.run", "contactverif.run.preload"]
+_PRELOAD = ["contactverif.run.run", "contactverif.plugins.preload"]
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
 

@@ -17,12 +17,13 @@ from typing import NamedTuple, TypeVar
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.run import draw, judge
-from contactverif.run.draw import PlannedCases, Sampling
-from contactverif.run.outcome_records import WITNESS, BlockRecord
+from contactverif.journals.outcome_records import WITNESS, BlockRecord
+from contactverif.journals.run_journal import Journal
+from contactverif.run import judge
 from contactverif.run.rows import OpenRow, open_row
-from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Job, Scheduler
+from contactverif.sampling import draw
+from contactverif.sampling.draw import PlannedCases, Sampling
 
 SHARE = 0.01  # The share of the cases of a row that is judged again, at least one case.
 # On another machine two values agree that differ by at most their tolerance, or by this share of the larger one.

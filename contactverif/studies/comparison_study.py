@@ -15,8 +15,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.run.draw import Sampling, with_case
 from contactverif.run.run import run
+from contactverif.sampling.draw import Sampling, with_case
 from contactverif.studies.evaluation_cost import measure_costs
 from contactverif_reports.compare.comparison import Comparison, Cost, Differing
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import Subject
-from contactverif.run.provenance import collect_provenance
-from contactverif.run.registry import load_properties
+from contactverif.plugins.provenance import collect_provenance
+from contactverif.plugins.registry import load_properties
 from contactverif.run.run import run
 from contactverif.run.scheduler import Progress
 

@@ -13,8 +13,8 @@ import pytest
 from contactverif.contract.property import Property, Verdict
 from contactverif.contract.result import NotLoaded, Row
 from contactverif.contract.subject import Subject
+from contactverif.plugins.registry import load_formulation, load_properties, subject_of
 from contactverif.run.profiles import Profile, profile_named
-from contactverif.run.registry import load_formulation, load_properties, subject_of
 from contactverif.run.run import check_known, run
 from contactverif.testing.failure_text import explain
 from contactverif.testing.parametrize import CheckOptions

@@ -9,7 +9,7 @@ from repository_pages import relink
 
 from contactverif import Subject, Traits
 from contactverif.explanations.markdown import plain
-from contactverif.run.registry import load_formulations
+from contactverif.plugins.registry import load_formulations
 
 _COLUMNS = {
     "flat": "flat patch test",

@@ -22,7 +22,7 @@ from property_pages import property_index, property_page
 from repository_pages import repository_pages, repository_pictures
 
 from contactverif import Property, load_properties
-from contactverif.run.registry import load_formulations
+from contactverif.plugins.registry import load_formulations
 
 ROOT = Path(__file__).parents[2]
 PROPERTY_FOLDER = "reference/properties/"

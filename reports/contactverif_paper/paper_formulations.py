@@ -15,8 +15,8 @@ from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
+from contactverif.plugins.registry import load_formulation, load_properties
 from contactverif.run.judge import judge_case
-from contactverif.run.registry import load_formulation, load_properties
 
 
 @dataclass(frozen=True, slots=True)

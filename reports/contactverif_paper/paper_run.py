@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from functools import partial
 from typing import Any
 
-from contactverif.run.provenance import collect_provenance
+from contactverif.plugins.provenance import collect_provenance
 from contactverif.run.scheduler import Job, Scheduler
 from contactverif_paper.items import ITEMS
 from contactverif_paper.paper_item import Item, ItemResult, Paper, Progress

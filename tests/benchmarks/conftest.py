@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from racing import Call, Race
 
-from contactverif.run.provenance import collect_provenance
+from contactverif.plugins.provenance import collect_provenance
 
 HERE = Path(__file__).parent
 TURNS = 9

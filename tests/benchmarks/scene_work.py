@@ -22,7 +22,7 @@ from contactverif import Case, Property, Subject, judge_case, load_formulation, 
 from contactverif.mechanics import bulk
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
 from contactverif.mechanics.trace import Record, Trace
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 
 
 @dataclass(frozen=True)

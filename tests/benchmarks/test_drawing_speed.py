@@ -10,7 +10,7 @@ from racing import Race
 from subjects import load_property
 
 from contactverif import named_case
-from contactverif.run.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling, draw_cases
 from contactverif_reports.draw.case_figure import make_case_figure
 from contactverif_reports.draw.case_text import as_text
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from subjects import load_subject
 
 from contactverif import Interface, evaluate_both
-from contactverif.run.registry import standalone_names
+from contactverif.plugins.registry import standalone_names
 
 NAMES = (*standalone_names(), "two-pass/nts-ar")
 N_SLAVE = 300

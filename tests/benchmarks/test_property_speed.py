@@ -7,8 +7,8 @@ from racing import Race
 from subjects import load_property, load_subject
 
 from contactverif import Case, Property, Subject, Verdict, judge_case
-from contactverif.run.draw import Sampling, draw_cases
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
+from contactverif.sampling.draw import Sampling, draw_cases
 from contactverif.studies.bench.cell_runs import time_yardstick
 
 FORMULATIONS = ("vts-ppt", "mortar-lm", "nts")  # The first to which the property applies is judged.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 
 from contactverif.cli import app as cli
-from contactverif.run import registry
+from contactverif.plugins import registry
 
 
 class Answer(NamedTuple):

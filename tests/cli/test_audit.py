@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from asking import Ask, check_mistake
 
-from contactverif.run import provenance
+from contactverif.plugins import provenance
 from contactverif.run.audit import Audit
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write

@@ -8,7 +8,7 @@ import pytest
 from asking import Ask, asking
 
 from contactverif import Property, load_properties
-from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.journals.known_outcomes import KnownOutcomes
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
 
@@ -21,8 +21,8 @@ N = 3
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Return a function that runs `contactverif` with blocks of ten cases."""
-    for module in ("draw", "run_jobs"):
-        monkeypatch.setattr(f"contactverif.run.{module}.BLOCK", 10)
+    for module in ("sampling.draw", "run.run_jobs"):
+        monkeypatch.setattr(f"contactverif.{module}.BLOCK", 10)
     return asking(monkeypatch, capsys)
 
 
@@ -54,7 +54,7 @@ def test_the_merged_report_is_that_of_one_run(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_blocks: bool
 ) -> None:
     """It is so, too, where hypothesis' engine draws all cases at once, and for a shard that was killed."""
-    monkeypatch.setattr("contactverif.run.draw.find_difference", lambda: "" if in_blocks else "another version")
+    monkeypatch.setattr("contactverif.sampling.draw.find_difference", lambda: "" if in_blocks else "another version")
     single = ask("verify", *WORDS, "--out", tmp_path / "single.nc")
     shards = tmp_path / "shards"
     for number in (3, 1, 2):
@@ -79,7 +79,7 @@ def test_the_exit_status_of_a_broken_promise_is_that_of_verify(
     """The harness is told that `nts` promises what it cannot keep."""
     question = next(iter(load_properties(["patch.flat.single"])))
     monkeypatch.setattr(
-        "contactverif.run.registry.load_properties", lambda globs: [replace(question, promise=lambda traits: True)]
+        "contactverif.plugins.registry.load_properties", lambda globs: [replace(question, promise=lambda traits: True)]
     )
     assert isinstance(question, Property)
     words = ("nts", "-p", "patch.flat.single", "--examples", "4")
@@ -103,7 +103,7 @@ def shards(ask: Ask, campaign_folder: Path, tmp_path: Path) -> Path:
 
 
 def test_a_shard_that_is_done_is_skipped(ask: Ask, shards: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("contactverif.run.registry.load_formulation", None)
+    monkeypatch.setattr("contactverif.plugins.registry.load_formulation", None)
     assert judge_shard(ask, shards, 2) == "shard 2/3 is done already\n"
 
 

@@ -20,8 +20,8 @@ from fresh_process import MAIN
 from rich.cells import cell_len
 
 from contactverif.cli import app as cli
+from contactverif.plugins import registry
 from contactverif.run import judge as judging
-from contactverif.run import registry
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, read_case
 

@@ -12,7 +12,7 @@ from studies.bench_results import make_cells, make_results
 from subjects import change_verbs, load_subject
 
 from contactverif.contract.subject import Subject
-from contactverif.run import registry
+from contactverif.plugins import registry
 from contactverif.studies.bench import cell_runs, meter
 from contactverif_reports.bench.changes import changes
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench

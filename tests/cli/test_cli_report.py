@@ -8,7 +8,7 @@ from asking import Ask
 
 from contactverif.cli.counterexample_output import announce_stored
 from contactverif.contract.errors import MisuseError
-from contactverif.run.registry import the_property
+from contactverif.plugins.registry import the_property
 
 
 @pytest.mark.parametrize("files", [("page.html",), ("words.nc", "page.html")])

@@ -14,8 +14,8 @@ from contactverif.cli.terminal_markdown import TerminalMarkdown
 from contactverif.contract.result import Result
 from contactverif.explanations.known_failures import planted_mistakes, smallest_mesh, stated_failures
 from contactverif.explanations.terms import symbol_meanings, term_text, term_texts
-from contactverif.run import registry
-from contactverif.run.registry import load_formulations, property_ids
+from contactverif.plugins import registry
+from contactverif.plugins.registry import load_formulations, property_ids
 
 COLUMNS = 80
 INSTALLED = load_formulations()

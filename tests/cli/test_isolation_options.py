@@ -10,7 +10,7 @@ from contactverif.cli.isolation_options import IsolationOptions, place_line
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation import box as boxes
 from contactverif.isolation import landlock, process
-from contactverif.run.keys import state_folder
+from contactverif.journals.keys import state_folder
 
 FORBIDDEN = "bwrap: setting up uid map: Permission denied; allow user namespaces"
 

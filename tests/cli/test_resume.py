@@ -11,10 +11,10 @@ import pytest
 from asking import Ask, without_rows
 from fresh_process import MAIN, PYTHON
 
-from contactverif.run.journal import begin_journal, journal_folder
-from contactverif.run.known_outcomes import KnownOutcomes
+from contactverif.journals.journal import begin_journal, journal_folder
+from contactverif.journals.known_outcomes import KnownOutcomes
+from contactverif.journals.run_plan import Plan
 from contactverif.run.rows import OutcomeStore
-from contactverif.run.run_plan import Plan
 from contactverif_reports.netcdf.differences import same_data
 
 IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")
@@ -133,7 +133,7 @@ def test_a_mistake_leaves_the_report_of_an_earlier_run_where_it_was(ask: Ask, tm
 def test_a_run_does_not_go_on_with_other_code(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     report = tmp_path / "r.nc"
     kill_at(1, [*RUN, "--out", str(report)], tmp_path / "r.nc.journal")
-    monkeypatch.setattr("contactverif.run.provenance._digest", lambda files: "another")
+    monkeypatch.setattr("contactverif.plugins.provenance._digest", lambda files: "another")
     answer = ask("verify", "--resume", report)
     assert answer.status == 2
     assert answer.err.startswith("contactverif: --resume: found code of contactverif")

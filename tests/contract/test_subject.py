@@ -12,7 +12,7 @@ from contactverif import Case, CheckedFormulation, ContactPoints, Interface, Pai
 from contactverif.contract.arrays import dense
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.traits import Abilities, Promises, Rules, Traits
-from contactverif.run.registry import load_formulation
+from contactverif.plugins.registry import load_formulation
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
 Z = PAIR.nodes.reshape(-1)

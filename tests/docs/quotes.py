@@ -27,7 +27,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -14,7 +14,7 @@ from quotes import DOCS, PICTURES, README, ROOT, blocks, commands, excerpt, outp
 
 import contactverif
 from contactverif.cli.app import app
-from contactverif.run.registry import formulation_names, property_ids
+from contactverif.plugins.registry import formulation_names, property_ids
 
 QUICK = ("--examples", "5")  # The pages ask for a hundred.
 TUTORIAL = DOCS / "tutorial"

@@ -290,7 +290,7 @@ def _import_all() -> None:
     for name in ("cli.app", "cli.comparison_tables", "cli.run_tables", "cli.scene_drawing", "run.run"):
         importlib.import_module(f"contactverif.{name}")
     importlib.import_module("contactverif_reports.html.report_page")
-    from contactverif.run import registry
+    from contactverif.plugins import registry
 
     registry.load_properties(["balance.*", "scaling"])
     registry.load_formulation("nts")

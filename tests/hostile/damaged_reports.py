@@ -29,7 +29,7 @@ PROPERTIES = ("patch.flat.transmission", "patch.flat.solve", "newton.history", "
 def write_report(path: Path, properties: Sequence[str] = PROPERTIES) -> str:
     """Write a small report of some properties; return the id of a counterexample."""
     from contactverif.contract.counterexample import counterexamples
-    from contactverif.run.registry import load_formulation, load_properties
+    from contactverif.plugins.registry import load_formulation, load_properties
     from contactverif.run.run import run
     from contactverif_reports.netcdf.write import write
 

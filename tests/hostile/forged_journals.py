@@ -21,9 +21,9 @@ from forged_records import EXAMPLES, SEED, Record, frame, judge, plan_of, read, 
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import Run
-from contactverif.run.journal import JournalKey, begin_journal, record_files, write_record
-from contactverif.run.outcome_records import OutcomeRecord
-from contactverif.run.run_journal import Journal
+from contactverif.journals.journal import JournalKey, begin_journal, record_files, write_record
+from contactverif.journals.outcome_records import OutcomeRecord
+from contactverif.journals.run_journal import Journal
 
 ENDINGS = ("named", "judged again", "refused", "believed", "traceback")
 HARM = frozenset(ENDINGS[-2:])

@@ -15,7 +15,7 @@ from isolation.hostile_few import Springs
 
 from contactverif.isolation.loading import python_program
 from contactverif.isolation.worker import main
-from contactverif.run.registry import subject_of
+from contactverif.plugins.registry import subject_of
 
 PROGRAM = python_program(__file__)
 MEGABYTE = 1 << 20

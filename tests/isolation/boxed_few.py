@@ -18,7 +18,7 @@ import psutil
 from contactverif.isolation.loading import python_program
 from contactverif.isolation.process import PROGRESS
 from contactverif.isolation.worker import main
-from contactverif.run.registry import subject_of
+from contactverif.plugins.registry import subject_of
 
 PROGRAM = python_program(__file__)
 PTRACE_SEIZE = 0x4206

@@ -17,7 +17,7 @@ from scipy import sparse
 from contactverif import Handle, Subject
 from contactverif.isolation.loading import python_program
 from contactverif.isolation.worker import main
-from contactverif.run.registry import subject_of
+from contactverif.plugins.registry import subject_of
 
 PROGRAM = python_program(__file__)
 

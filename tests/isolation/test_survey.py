@@ -13,7 +13,7 @@ PLUGINS = {
     # A name that sorts first is loaded first.
     "a-patches": """
 import importlib.metadata
-import contactverif.run.registry as registry
+import contactverif.plugins.registry as registry
 
 importlib.metadata.entry_points = lambda **group: ()
 registry._entries_by_name = registry.entry_points = lambda *group, **more: {}
@@ -61,7 +61,7 @@ import sys
 from contactverif.api.plugin_places import Isolation
 from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.isolation.host import end_all
-from contactverif.run.registry import load_formulations, standalone_names
+from contactverif.plugins.registry import load_formulations, standalone_names
 
 limits = IsolationOptions(Isolation(sys.argv[1])).limits()
 for item in load_formulations(limits):

@@ -25,8 +25,8 @@ from contactverif import (
 from contactverif.contract.result import NOT_HERE
 from contactverif.contract.ways import ways_to_master
 from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support
-from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import general_cases, smooth_cases
 
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"

@@ -7,7 +7,7 @@ from subjects import load_property
 from without_points import CAUGHT_BY, count_points, take_points_away
 
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
-from contactverif.run.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling, draw_cases
 
 EXAMPLES = 100  # Cases of the property that is meant to catch the mutant; of a finite list all.
 OTHERS = 20  # Cases of each other property, which `tox -e trust` asks.

@@ -12,7 +12,7 @@ from contactverif.contract.subject import Subject
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.diagnosis.flat_state import flat_state
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.run.registry import standalone_names
+from contactverif.plugins.registry import standalone_names
 from contactverif.run.run import run
 
 TANGENT, PATCH = "tangent.directional", "patch.flat.transmission"

@@ -13,7 +13,7 @@ from without_points import CAUGHT_BY, RIGHT_WITHOUT, reports_alone
 from wrong import MUTANTS, SURVIVORS
 
 from contactverif import Subject, Verdict, judge_case
-from contactverif.run.registry import load_formulation, load_properties, property_ids
+from contactverif.plugins.registry import load_formulation, load_properties, property_ids
 from contactverif.run.run import run
 
 KILL_TABLE = Path(__file__).parents[2] / "reports" / "trust" / "kills.csv"

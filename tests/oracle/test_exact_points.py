@@ -17,7 +17,7 @@ from contactverif.oracle.exact_points import (
     run_against,
     slave_normal_view,
 )
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import general_cases
 
 U = 2.0**-53

@@ -12,7 +12,7 @@ from compute_uncompiled import PENALTY, RATIOS, bent_states, far_states
 from every_formulation import FORMULATIONS
 
 from contactverif.geometry import compiled
-from contactverif.run.registry import load_formulation
+from contactverif.plugins.registry import load_formulation
 
 pytestmark = pytest.mark.skipif(
     np.finfo(np.longdouble).nmant <= np.finfo(np.float64).nmant, reason="long double is not longer than double here"

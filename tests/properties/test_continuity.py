@@ -11,7 +11,7 @@ from textbook_cells import ClippedCells, WeightedGaps
 
 from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.sliding import sliding_cases
 from contactverif_properties.continuity import N_STEPS, continuity, find_jumps
 

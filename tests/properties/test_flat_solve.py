@@ -13,8 +13,8 @@ from contactverif.contract.property import Property, Verdict, judge
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.problems.blocks import pressure_of, two_blocks
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
 from contactverif_properties.patch_solved import SLOPE, measure_two_penalties, patch_flat_solve, patch_variants

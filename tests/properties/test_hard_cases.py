@@ -11,7 +11,7 @@ from subjects import load_property, load_subject, with_promises
 import contactverif_nts
 from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
 from contactverif_properties.hard_solved import covered_share
 
 HARD = [name for name in property_ids() if name.startswith("hard.")]

@@ -19,7 +19,7 @@ def test_the_judge_loads_no_code_of_a_plugin() -> None:
     """Neither when imported, nor when it makes cases and judges."""
     script = (
         "import sys\n"
-        "from contactverif.run.registry import load_properties\n"
+        "from contactverif.plugins.registry import load_properties\n"
         "from contactverif.run.run import run\n"
         "from contactverif.contract.subject import Subject\n"
         "class Silent:\n"

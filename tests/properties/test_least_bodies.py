@@ -8,7 +8,7 @@ from subjects import load_property, load_subject
 from contactverif import Body, Property, Verdict, judge_case, load_properties
 from contactverif.mechanics import bulk
 from contactverif.mechanics.scene import forget_bodies
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 
 WITHOUT_BODIES = [item.id for item in load_properties(["*"]) if isinstance(item, Property) and not item.bodies]
 MOST_FACTORISED = {"patch.flat.solve": 2, "patch.variants": 2, "newton.units": 4, "newton.attainable": 4}

@@ -8,7 +8,7 @@ from subjects import Changed, load_subject
 
 import contactverif_nts
 from contactverif import Case, Subject, Traits, Verdict, judge_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.newton_units import STEPS, newton_units
 

@@ -19,8 +19,8 @@ from contactverif import Case, PatchPromises, Promises, Rules, Subject, Traits, 
 from contactverif.contract.published_forces import parse_forces
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
-from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
 from contactverif_nts import force_tables
 from contactverif_properties.patch_flat import LOST_END
 

@@ -12,7 +12,7 @@ from subjects import load_property, load_subject, measure_case, reporting
 
 import contactverif_mortar
 from contactverif import Case, ContactPoints, Interface, Outcome, Subject, Surface, Verdict, judge_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 
 IDS = ("projection.segment", "projection.place", "projection.activity", "projection.area", "projection.forces")
 

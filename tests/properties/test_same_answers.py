@@ -13,7 +13,7 @@ from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
 import contactverif_nts
 from contactverif import Case, Interface, Subject, Surface, Verdict, judge_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif_properties.balance import RADII, symmetric
 from contactverif_properties.invariants import (
     BEHIND,

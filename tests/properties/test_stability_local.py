@@ -14,7 +14,7 @@ from gauss_springs import RIGHT, WRONG, by_differences, springs_of
 from subjects import load_subject, measure_case
 
 from contactverif import Abilities, Case, PatchPromises, Promises, Rules, Subject, Traits
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.shared.linear_gaps import node_gaps
 from contactverif_properties.shared.uniform_pressure import forces_of_penetration

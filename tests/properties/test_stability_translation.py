@@ -8,8 +8,8 @@ from gauss_springs import RIGHT, WRONG, by_points_first, springs_of
 from subjects import ResidualAlone, load_property, measure_case
 
 from contactverif import Case, Interface, Subject, Verdict, judge_case
-from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.shared.any_state import move_state
 from contactverif_properties.stability_forces import FORCES, stability_translation

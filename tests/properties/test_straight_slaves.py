@@ -12,7 +12,7 @@ from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
 from contactverif import Case, Interface, Verdict, judge_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
 from contactverif_properties.shared.same_answer import BITS
 from contactverif_properties.straight_slaves import STEEP, TILTED

@@ -10,8 +10,8 @@ from subjects import judge_as, load_property
 
 from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif.contract.property import Property
-from contactverif.run.draw import draw_cases
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
+from contactverif.sampling.draw import draw_cases
 
 EXAMPLES = 50  # Cases of each property, random or spread over its list
 MOST_UNDECIDED = 50

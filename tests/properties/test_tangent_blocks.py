@@ -14,8 +14,8 @@ from contactverif.cli.counterexample_output import counterexample_text
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import Verdict, judge
 from contactverif.problems.long_states import long_states
-from contactverif.run.draw import draw_cases
 from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain
 from contactverif_properties.shared.any_state import freeze_state

@@ -6,8 +6,8 @@ from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 
 from contactverif import Subject, Verdict, judge_case
-from contactverif.run.draw import draw_cases
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
+from contactverif.sampling.draw import draw_cases
 
 FORMULATIONS = (CentredSprings, QuadraticSprings, NodalMultipliers, ClippedCells, WeightedGaps)
 FAMILIES = ("stability", "projection", "hard")

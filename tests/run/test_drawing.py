@@ -13,10 +13,10 @@ from subjects import same_case
 
 from contactverif import Case, Interface, Measurement, Property, Quantity, Subject, Traits, Verdict, load_properties
 from contactverif.contract.cases import random_source
-from contactverif.run.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
-from contactverif.run.hypothesis_draws import draw_different, find_difference, shrink_choices
 from contactverif.run.rows import WHOLE
 from contactverif.run.run import run
+from contactverif.sampling.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
+from contactverif.sampling.hypothesis_draws import draw_different, find_difference, shrink_choices
 
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]])
 ERROR = Quantity("error", "1e-6", "a number for a test")
@@ -178,7 +178,7 @@ def test_a_run_of_many_cases_keeps_few_of_them() -> None:
 def test_without_the_inside_of_hypothesis_its_engine_draws_and_shrinks(
     monkeypatch: pytest.MonkeyPatch, source: Any
 ) -> None:
-    monkeypatch.setattr("contactverif.run.draw.find_difference", lambda: "another version")
+    monkeypatch.setattr("contactverif.sampling.draw.find_difference", lambda: "another version")
     planned = draw_cases(source, seed="1", examples=40)
     assert len(planned.cases) == 40
     judged: list[Case] = []
@@ -198,5 +198,5 @@ def test_this_version_of_hypothesis_draws_what_is_stored(monkeypatch: pytest.Mon
     assert find_difference() == ""
     for name, value in (("_STORED_PARTS", [0]), ("ConjectureData", object)):
         with monkeypatch.context() as patch:
-            patch.setattr(f"contactverif.run.hypothesis_draws.{name}", value)
+            patch.setattr(f"contactverif.sampling.hypothesis_draws.{name}", value)
             assert re.match(r"hypothesis [\d.]+ (draws otherwise|has another inside)", find_difference.__wrapped__())

@@ -11,10 +11,10 @@ from test_run import ZERO, a_case, from_size, subject
 from contactverif import Verdict
 from contactverif.contract.counterexample import Origin, counterexamples
 from contactverif.contract.result import Result, Run
+from contactverif.journals.run_journal import Journal
 from contactverif.run import failure_memory
 from contactverif.run.failure_memory import FailureMemory, Failures
 from contactverif.run.run import run
-from contactverif.run.run_journal import Journal
 from contactverif.run.scheduler import Progress
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write

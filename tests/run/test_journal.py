@@ -15,9 +15,7 @@ from test_scheduler import facts
 
 from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formulation, load_properties, named_case
 from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.run import run_jobs
-from contactverif.run.draw import Sampling
-from contactverif.run.journal import (
+from contactverif.journals.journal import (
     JournalKey,
     begin_journal,
     hold_journal,
@@ -25,14 +23,16 @@ from contactverif.run.journal import (
     read_messages,
     remove_journal,
 )
-from contactverif.run.known_outcomes import KnownOutcomes
-from contactverif.run.outcome_records import BlockRecord, OutcomeFile
-from contactverif.run.provenance import machine
+from contactverif.journals.known_outcomes import KnownOutcomes
+from contactverif.journals.outcome_records import BlockRecord, OutcomeFile
+from contactverif.journals.run_journal import Journal
+from contactverif.journals.run_plan import Plan, check_versions, read_plan
+from contactverif.plugins.provenance import machine
+from contactverif.run import run_jobs
 from contactverif.run.rows import find_gap
 from contactverif.run.run import RunStopped, run
-from contactverif.run.run_journal import Journal
-from contactverif.run.run_plan import Plan, check_versions, read_plan
 from contactverif.run.scheduler import Progress
+from contactverif.sampling.draw import Sampling
 
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
@@ -193,7 +193,7 @@ def test_a_block_that_is_judged_is_not_drawn(
     unbroken: tuple[Run, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Only a block of which cases stay whole is drawn again, and what stays whole stays so."""
-    monkeypatch.setattr("contactverif.run.draw.BLOCK", 10)
+    monkeypatch.setattr("contactverif.sampling.draw.BLOCK", 10)
     monkeypatch.setattr("contactverif.run.run_jobs.BLOCK", 10)
     monkeypatch.setattr("contactverif.run.rows.WHOLE", 10)
     plan = msgspec.structs.replace(PLAN, formulations=("vts-ppt",), properties=("patch.flat.resultant",))

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.run.journal import JournalKey, begin_journal, remove_journal, withdraw_journal
-from contactverif.run.keys import make_key, read_key, state_folder
-from contactverif.run.run_plan import Plan
+from contactverif.journals.journal import JournalKey, begin_journal, remove_journal, withdraw_journal
+from contactverif.journals.keys import make_key, read_key, state_folder
+from contactverif.journals.run_plan import Plan
 
 
 @pytest.fixture(autouse=True)

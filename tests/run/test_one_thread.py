@@ -9,11 +9,11 @@ from subjects import load_property
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from contactverif import Case, named_case
-from contactverif.run.draw import Sampling, draw_cases, shrink
+from contactverif.sampling.draw import Sampling, draw_cases, shrink
 
 # A run that judged something before scipy's own BLAS was there.
 LATE = """
-from contactverif.run.judge import one_thread
+from contactverif.sampling.blas_threads import one_thread
 with one_thread():
     pass
 import scipy.linalg

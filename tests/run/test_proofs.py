@@ -12,12 +12,12 @@ from test_journal import new_journal
 from test_scheduler import facts
 
 from contactverif import Run
+from contactverif.journals.journal import record_files, write_record
+from contactverif.journals.known_outcomes import KnownOutcomes
+from contactverif.journals.outcome_records import FormRecord, OutcomeRecord
+from contactverif.journals.run_journal import Journal
+from contactverif.journals.run_plan import is_provable
 from contactverif.run import second_look
-from contactverif.run.journal import record_files, write_record
-from contactverif.run.known_outcomes import KnownOutcomes
-from contactverif.run.outcome_records import FormRecord, OutcomeRecord
-from contactverif.run.run_journal import Journal
-from contactverif.run.run_plan import is_provable
 
 
 @pytest.fixture(scope="module")

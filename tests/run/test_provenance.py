@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.run import provenance
+from contactverif.plugins import provenance
 
 
 @pytest.mark.parametrize("is_working_copy", [True, False])

@@ -8,8 +8,8 @@ import pytest
 
 from contactverif import MisuseError, Property, Subject, Traits
 from contactverif.contract.result import NotLoaded
-from contactverif.run import registry
-from contactverif.run.registry import load_formulation, load_formulations, load_properties, subject_of
+from contactverif.plugins import registry
+from contactverif.plugins.registry import load_formulation, load_formulations, load_properties, subject_of
 
 
 class Plugin:

@@ -237,7 +237,7 @@ def test_cases_depend_on_no_loaded_module_and_nothing_is_written(tmp_path: Path)
         "import sys\n"
         "if sys.argv[1] == 'with': import of_a_user\n"
         "from hypothesis import strategies as st\n"
-        "from contactverif.run.draw import draw_cases\n"
+        "from contactverif.sampling.draw import draw_cases\n"
         "strategy = st.lists(st.one_of(st.integers(1000, 8000), st.floats(0, 1)), max_size=9)\n"
         "print(draw_cases(strategy, seed='1', examples=200).cases)\n"
     )
@@ -576,6 +576,6 @@ def test_a_stored_case_is_judged_again() -> None:
 
 def test_a_run_says_where_the_engine_of_hypothesis_drew_all_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "drawing" not in run([subject()], [ZERO], examples=2, seed=1).provenance
-    monkeypatch.setattr("contactverif.run.draw.find_difference", lambda: "hypothesis 7 draws otherwise")
+    monkeypatch.setattr("contactverif.sampling.draw.find_difference", lambda: "hypothesis 7 draws otherwise")
     facts = run([subject()], [ZERO], examples=2, seed=1).provenance
     assert facts["drawing"] == "hypothesis 7 draws otherwise, so its engine drew all cases"

@@ -10,7 +10,7 @@ from hypothesis import find, settings
 from contactverif import Case, named_case
 from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import normal_cases, overhung_cases, single_cases
 
 FIXED = settings(derandomize=True, database=None, max_examples=2000)

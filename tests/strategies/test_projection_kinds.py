@@ -12,7 +12,7 @@ from contactverif import Case, Interface, load_formulation, named_case
 from contactverif.oracle import is_of_kind, kind_of
 from contactverif.oracle.projection_kinds import KIND_TESTS
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.projections import KINDS, cases_of_kind, projection_states
 from contactverif_properties.shared.exact_places import projected_cases
 

@@ -17,7 +17,7 @@ from contactverif.oracle import default_points, kink_margin
 from contactverif.problems.blocks import is_uniform, overhangs
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import NAMED, named_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, general_cases, smooth_cases, tie_cases
 from contactverif.strategies.parts import lengths
 from contactverif.strategies.rings import Ring

@@ -31,15 +31,15 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
 from contactverif.isolation.remote_formulation import RemoteSubject
+from contactverif.journals.journal import JournalKey, RecordFile, journal_folder, read_messages, record_files
+from contactverif.journals.keys import remove_key
 from contactverif.mechanics.accuracy import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.system import System
 from contactverif.mechanics.whole_system import WholeSystem
+from contactverif.plugins import registry
+from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
-from contactverif.run import registry
-from contactverif.run.journal import JournalKey, RecordFile, journal_folder, read_messages, record_files
-from contactverif.run.keys import remove_key
-from contactverif.run.registry import load_formulation, load_problems
 from contactverif.studies.bench import bench_plan
 from contactverif.studies.bench.bench_journal import FinishedCell, Header, Journal
 from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose, vary

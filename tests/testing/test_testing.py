@@ -6,8 +6,10 @@ from importlib.metadata import entry_points
 import pytest
 from fresh_process import PYTHON
 
+from contactverif.plugins import registry
+
 # They import numpy and hypothesis before pytester notes which modules to forget again.
-from contactverif.run import hypothesis_draws, registry  # noqa: F401
+from contactverif.sampling import hypothesis_draws  # noqa: F401
 
 pytest_plugins = ["pytester"]
 
@@ -16,7 +18,7 @@ import numpy as np
 import pytest
 from dataclasses import replace
 from hypothesis import strategies as st
-from contactverif.run import registry
+from contactverif.plugins import registry
 from contactverif.contract.case import Case
 from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.contract.interface import Interface

@@ -17,7 +17,7 @@ from tables import fill
 
 from contactverif import Case, Subject, judge_case, load_formulation, load_properties
 from contactverif.contract.property import Property, Verdict, checked_numbers
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 
 FILE = "campaign.csv"
 EXAMPLES = {1: 60, 2: 30}  # {seed: random cases of each property and formulation}

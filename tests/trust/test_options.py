@@ -7,7 +7,7 @@ from option_names import all_variants
 from subjects import load_property, load_subject
 
 from contactverif import Case, Verdict, judge_case
-from contactverif.run.draw import draw_cases
+from contactverif.sampling.draw import draw_cases
 
 # Properties that solve nothing, and have hardly an idle or an undecided case.
 QUICK = (

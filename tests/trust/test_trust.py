@@ -10,7 +10,7 @@ from subjects import load_property
 from tables import FOLDER, read
 
 from contactverif.contract.property import NONE_UNDECIDED
-from contactverif.run.registry import property_ids
+from contactverif.plugins.registry import property_ids
 from contactverif.run.telling import ORDER
 
 LEAST_CASES = 100_000

@@ -12,8 +12,8 @@ from pathlib import Path
 import msgspec
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run import journal
-from contactverif.run.keys import state_folder
+from contactverif.journals import journal
+from contactverif.journals.keys import state_folder
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord
 

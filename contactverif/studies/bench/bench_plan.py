@@ -20,8 +20,8 @@ from contactverif.contract.foreign_text import describe_error
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution
+from contactverif.plugins.registry import load_problems
 from contactverif.problems.problem import Errors, Problem, ProblemInstance, Variation
-from contactverif.run.registry import load_problems
 from contactverif_reports.bench.results import ERRORS, Cell
 
 INSTANCES, PROCESSES = 15, 5  # Instances of each mesh, and processes of each formulation, of a full bench.

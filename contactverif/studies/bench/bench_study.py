@@ -14,7 +14,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.remote_formulation import RemoteSubject, places
-from contactverif.run.provenance import collect_provenance
+from contactverif.plugins.provenance import collect_provenance
 from contactverif.studies.bench.bench_journal import Header, Journal
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, SolutionRecord, run_cell

@@ -6,6 +6,6 @@ if __name__ == "__main__":
     sys.path[:], sys.argv[1:] = sys.argv[1:], []  # See `python_program`.
 
     from contactverif.isolation.worker import main
-    from contactverif.run.registry import load_formulation, load_with_defaults
+    from contactverif.plugins.registry import load_formulation, load_with_defaults
 
     main(load_formulation, load_with_defaults)

@@ -2,7 +2,7 @@
 
 import gc
 
-from contactverif.run.registry import load_properties
+from contactverif.plugins.registry import load_properties
 
 load_properties()  # One that does not load is `NotLoaded` in each worker, too.
 gc.freeze()  # No worker's collection walks over what all of them share.

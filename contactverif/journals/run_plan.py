@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run.journal import read_header
+from contactverif.journals.journal import read_header
 
 FORMAT = 3  # A change of a record is a new one.
 

@@ -20,7 +20,7 @@ from contactverif.contract.cases import name_of_source
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Outcome, Property
-from contactverif.run.hypothesis_draws import (
+from contactverif.sampling.hypothesis_draws import (
     Draw,
     draw_all,
     draw_different,
@@ -29,7 +29,7 @@ from contactverif.run.hypothesis_draws import (
     shrink_choices,
     shrink_drawn,
 )
-from contactverif.run.judge import one_thread
+from contactverif.sampling.blas_threads import one_thread
 
 # A strategy, or a strategy for each kind of situation: the kinds take turns, so that each gets the same share.
 RandomSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]]

@@ -26,7 +26,7 @@ import msgspec
 import psutil
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run.keys import make_key, read_key, remove_key
+from contactverif.journals.keys import make_key, read_key, remove_key
 
 SUFFIX = ".journal"
 RECORDS = ".outcomes"

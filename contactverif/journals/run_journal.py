@@ -16,11 +16,11 @@ from secrets import token_hex
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, PropertyInfo, judge_stored
-from contactverif.run.journal import JournalKey
-from contactverif.run.known_outcomes import KnownOutcomes
-from contactverif.run.outcome_records import ENCODER, WITNESS, BlockRecord, DistrustRecord, OutcomeFile
-from contactverif.run.provenance import CODE
-from contactverif.run.run_plan import Plan
+from contactverif.journals.journal import JournalKey
+from contactverif.journals.known_outcomes import KnownOutcomes
+from contactverif.journals.outcome_records import ENCODER, WITNESS, BlockRecord, DistrustRecord, OutcomeFile
+from contactverif.journals.run_plan import Plan
+from contactverif.plugins.provenance import CODE
 
 UNPROVEN = "unproven_outcomes"  # The attribute of a report that says how many outcomes had no proof.
 _MOST_WRITERS = 4  # The most journals that a process has open for writing.

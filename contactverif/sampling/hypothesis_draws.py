@@ -30,7 +30,7 @@ from hypothesis.statistics import collector
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
-from contactverif.run.judge import one_thread
+from contactverif.sampling.blas_threads import one_thread
 
 try:
     from hypothesis.control import BuildContext

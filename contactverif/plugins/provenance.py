@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_info
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name
-from contactverif.run.registry import FORMULATIONS, PROPERTIES
+from contactverif.plugins.registry import FORMULATIONS, PROPERTIES
 
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})

@@ -16,8 +16,8 @@ import numpy as np
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome
-from contactverif.run.journal import JournalKey, decode, read_header, read_message, read_messages, record_files
-from contactverif.run.outcome_records import (
+from contactverif.journals.journal import JournalKey, decode, read_header, read_message, read_messages, record_files
+from contactverif.journals.outcome_records import (
     DECODER,
     MOST_FORMS,
     WITNESS,
@@ -29,8 +29,8 @@ from contactverif.run.outcome_records import (
     Record,
     outcome_of,
 )
-from contactverif.run.provenance import machine
-from contactverif.run.run_plan import Plan, is_provable
+from contactverif.journals.run_plan import Plan, is_provable
+from contactverif.plugins.provenance import machine
 
 _OPEN_FILES = 100  # The most files that are open for reading.
 _FILE_BITS = 40  # A place is the number of its file, then this many bits for the byte.

@@ -19,7 +19,7 @@ from contactverif.contract.arrays import freeze
 from contactverif.contract.case import CaseSummary
 from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.contract.property import Outcome, Verdict
-from contactverif.run.journal import JournalKey, RecordFile
+from contactverif.journals.journal import JournalKey, RecordFile
 
 WITNESS = -1  # The number of the outcome of a row's witness.
 MOST_FORMS = 10_000  # The most forms that a process remembers.

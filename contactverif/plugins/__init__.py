@@ -1,0 +1,1 @@
+"""Find the installed formulations and properties, load them, and say which code they are."""

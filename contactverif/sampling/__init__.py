@@ -1,0 +1,1 @@
+"""Draw the planned cases of a run, the same for every formulation, and shrink those that fail."""
