@@ -8,7 +8,6 @@ that a plugin made, but for `str(error)`, which may raise.
 from __future__ import annotations
 
 import re
-from os.path import basename, dirname
 from traceback import walk_tb
 from types import TracebackType
 
@@ -81,8 +80,9 @@ def place_of_error(error: BaseException) -> str:
     """
     trace: TracebackType | None = BaseException.__dict__["__traceback__"].__get__(error)
     frames = [] if trace is None else [(frame.f_code.co_filename, line) for frame, line in walk_tb(trace.tb_next)]
-    places = [(file, line) for file, line in frames if dirname(file) == dirname(frames[0][0]) and file[:1] != "<"]
-    return f" ({name_line(basename(places[-1][0]))}, line {places[-1][1]})" if places else ""
+    places = [(file.replace("\\", "/").rpartition("/"), line) for file, line in frames if file[:1] != "<"]
+    names = [f"{name_line(name)}, line {line}" for (folder, _, name), line in places if folder == places[0][0][0]]
+    return f" ({names[-1]})" if names else ""
 
 
 def clean(instance: object, *, names: tuple[str, ...] = (), lines: tuple[str, ...] = ()) -> None:
