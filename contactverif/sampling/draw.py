@@ -20,6 +20,7 @@ from contactverif.contract.cases import name_of_source
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Outcome, Property
+from contactverif.sampling.blas_threads import one_thread
 from contactverif.sampling.hypothesis_draws import (
     Draw,
     draw_all,
@@ -29,7 +30,6 @@ from contactverif.sampling.hypothesis_draws import (
     shrink_choices,
     shrink_drawn,
 )
-from contactverif.sampling.blas_threads import one_thread
 
 # A strategy, or a strategy for each kind of situation: the kinds take turns, so that each gets the same share.
 RandomSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]]

@@ -9,14 +9,14 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from typing import Any
 
 import numpy as np
 import pytest
+from same_facts import facts
 
-from contactverif import Case, Interface, Outcome, Row, Run, Subject, load_formulation, load_properties, named_case
+from contactverif import Interface, Subject, load_formulation, load_properties, named_case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.traits import Traits
 from contactverif.isolation import host
@@ -45,26 +45,6 @@ class Ends:
 
     def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
         os._exit(0)
-
-
-def facts(result: Run) -> list[bytes]:
-    """Return all rows as bytes, without the seconds and without the meshes of those cases that all have."""
-
-    def timeless(outcome: Outcome | None, *, whole: bool = True) -> Any:
-        if outcome is None:
-            return None
-        case = outcome.case_or_summary if whole else outcome.summary
-        arrays = {name: array.tolist() for name, array in case.to_arrays().items()} if isinstance(case, Case) else case
-        return replace(outcome, seconds=0.0, case_or_summary=outcome.summary), arrays
-
-    def line(row: Row) -> bytes:
-        outcomes = [timeless(outcome) for outcome in row.outcomes]
-        return repr(
-            (row.formulation, row.property_id, row.verdict, row.reason, row.planned, row.promise)
-            + (outcomes, timeless(row.witness), timeless(row.shrunk))
-        ).encode()
-
-    return [line(row) for row in result.rows]
 
 
 def test_one_process_and_two_give_the_same_results_bit_by_bit(pool: Executor) -> None:

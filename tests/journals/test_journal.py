@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from forged_records import BOX
-from test_scheduler import facts
+from same_facts import facts
 
 from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formulation, load_properties, named_case
 from contactverif.contract.measurement import Finding, Measurement, Quantity

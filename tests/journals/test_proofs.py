@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 from forged_records import BOX, EXAMPLES, IDS, Record, forge, judge, plan_of, read, say_pass, scale_numbers
+from same_facts import facts
 from test_journal import new_journal
-from test_scheduler import facts
 
 from contactverif import Run
 from contactverif.journals.journal import record_files, write_record
