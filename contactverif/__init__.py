@@ -67,12 +67,12 @@ _HOMES = {
     "mechanics.simple_bodies": ("Placing", "Rectangle", "block", "rigid_surface"),
     "meshes.mesh_file": ("read_interface",),
     "meshes.mesh_scene": ("read_scene",),
-    "run.judge": ("judge_case",),
-    "run.registry": ("load_formulation", "load_properties"),
+    "plugins.registry": ("load_formulation", "load_properties"),
     "problems.blocks": ("two_blocks",),
     "problems.catalogue": ("load_scene",),
     "problems.named_states": ("named_case",),
     "problems.shrink_fit": ("ShrinkFit", "shrink_fit"),
+    "run.judge": ("judge_case",),
 }
 _MODULE_OF = {name: f"contactverif.{module}" for module, names in _HOMES.items() for name in names}
 
