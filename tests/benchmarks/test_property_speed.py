@@ -46,4 +46,8 @@ def test_one_case(race: Race, benchmark: Any, property_id: str) -> None:
     question = load_property(property_id)
     case, subject = case_of(question), subject_for(question)
     assert judge_case(question, case, subject).verdict in (Verdict.PASS, Verdict.FAIL)
-    race(lambda: judge_case(question, case, subject), work_as_newton_does, "the yardstick: small steps of numpy, and a linear system")
+    race(
+        lambda: judge_case(question, case, subject),
+        work_as_newton_does,
+        "the yardstick: small steps of numpy, and a linear system",
+    )
