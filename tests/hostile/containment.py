@@ -49,6 +49,7 @@ ALONE = ("memory", "leaves", "says")  # Plugins of these kinds run alone.
 MEGABYTES = 4000  # The address space of a whole run, plugins included.
 MOST_OUTPUT = 100_000  # Bytes that the command may print.
 PURE_IN_A_BOX = ("inputs-by-process",)  # There the number of its process is always the same.
+EXPECTED = {"report.nc", ".contactverif"}  # The report, and what failed for the next run.
 CHECKS = ("goes on", "others unchanged", "report complete", "exit status right", "nothing left", "output clean")
 HEADS = ("mode/plugin", "seconds", "status", *CHECKS, "result", "remarks")
 CONTROL = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]|\xc2[\x80-\x9f]")
@@ -89,7 +90,7 @@ def run_command(folder: Path, *arguments: str, seconds: float = SECONDS) -> Fini
     facts: dict[str, Any] = json.loads(facts_file.read_text())
     left = [f"process {line}" for line in facts["left"]]
     left += [f"file {path.name}" for path in sorted(temporary.iterdir())]
-    left += [f"file {path.name}" for path in sorted(here.iterdir()) if path.name != "report.nc"]
+    left += [f"file {path.name}" for path in sorted(here.iterdir()) if path.name not in EXPECTED]
     blocks = set(Path("/dev/shm").glob("hostile-*")) - shared
     left += [f"shared memory {path.name}" for path in sorted(blocks)]
     for path in blocks:
