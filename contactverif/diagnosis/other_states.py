@@ -29,7 +29,6 @@ def diagnose_turned(subject: Subject) -> str:
     """Return by how many quarters the flat state must be turned until its forces do not turn with it."""
     state = flat_state()
     interface, positions = state.case.interface, state.case.positions
-    formulation = subject.for_interface(interface, state.case.penalty)
     expected = None
     for degrees, x, y in ((0, 1, 0), (90, 0, 1), (180, -1, 0), (270, 0, -1)):
         turn = np.array([[x, y], [-y, x]], dtype=np.float64)  # So it takes rows to rows, without any rounding.
@@ -112,7 +111,10 @@ def diagnose_law(subject: Subject) -> str:
             f"the force grows like the penetration to the power {1 + powers[0]:.3g}, and should be proportional to it"
         )
     changed = int(np.argmax(np.abs(shares - shares[0]) > SAME * abs(shares[0])))
-    before, after, factor = depths[changed - 1], depths[changed], shares[changed] / shares[0]
+    before, after = depths[changed - 1], depths[changed]
+    if not shares[0]:
+        return f"there is no force up to a penetration of {before:.2g}, and from {after:.2g} on there is one"
+    factor = shares[changed] / shares[0]
     return (
         f"the force is proportional to the penetration up to {before:.2g}, and from {after:.2g} on it has {factor:.3g} "
         "times this size, on segments of length 1: look for a limit of depths"

@@ -105,10 +105,9 @@ def _shifted_points(state: FlatState, pushes: FloatArray) -> str:
     """Return by which share of its length the force of each piece acts beside the middle, if it is the same for all."""
     shifts = np.zeros(len(pushes))  # The change of the forces if the share is 1.
     interface, along = state.case.interface, state.along
-    lengths = state.lengths
     sides = (interface.slave.segments[state.slave_segment], interface.master.segments[state.master_segment])
     for segments in sides:
-        change = PENALTY * DEPTH * lengths**2 / (along[segments[:, 1]] - along[segments[:, 0]])
+        change = PENALTY * DEPTH * state.lengths**2 / (along[segments[:, 1]] - along[segments[:, 0]])
         np.add.at(shifts, segments, np.stack([-change, change], axis=1))
     share = float(shifts @ (pushes - state.exact) / (shifts @ shifts))
     if not same(pushes, state.exact + share * shifts):

@@ -154,7 +154,7 @@ def _of_differences(pair: Tangents) -> str:
     # Half a step times the second derivative, and what follows it is smaller by the step over the size of a segment.
     step = 2 * float((pair.errors * pair.curvatures).sum() / (pair.curvatures**2).sum())
     rest = np.abs(pair.errors - step / 2 * pair.curvatures).max()
-    if rest > _DIFFERENCES * np.abs(pair.errors).max():
+    if not rest <= _DIFFERENCES * np.abs(pair.errors).max():  # It is NaN where forces are linear.
         return ""
     return f"the tangent is of one-sided differences with a step of about {abs(step):.1g}, on segments of length 1"
 

@@ -25,8 +25,9 @@ from contactverif.plugins.provenance import code_digests
 
 FOLDER = Path(".contactverif")
 _OWNER = "owner"  # The array that says whose failure a file holds.
-_LARGEST = 1 << 24  # Bytes of a file. A case that a person may draw has a thousandth of it.
-FAILED = Verdict.FAIL, Verdict.CRASHED
+_LARGEST = 1 << 24  # Bytes of all arrays. A case that a person may draw has a thousandth of it.
+_FAILED = Verdict.FAIL, Verdict.CRASHED
+_SETTLED = Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED  # Nothing fails any more, or nothing is asked.
 Failures = Mapping[tuple[str, str], Case]  # {(formulation, property id): case}
 
 
@@ -56,9 +57,9 @@ class FailureMemory:
 
     def _update(self, row: Row) -> None:
         path = self._path(row.formulation, row.property_id)
-        if row.result is Result.FAILS_AS_STATED or row.verdict is Verdict.PASS:
+        if row.result is Result.FAILS_AS_STATED or row.verdict in _SETTLED:
             path.unlink(missing_ok=True)
-        elif row.verdict in FAILED and not is_remembered(row) and (example := counterexample_of(row)) is not None:
+        elif row.verdict in _FAILED and not is_remembered(row) and (example := counterexample_of(row)) is not None:
             self._write(path, example.case, _owner(row.formulation, row.property_id))
 
     def _path(self, formulation: str, property_id: str) -> Path:
@@ -68,9 +69,9 @@ class FailureMemory:
         """Return the case of a file; None without one, or if it holds something else."""
         path = self._path(formulation, property_id)
         try:
-            if path.stat().st_size > _LARGEST:
-                return None
             with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+                if sum(member.file_size for member in file.zip.infolist()) > _LARGEST:
+                    return None
                 arrays = dict(file)
             return Case.from_arrays(arrays) if str(arrays[_OWNER]) == _owner(formulation, property_id) else None
         except (OSError, ValueError, LookupError, TypeError, EOFError, zipfile.BadZipFile, MisuseError):

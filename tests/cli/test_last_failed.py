@@ -47,11 +47,11 @@ def test_what_fails_is_kept_and_asked_first_until_it_passes(
     again = ask("verify", "mine", *OPTIONS, "--last-failed")
     assert again.status == 1
     assert f"mine, {ID}: BROKEN PROMISE, a case that failed in an earlier run\n" in again.out
-    assert again.out.endswith("1 of 1 cases that failed in earlier runs fail again.\n")
+    assert again.out.endswith("1 of 1 failures of earlier runs are left.\n")
     FACTOR["now"] = 1.0
     mended = ask("verify", "mine", *OPTIONS, "--last-failed")
     assert (mended.status, list(folder.iterdir())) == (0, [])
-    assert mended.out.endswith("0 of 1 cases that failed in earlier runs fail again.\n")
+    assert mended.out.endswith("0 of 1 failures of earlier runs are left.\n")
     needed = "a run of `verify` here in which something fails"
     message = f"--last-failed: found no failure of 'mine' in .contactverif; needed {needed}"
     check_mistake(ask("verify", "mine", *OPTIONS, "--last-failed"), message)
@@ -62,3 +62,15 @@ def test_nothing_is_kept_without_a_memory(ask: Ask, folder: Path) -> None:
     (folder.parents[1] / "pyproject.toml").write_text("[tool.contactverif]\nmemory = false\n", encoding="utf-8")
     assert ask("verify", "mine", *OPTIONS).status == 1
     assert not folder.exists()
+
+
+def test_what_cannot_be_judged_is_left(ask: Ask, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert ask("verify", "mine", *OPTIONS, "--seed", "1").status == 1
+    check_mistake(
+        ask("verify", "mine", *OPTIONS, "--last-failed", "--out", "mine.nc"), "--last-failed: found --out, .*"
+    )
+    install_formulations(monkeypatch, mine="no_such_module:make")
+    answer = ask("verify", "mine", *OPTIONS, "--last-failed")
+    assert (answer.status, len(list(folder.iterdir()))) == (1, 1)
+    assert "mine: not loaded: ModuleNotFoundError" in answer.out
+    assert answer.out.endswith("1 of 1 failures of earlier runs are left.\n")

@@ -1,5 +1,8 @@
 """Each mistake that a rule knows is named, and no right formulation hears anything."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 from killing import properties
 from strangers import STRANGERS
@@ -7,6 +10,7 @@ from subjects import load_subject
 from wrong import MUTANTS
 from wrong_springs import FORCES, TANGENTS, Right
 
+from contactverif.contract.interface import Interface
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.diagnose import diagnose
@@ -78,3 +82,24 @@ def test_a_run_says_it_of_what_fails_alone() -> None:
     assert isinstance(make, type)
     assert words in judge_patch(make).diagnoses["mine"]
     assert not judge_patch(Right).diagnoses
+
+
+class Linear:
+    """Forces that are linear in the positions, to the last bit, and a tangent with two wrong numbers."""
+
+    traits = Right.traits
+
+    def __init__(self, *, penalty: float) -> None:
+        self.penalty = penalty
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        return z @ np.tri(z.size)
+
+    def tangent(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        return np.tri(z.size).T + np.diag([1.0, 2.0], z.size - 2)
+
+
+def test_a_wrong_tangent_of_linear_forces_is_none_of_differences() -> None:
+    text = diagnose(Subject("linear", Linear), TANGENT)
+    assert text
+    assert "differences" not in text
