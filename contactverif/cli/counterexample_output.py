@@ -36,6 +36,7 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     text = indent_below(
         f"{row.formulation}, {row.property_id}: {row.result}, {example.label}",
         *chain.from_iterable(words),
+        *([f"promised by {row.promised_by}"] if row.promised_by else []),
         *as_text(outcome.case).splitlines(),
         *([] if report is None else [example.replay_command(str(report))]),
     )

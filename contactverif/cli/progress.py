@@ -1,4 +1,6 @@
-"""The progress of a run on standard error: a line for each row that is judged, and on a terminal a bar below them.
+"""The progress of a run on standard error: a line for each row that is judged, and how far the whole run is.
+
+A terminal has a bar for that below the rows, and a file a line every few seconds.
 
 While the bar is up, Ctrl-C ends the run at the next case at the latest. Python drops an interrupt that arrives in a
 callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
@@ -10,10 +12,12 @@ import os
 import signal
 import sys
 import threading
+from time import monotonic
 from types import FrameType, TracebackType
 from typing import Any
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Column
 from rich.text import Text
 
 from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole
@@ -21,7 +25,17 @@ from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import Row
 from contactverif.run import scheduler
 
+_BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
+_PAUSE = 5.0  # Seconds between two lines about the whole run, where there is no terminal.
+_SLOW = 0.01  # Seconds of a call of a formulation that are worth a word: the included ones take 1e-4.
+
+
+class _TimeColumn(TimeElapsedColumn):
+    """The time that is left, where there is a guess, else the time since the start."""
+
+    def render(self, task: Task) -> Text:
+        return Text(task.fields["left"]) if task.fields["left"] else super().render(task)
 
 
 class Bar:
@@ -30,16 +44,19 @@ class Bar:
     def __init__(self) -> None:
         console = QuietConsole(stderr=True)
         self._progress = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
+            TextColumn("{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True)),
+            BarColumn(_BAR_WIDTH),
             MofNCompleteColumn(),
-            TimeElapsedColumn(),
+            _TimeColumn(),
+            expand=True,
             console=console,
             transient=True,
             disable=not console.is_terminal,
         )
         self._task: TaskID | None = None
         self._interrupted = False
+        self._of_run: scheduler.RunProgress | None = None
+        self._next_line = monotonic() + _PAUSE
         self._previous_handler: Any = None
 
     def __enter__(self) -> Bar:
@@ -61,23 +78,35 @@ class Bar:
 
     def show_progress(self, step: scheduler.Progress) -> None:
         """Show how far a run is; the scheduler calls this after every case."""
+        self._of_run = step.of_run or self._of_run
         if step.row is not None:
             self._show_row(step.row)
-        self.update(f"{step.formulation}  {step.property_id}  {step.phase}", step.count, step.planned)
+        if (step.first_seconds or 0.0) >= _SLOW:
+            self._print(Text(f"{step.formulation}: a pairing and a residual take {step.first_seconds:.2g} s"))
+        words = f"{f'{step.formulation} {step.property_id}'.rstrip()}: {step.phase} {step.count}/{step.planned}"
+        if self._progress.disable and monotonic() >= self._next_line:
+            self._next_line = monotonic() + _PAUSE
+            self._print(Text(f"{words}{_of_whole_run(self._of_run)}", style=PLAIN_STYLE))
+        if self._of_run is None:
+            self.update(words, 0, None)
+        else:
+            self.update(words, self._of_run.finished, self._of_run.planned, left=_time_left(self._of_run))
 
     def _show_row(self, row: Row) -> None:
         # A row without planned cases is that of a failure of an earlier run.
         judged = f", {row.judged}/{row.planned} judged" if row.planned else " again"
         words = f"{row.formulation} {row.property_id}: ", row.result, judged
         reason = f": {row.reason}" if row.reason else ""
-        line = Text.assemble(words[0], (words[1], STYLES.get(row.result, PLAIN_STYLE)), words[2] + reason)
+        self._print(Text.assemble(words[0], (words[1], STYLES.get(row.result, PLAIN_STYLE)), words[2] + reason))
+
+    def _print(self, line: Text) -> None:
         try:
             self._progress.console.print(line, soft_wrap=True)
         except OSError:  # Without a reader the run goes on.
             sys.stderr = open(os.devnull, "w")  # noqa: SIM115, or Python would fail to flush it at the end.
 
-    def update(self, description: str, n_finished: int, n_planned: int) -> None:
-        """Show how many of the planned steps are finished, and what comes next.
+    def update(self, description: str, n_finished: int, n_planned: int | None, left: str = "") -> None:
+        """Show how many of the planned steps are finished, if that is known, what comes next, and the time left.
 
         Raises
         ------
@@ -89,7 +118,26 @@ class Bar:
         if self._progress.disable:
             return
         if self._task is None:
-            self._task = self._progress.add_task(description)
+            self._task = self._progress.add_task(description, left=left)
         self._progress.update(
-            self._task, description=one_line(description, _LONGEST), completed=n_finished, total=n_planned
+            self._task, description=one_line(description, _LONGEST), completed=n_finished, total=n_planned, left=left
         )
+
+
+def _of_whole_run(progress: scheduler.RunProgress | None) -> str:
+    """Return how far a run is, behind other words."""
+    if progress is None:
+        return ""
+    left = _time_left(progress)
+    return f"; {progress.finished:,} of some {progress.planned:,} cases in all{left and f', {left}'}"
+
+
+def _time_left(progress: scheduler.RunProgress) -> str:
+    """Return the time that a run still takes, which is a guess; empty if nothing is measured yet."""
+    seconds = progress.seconds_left
+    if seconds is None:
+        return ""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"about {seconds / size:.0f} {unit} left"
+    return f"about {seconds:.0f} s left"

@@ -132,6 +132,8 @@ class Row:
         The verdict over all cases: crashed and fail first, then not judged, then pass.
     promise : bool | None
         True if the formulation promises to pass, False if it states that it fails, None if it states nothing.
+    promised_by : str
+        The traits from which the promise follows, empty if it is one of every formulation or there is none.
     known : str
         The reason why a failure is known to the caller, empty if it is not.
     reason : str
@@ -154,6 +156,7 @@ class Row:
     info: PropertyInfo
     verdict: Verdict
     promise: bool | None
+    promised_by: str = ""
     known: str = ""
     reason: str = ""
     planned: int = 0
@@ -165,7 +168,7 @@ class Row:
     _tally: Tally | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        clean(self, names=("formulation",), lines=("known", "reason"))
+        clean(self, names=("formulation",), lines=("promised_by", "known", "reason"))
 
     @property
     def property_id(self) -> str:

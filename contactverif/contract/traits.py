@@ -6,7 +6,7 @@ that runs. A promise that no property checks is withdrawn. No two traits have th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -295,6 +295,16 @@ class Traits:
     def by_name(self) -> dict[str, Any]:
         """Return ``{name: value}`` of the traits of all groups."""
         return dict(_flatten(self))
+
+
+def traits_behind(statement: Callable[[Traits], object], traits: Traits) -> dict[str, Any]:
+    """Return ``{name: value}`` of the traits without any one of which a statement about them would be another."""
+    stated, silent = statement(traits), Traits().by_name()
+    return {
+        name: value
+        for name, value in traits.by_name().items()
+        if value != silent[name] and statement(traits.revise(**{name: silent[name]})) != stated
+    }
 
 
 def _flatten(group: Any) -> Iterator[tuple[str, Any]]:

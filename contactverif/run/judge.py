@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf
 from time import perf_counter
@@ -135,23 +135,35 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
     return -forces.reshape(case.interface.nodes.shape)
 
 
-def call_first(subject: Subject, parts: Collection[str]) -> tuple[bool, FirstAnswers | None]:
+@dataclass(frozen=True, slots=True)
+class FirstCall:
+    """The findings of the first calls of a formulation."""
+
+    opposite_sign: bool = False
+    answers: FirstAnswers | None = None
+    seconds: float | None = None  # Of a pairing and a residual that are asked once more; a kernel is compiled then.
+
+
+def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     """Call a formulation for the first time, and return whether its forces have the opposite sign, and its answers.
 
     Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
     is called. What else goes wrong here, the properties will say: then there are no answers.
     """
     if subject.traits.rules.enforcement == "barrier":  # It is not defined in penetration.
-        return False, None
+        return FirstCall()
     try:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, named_case(STATES[0]), parts)
-            opposite = has_opposite_sign(subject)
+            start = perf_counter()
+            opposite = _pulls(subject, STATES[0])
+            seconds = perf_counter() - start
+            opposite = opposite and all(_pulls(subject, name) for name in STATES[1:])
             if "contact_points" in parts:
                 _call_contact_points(subject, first.case)
     except ContractError:
-        return False, None
-    return opposite, first
+        return FirstCall()
+    return FirstCall(opposite, first, seconds)
 
 
 def _call_contact_points(subject: Subject, case: Case) -> None:
@@ -161,16 +173,14 @@ def _call_contact_points(subject: Subject, case: Case) -> None:
         formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
 
 
-def has_opposite_sign(subject: Subject) -> bool:
-    """Return whether the forces of a formulation pull the slave towards the master in all of `STATES`.
+def _pulls(subject: Subject, state: str) -> bool:
+    """Return whether the forces of a formulation pull the slave towards the master.
 
     A residual with all signs turned round is the most frequent mistake of a first plugin. Then nearly every property
     fails, and none of the numbers says why. Where anything else can explain the answer, this returns False.
     """
-    if subject.traits.rules.enforcement == "barrier":  # It is not defined in penetration.
-        return False
     try:
-        return all(_push(subject, named_case(name)) < 0 for name in STATES)
+        return _push(subject, named_case(state)) < 0
     except ContractError:
         return False
 

@@ -21,6 +21,7 @@ from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
+from contactverif.contract.traits import traits_behind
 from contactverif.isolation.remote_formulation import count_ends
 from contactverif.journals.outcome_records import OutcomeForm, decode_outcome, encode_outcome
 from contactverif.journals.run_journal import Notes
@@ -255,7 +256,14 @@ def open_row(
     `stopped` says why the formulation is asked nothing more; it is empty if all is asked.
     """
     promise = question.promise(subject.traits)
-    row = Row(formulation=subject.name, info=question.info, verdict=Verdict.PASS, promise=promise, known=known)
+    row = Row(
+        formulation=subject.name,
+        info=question.info,
+        verdict=Verdict.PASS,
+        promise=promise,
+        promised_by=_traits_of_promise(question, subject),
+        known=known,
+    )
     if reason := question.refusal(subject.traits):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
@@ -271,6 +279,13 @@ def open_row(
     if promise is False and (_is_on_scene(question, sampling) or question.shown_by - subject.provides):
         row = replace(row, promise=None)
     return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None))
+
+
+def _traits_of_promise(question: Property, subject: Subject) -> str:
+    """Return the traits from which a promise to pass follows, in words."""
+    if not question.promise(subject.traits):
+        return ""
+    return ", ".join(f"{name}={value!r}" for name, value in traits_behind(question.promise, subject.traits).items())
 
 
 def row_of_case(question: Property, subject: Subject, outcome: Outcome) -> Row:

@@ -19,7 +19,6 @@ from operator import attrgetter
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
@@ -40,6 +39,7 @@ from contactverif.run.rows import (
     row_of_case,
     shrink_case,
 )
+from contactverif.run.run_meter import RunMeter
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
 from contactverif.run.telling import PURITY, most_telling, wrong_rows
@@ -84,6 +84,7 @@ class RunJobs:
         self._groups: dict[tuple[str, bool], list[Property]] = {}
         for question in sorted(questions, key=_turn):
             self._groups.setdefault(sampling.group(question), []).append(question)
+        self._meter = RunMeter(subjects, questions, sampling)
         self._opposite_signs: set[str] = set()
         self._diagnoses: dict[str, str] = {}
         self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
@@ -125,13 +126,10 @@ class RunJobs:
                 judge.call_first, (subject, self._needs & subject.provides), partial(self._note_first, before, subject)
             )
 
-    def _note_first(
-        self, before: Progress, subject: Subject, answers: tuple[bool, FirstAnswers | None]
-    ) -> Iterable[Job]:
-        opposite, first = answers
-        subject.first_answers = subject.first_answers or first  # In a second run the process is warm.
-        self._opposite_signs |= {before.formulation} if opposite else set()
-        self._report(replace(before, count=1))
+    def _note_first(self, before: Progress, subject: Subject, first: judge.FirstCall) -> Iterable[Job]:
+        subject.first_answers = subject.first_answers or first.answers  # In a second run the process is warm.
+        self._opposite_signs |= {before.formulation} if first.opposite_sign else set()
+        self._report(replace(before, count=1, first_seconds=first.seconds))
         return ()
 
     def __iter__(self) -> Iterator[Job]:
@@ -327,10 +325,16 @@ class RunJobs:
             return
         notes = self._journal.notes(name, property_id, chunk.first)
         arguments = row.question, row.subject, chunk, notes, earlier
-        yield Job(judge_cases, arguments, partial(self._add, row, chunk.first), self._judging(row))
+        yield Job(judge_cases, arguments, partial(self._add_judged, row, chunk.first), self._judging(row))
 
     def _judging(self, row: OpenRow) -> Progress:
-        return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned)
+        of_run = self._meter.read(self._rows)
+        return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned, of_run=of_run)
+
+    def _add_judged(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
+        """Add the outcomes of a chunk that was judged now."""
+        self._meter.measure(row.question.id, judged.outcomes)
+        return self._add(row, first, judged)
 
     def _add(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
         """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""

@@ -27,7 +27,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from multiprocessing.process import BaseProcess
 from typing import Any, Literal
@@ -48,12 +48,22 @@ Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
 # What the server of processes imports once for all workers: the judge, and, as it is imported, all properties.
 _PRELOAD = ["contactverif.run.run", "contactverif.plugins.preload"]
+_SILENCE = 5.0  # Seconds after which the last step is reported once more, to show that the run goes on.
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
 
 
 class WorkerError(ContactverifError):
     """A worker process ended before it had done its job."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunProgress:
+    """The cases of a run that are judged, the number of all, and a guess of the seconds that are left."""
+
+    finished: int
+    planned: int  # A guess as long as lists of cases are not made.
+    seconds_left: float | None  # None as long as nothing is measured.
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +79,10 @@ class Progress:
     count: int  # The number of finished cases.
     planned: int
     row: Row | None = None  # The row, once all its cases are judged.
+    of_run: RunProgress | None = field(default=None, compare=False)  # How far the run is, with some steps.
+    first_seconds: float | None = (
+        None  # What a pairing and a residual took of a formulation that had been called before.
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,9 +117,18 @@ class Scheduler:
                     running[future] = job
                 else:
                     waiting.appendleft(iter(job.then(job.function(*job.arguments, **self._counter(job)))))
-            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
+            for future in self._wait(running):
                 job = running.pop(future)
                 waiting.appendleft(iter(job.then(self._result(future, job))))
+
+    def _wait(self, running: Iterable[Future[bytes]]) -> Iterable[Future[bytes]]:
+        """Wait until some of the jobs that run are done, and return them."""
+        while running:
+            if ended := wait(running, _SILENCE, FIRST_COMPLETED).done:
+                return ended
+            if self._report is not None and self._last is not None:
+                self._report(replace(self._last, row=None))
+        return ()
 
     def report(self, step: Progress) -> None:
         """Report a step, unless it was the last."""

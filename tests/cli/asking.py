@@ -22,7 +22,10 @@ class Answer(NamedTuple):
 
 
 Ask = Callable[..., Answer]
-_ROW = re.compile(r"^\S+ [a-z0-9.-]+: [A-Za-z ]+(, \d+/\d+ judged| again)(: .*)?\n", re.MULTILINE)
+_ROW = re.compile(
+    r"^\S+ [a-z0-9.-]*: ([A-Za-z ]+(, \d+/\d+ judged| again)(: .*)?|[a-z ()]+ \d+/\d+(; .* cases in all.*)?)\n",
+    re.MULTILINE,
+)
 
 
 def without_rows(err: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contactverif import ContactPoints, ContractError, Interface, MisuseError, Pairing
-from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits, traits_behind
 
 PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns
 
@@ -180,3 +180,11 @@ def test_a_trait_is_revised_by_its_name_whatever_its_group() -> None:
         traits.revise(flatt=True)
     with pytest.raises(ContractError, match=r"Traits.rules.area: found 'here'; needed one of 'reference', 'current'"):
         traits.revise(area="here")
+
+
+def test_the_traits_behind_a_statement_are_those_without_which_it_would_be_another() -> None:
+    traits = Traits(Promises(PatchPromises(flat=True), symmetric=True), Rules(penalty="nodal", area="current"))
+    assert traits_behind(lambda stated: stated.promises.patch.flat, traits) == {"flat": True}
+    both = traits_behind(lambda stated: stated.rules.penalty == "nodal" and stated.rules.area is not None, traits)
+    assert both == {"penalty": "nodal", "area": "current"}
+    assert traits_behind(lambda stated: True, traits) == {}

@@ -53,8 +53,8 @@ def hard_run() -> Run:
         Outcome(case, Verdict.PASS, "", Measurement(details=details)),
     )
     rows = [
-        Row("mine", info, Verdict.FAIL, True, reason="breaks the contract", planned=12, outcomes=outcomes,
-            shrunk=outcomes[6], seconds=3.0),
+        Row("mine", info, Verdict.FAIL, True, "area='current'", reason="breaks the contract", planned=12,
+            outcomes=outcomes, shrunk=outcomes[6], seconds=3.0),
         Row("mine", question("a.b", "a"), Verdict.NOT_JUDGED, None, reason="0 of 9 cases judged", planned=9),
         Row("mine", question("patch", "patch", ERROR), Verdict.PASS, False, planned=1, outcomes=(outcome(case, 0.0),),
             witness=replace(outcome(case, 0.0), case_or_summary=awkward())),

@@ -56,6 +56,7 @@ class RowDocument(msgspec.Struct, frozen=True, kw_only=True):
     family: str
     result: str
     promise: bool | None  # True to pass, false to fail, null if nothing is stated.
+    promised_by: str  # The traits from which it follows; empty if it is a promise of everybody.
     known: str
     breaks: str
     reason: str
@@ -122,6 +123,7 @@ def _row(row: Row, examples: Mapping[tuple[str, str], Counterexample]) -> RowDoc
         family=row.info.family,
         result=str(row.result),
         promise=row.promise,
+        promised_by=row.promised_by,
         known=row.known,
         breaks=row.unexpected,
         reason=row.reason,

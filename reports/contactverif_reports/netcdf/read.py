@@ -175,6 +175,8 @@ class _Reader:
                 info=info,
                 verdict=Verdict(verdict),
                 promise=schema.Promise(int(self._summary["promise"].values[i, j])).promise,
+                # Older reports do not say it.
+                promised_by=str(self._summary["promised_by"].values[i, j]) if "promised_by" in self._summary else "",
                 known=str(self._summary["known"].values[i, j]),
                 reason=str(self._summary["reason"].values[i, j]),
                 planned=int(self._summary["planned"].values[i, j]),

@@ -122,6 +122,9 @@ def _rows(grid: _Grid, run: Run) -> Table:
             "stated_to_fail names a witness, a case that always runs",
         ),
         "unexpected": grid.words(lambda row: row.unexpected, "why this row makes the run fail", "empty if it does not"),
+        "promised_by": grid.words(
+            lambda row: row.promised_by, "the traits from which the promise follows", "empty if it is one of everybody"
+        ),
         "known": grid.words(lambda row: row.known, "why a failure is known", "empty where none is"),
         "reason": grid.words(lambda row: row.reason, "why the verdict is no pass, in the worst case"),
         "planned": grid.count(lambda row: row.planned, "number of random cases planned"),

@@ -1,0 +1,49 @@
+"""The progress of a whole run, on standard error where it is no terminal."""
+
+import pytest
+
+from contactverif.cli import progress
+from contactverif.cli.progress import Bar
+from contactverif.run.scheduler import Progress, RunProgress
+
+
+@pytest.fixture
+def bar(monkeypatch: pytest.MonkeyPatch) -> Bar:
+    """Return a bar on a clock that goes on by three seconds whenever it is read."""
+    times = iter(range(0, 1000, 3))
+    monkeypatch.setattr(progress, "monotonic", lambda: float(next(times)))
+    return Bar()
+
+
+def step(count: int, seconds_left: float | None) -> Progress:
+    of_run = RunProgress(1000 + count, 4255, seconds_left)
+    return Progress("mine", "purity", "judging", count, 100, of_run=of_run)
+
+
+def test_a_line_every_few_seconds_says_how_far_the_run_is(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
+    for count in range(6):
+        bar.show_progress(step(count, 100.0 - count))
+    assert capsys.readouterr().err.splitlines() == [
+        "mine purity: judging 1/100; 1,001 of some 4,255 cases in all, about 99 s left",
+        "mine purity: judging 3/100; 1,003 of some 4,255 cases in all, about 97 s left",
+        "mine purity: judging 5/100; 1,005 of some 4,255 cases in all, about 95 s left",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(None, "in all"), (119.0, "about 119 s left"), (121.0, "about 2 min left"), (9000.0, "about 2 h left")],
+)
+def test_the_time_left_has_a_unit_that_suits_it(
+    bar: Bar, capsys: pytest.CaptureFixture[str], seconds: float | None, words: str
+) -> None:
+    bar.show_progress(step(0, seconds))
+    bar.show_progress(step(1, seconds))
+    assert capsys.readouterr().err.endswith(f"{words}\n")
+
+
+def test_a_slow_formulation_is_told_what_a_call_costs(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, seconds in (("fast", 0.001), ("slow", 0.25)):
+        bar.show_progress(Progress(name, "", "first call (compiles)", 1, 1, first_seconds=seconds))
+    lines = capsys.readouterr().err.splitlines()
+    assert [line for line in lines if "take" in line] == ["slow: a pairing and a residual take 0.25 s"]

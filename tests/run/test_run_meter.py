@@ -1,0 +1,89 @@
+"""The progress of a whole run: its cases, and the seconds that are left by what cases of the same kind have cost."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from test_run import ZERO, a_case, sizes, subject
+
+from contactverif import Outcome, Property, Verdict
+from contactverif.contract.cases import Cases
+from contactverif.run import run_meter
+from contactverif.run.run import run
+from contactverif.run.run_meter import RunMeter
+from contactverif.run.scheduler import Progress
+from contactverif.sampling.draw import Sampling
+
+SOLVED = replace(ZERO, id="patch.solved", bodies=True)
+LISTED = replace(ZERO, id="patch.listed", cases=Cases.from_list(lambda: tuple(a_case(1, f"{n}") for n in range(3))))
+
+
+class Clock:
+    """A clock that a test sets."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(run_meter, "perf_counter", clock)
+    return clock
+
+
+def meter_of(*questions: Property) -> RunMeter:
+    meter = RunMeter([subject()], questions, Sampling(100, 1))
+    meter.read({})  # The run begins.
+    return meter
+
+
+def outcomes(count: int, seconds: float) -> list[Outcome]:
+    return [Outcome(a_case(1), Verdict.PASS, seconds=seconds)] * count
+
+
+def rows_judged(count: int) -> dict[tuple[str, str], Any]:
+    """Return the rows of a run in which some cases of the first property are judged."""
+
+    class Opened:
+        n_finished, planned = count, 100
+
+    return {("mine", ZERO.id): Opened()}
+
+
+def test_what_is_left_takes_as_long_as_what_was_before(clock: Clock) -> None:
+    meter = meter_of(ZERO)
+    meter.measure(ZERO.id, outcomes(20, 1.0))
+    clock.now = 10.0  # Two processes.
+    progress = meter.read(rows_judged(20))
+    assert (progress.finished, progress.planned, progress.seconds_left) == (20, 100, pytest.approx(40.0))
+
+
+def test_cases_that_solve_bodies_count_for_more_until_they_are_measured(clock: Clock) -> None:
+    meter = meter_of(ZERO, SOLVED)
+    meter.measure(ZERO.id, outcomes(100, 1.0))
+    clock.now = 100.0
+    guess = meter.read(rows_judged(100)).seconds_left
+    assert guess == pytest.approx(100 * run_meter._COSTS[True, False])
+    meter.measure(SOLVED.id, outcomes(1, 7.0))
+    clock.now = 107.0
+    assert meter.read(rows_judged(100)).seconds_left == pytest.approx(700.0)
+
+
+def test_a_few_cases_are_no_measure(clock: Clock) -> None:
+    meter = meter_of(ZERO)
+    meter.measure(ZERO.id, outcomes(4, 1.0))
+    clock.now = 4.0
+    assert meter.read(rows_judged(4)).seconds_left is None
+
+
+def test_at_the_end_of_a_run_all_cases_are_judged_and_nothing_is_left() -> None:
+    log: list[Progress] = []
+    fewer = replace(ZERO, id="patch.fewer", cases=lambda _: sizes(7))
+    lacking = replace(ZERO, id="patch.lacking", needs=frozenset({"tangent"}))
+    run([subject()], [ZERO, LISTED, fewer, lacking], examples=40, seed=1, progress=log.append)
+    steps = [step.of_run for step in log if step.of_run is not None]
+    assert [step.finished for step in steps] == sorted(step.finished for step in steps)
+    assert (steps[-1].finished, steps[-1].planned, steps[-1].seconds_left) == (50, 50, 0.0)
