@@ -72,8 +72,8 @@ class PropertyInfo:
         The kinds of situation (`Case.kind`) that the strategy makes, in the order of tables. A run counts the cases of
         each, and shows a kind of which there was no case too.
     least_contact : float
-        The least share of judged cases in which something must be in contact, 0 to 1; with less the property is not
-        judged. It is 0 where contact is not the question.
+        The least share of judged cases in which something must be in contact, 0 to 1; with clearly less the property
+        is not judged. It is 0 where contact is not the question.
     usual_undecided : float
         The share of undecided cases of right formulations, 0 to 1, as it was measured. A formulation with more than
         twice that, and more than chance allows, is reported: what is undecided may hide what is wrong.

@@ -73,10 +73,15 @@ def refuse_unknown_mean(traits: Traits) -> str:
 
 
 def promise_mean(traits: Traits) -> bool | None:
-    """Return True where the traits say what the mean pressure is, and for multipliers, that they are unique."""
-    if refuse_unknown_mean(traits) or (
-        traits.rules.enforcement == "multiplier" and not traits.promises.independent_multipliers
-    ):
+    """Return True where the traits say what the mean pressure is.
+
+    Of multipliers it is known if they are unique, unless their inf-sup constant falls as meshes are refined: then
+    pressures that alternate from node to node are part of the solution, and what they add to the mean is no second
+    order of the mesh.
+    """
+    promises = traits.promises
+    unsure = not promises.independent_multipliers or promises.inf_sup is False
+    if refuse_unknown_mean(traits) or (traits.rules.enforcement == "multiplier" and unsure):
         return None
     return True
 
@@ -118,8 +123,8 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
     differentiates the residual. The error E_F of nodal forces is a detail, because facets press with their middles at a
     high penalty, and no formulation is to blame for that.
 
-    The total is known from the traits only if `penalty` is "distributed" and `area` is stated, or for multipliers.
-    These formulations are asked to pass.
+    The total is known from the traits only if `penalty` is "distributed" and `area` is stated, or for multipliers that
+    are independent. These formulations are asked to pass, but not multipliers that state `inf_sup=False`.
 
     **Undecided.** A case whose solution Newton's method does not find. A failing case in which an end of the slave has
     no force: it faces the end of the master, and without a tolerance there roundoff decides whether it is in contact.

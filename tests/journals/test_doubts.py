@@ -42,7 +42,13 @@ def one_row(count: int, *, idle: int = 0, undecided: int = 0, **info: Any) -> Ro
 
 @pytest.mark.parametrize(
     ("idle", "least", "verdict"),
-    [(0, 0.8, Verdict.PASS), (20, 0.8, Verdict.PASS), (21, 0.8, Verdict.NOT_JUDGED), (100, 0.0, Verdict.PASS)],
+    [
+        (0, 0.8, Verdict.PASS),
+        (20, 0.8, Verdict.PASS),
+        (36, 0.8, Verdict.PASS),
+        (37, 0.8, Verdict.NOT_JUDGED),
+        (100, 0.0, Verdict.PASS),
+    ],
 )
 def test_a_row_with_too_few_cases_in_contact_is_not_judged(idle: int, least: float, verdict: Verdict) -> None:
     row = one_row(100, idle=idle, least_contact=least)
@@ -52,9 +58,11 @@ def test_a_row_with_too_few_cases_in_contact_is_not_judged(idle: int, least: flo
 
 
 def test_the_reason_says_how_many_were_in_contact() -> None:
-    assert one_row(100, idle=21).reason == "79 of 100 judged cases in contact, needed 80%"
+    assert one_row(100, idle=41).reason == "59 of 100 judged cases in contact, needed 80%"
     assert one_row(3, idle=3).reason == "nothing was in contact in any case: nothing was judged"
-    assert one_row(3, idle=1).verdict is Verdict.PASS  # A single case may be chance.
+    assert one_row(3, idle=1).verdict is Verdict.PASS  # A few cases may be chance.
+    assert one_row(12, idle=5).verdict is Verdict.PASS
+    assert one_row(12, idle=9).verdict is Verdict.NOT_JUDGED
 
 
 def test_undecided_cases_are_reported_beyond_twice_the_usual_share_and_chance() -> None:

@@ -232,3 +232,14 @@ def test_an_end_that_is_lost_for_want_of_a_tolerance_is_no_accusation() -> None:
     question = load_property("patch.curved")
     outcome = judge_as(Verdict.UNDECIDED, question, question.cases(None)[0], load_subject("nts-ar:tau=0"))
     assert "an end of the slave" in outcome.reason
+
+
+@pytest.mark.parametrize("name", ["vts-me-lm:n=1", "vts-ppt-lm:n=1"])
+def test_multipliers_whose_inf_sup_constant_falls_promise_no_mean_on_rings(name: str) -> None:
+    """They are independent, and tend to the exact mean: 4e-2, 2e-3 to 4e-3, 1e-3, 4e-4. The rule needs two of these."""
+    subject, question = load_subject(name), load_property("patch.curved")
+    outcomes = judge_all("patch.curved", subject)
+    assert (subject.traits.promises.independent_multipliers, subject.traits.promises.inf_sup) == (True, False)
+    assert any(outcome.verdict is Verdict.FAIL for outcome in outcomes)
+    assert question.promise(subject.traits) is None
+    assert question.promise(load_subject("mortar-lm").traits) is True

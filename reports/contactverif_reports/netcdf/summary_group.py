@@ -137,7 +137,7 @@ def _rows(grid: _Grid, run: Run) -> Table:
             ),
             "share of judged random cases in which something was in contact",
             "1",
-            "below the attribute least_contact of the property nothing is judged; missing where no case was",
+            "clearly below the attribute least_contact of the property nothing is judged; missing where no case was",
             fill=schema.NOT_MEASURED,
         ),
         "suspicion": grid.words(
