@@ -2,11 +2,14 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from math import inf, isnan
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from page_reader import complaints
 from studies.bench_results import make_cells, make_results
 
@@ -26,7 +29,8 @@ from contactverif_reports.bench.costs import (
 )
 from contactverif_reports.bench.intervals import Ratio, ratio_of
 from contactverif_reports.bench.results import DEEP, VARIANTS, Outcome
-from contactverif_reports.draw.bench_figures import draw_bench, highlights
+from contactverif_reports.draw.bench_figures import draw_bench, highlights, make_scene_figure
+from contactverif_reports.draw.curve_names import ROOM, spread
 from contactverif_reports.html.bench_page import bench_page
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
@@ -235,3 +239,17 @@ def test_many_formulations_have_a_picture_with_a_panel_each_and_one_mesh_has_no_
 )
 def test_seconds_have_a_unit(seconds: float, text: str) -> None:
     assert format_seconds(seconds) == text
+
+
+def test_each_curve_with_a_colour_is_named_beside_its_end() -> None:
+    names = [text.get_text() for axes in make_scene_figure(RESULTS, "wavy").axes for text in axes.texts]
+    assert sorted(names) == sorted(3 * [*highlights(RESULTS)])
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6).map(sorted))
+def test_names_of_curves_do_not_overlap_and_stand_beside_the_panel(heights: list[float]) -> None:
+    places = spread(heights)
+    assert all(above - below >= ROOM * (1 - 1e-9) for below, above in pairwise(places))
+    assert -1e-9 <= places[0] <= places[-1] <= 1.0 + 1e-9
+    if all(above - below >= ROOM for below, above in pairwise(heights)):
+        assert places == pytest.approx(heights)

@@ -27,8 +27,9 @@ from contactverif_reports.bench.bench_text import (
 )
 from contactverif_reports.bench.cost_tables import costs_at, format_share, ratios_at
 from contactverif_reports.bench.costs import REFERENCE, curve, rank, runtimes
-from contactverif_reports.bench.results import BEST, ERRORS, BenchResults
+from contactverif_reports.bench.results import BEST, ERRORS, RULE, BenchResults
 from contactverif_reports.draw.case_figure import save
+from contactverif_reports.draw.curve_names import name_curves
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#8B4513")  # Okabe and Ito's, and brown.
 _MARKERS = "os^vDP"
@@ -80,7 +81,7 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
     """Return the three errors of a scene, each against one evaluation and against one factorisation."""
     pens = highlights(results)
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(4.6, 6.6), layout="constrained")
+        figure = Figure(figsize=(5.2, 6.6), layout="constrained")
         panels = figure.subplots(len(ERRORS), len(_AXES), sharex="col", sharey="row")
         for row, kind in zip(panels, ERRORS, strict=True):
             for axes, number in zip(row, _AXES, strict=True):
@@ -94,7 +95,12 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
         for axes in panels.reshape(-1):
             _label_plainly(axes.xaxis)
             _label_plainly(axes.yaxis)
-        _legend(figure, results, pens, Line2D([], [], color="0.4", linestyle="--", label="best penalty"))
+        figure.draw_without_rendering()  # Labels stand where the layout has put the panels.
+        for axes in panels[:, -1]:
+            name_curves(axes, {pen["color"]: name for name, pen in pens.items()})
+        words = f"solid: {RULE.penalty:g} E/h, dashed: the best penalty"
+        others = ", grey: others" if len(pens) < len(results.formulations) else ""
+        figure.suptitle(words + others, fontsize=8, color="0.3")
     return figure
 
 
