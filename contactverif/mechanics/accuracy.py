@@ -2,6 +2,7 @@
 
 - `force_error`: nodal forces of one surface, sqrt(Σ|F_i − F_i^exact|²/m_i) over sqrt(Σ|F_i^exact|²/m_i), m_i = ∫N_i ds.
 - `pressure_error`: reported pressures, the root of the mean of (p − p^exact)² with the plugin's own weights.
+- `best_pressure_error`: what `pressure_error` would be of the best linear pressure on the mesh.
 - `displacement_error`: displacements of a surface, sqrt(∫|u_h − u^exact|² ds) over sqrt(∫|u^exact|² ds).
 - `fit_rate`: the power of h by which the errors on several meshes fall.
 
@@ -17,6 +18,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg
 
 from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.case import Case
@@ -31,6 +34,9 @@ Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), o
 
 # Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
 BALANCED = 1e-9
+_PARTS_OF_EDGE = (
+    32  # A pressure may end inside a segment with a vertical tangent: so many parts leave 1e-3 of its error.
+)
 GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 times a shape function.
 
 
@@ -194,6 +200,25 @@ def pressure_error(solution: Solution, exact: Field, scale: float) -> float | No
         return np.inf
     errors = pressures[counted] - exact(places[counted])
     return float(np.sqrt(np.average(errors**2, weights=weights[counted]))) / scale
+
+
+def best_pressure_error(surface: Surface, positions: FloatArray, exact: Field, scale: float) -> float:
+    """Return the root mean square error of the best pressure on a mesh, over a pressure `scale`.
+
+    The best one is continuous, linear between the nodes of a surface at positions (n_nodes, 2), and nearest to the
+    exact pressure in L2.
+    """
+    share, places, weights = _quadrature(surface, positions, _PARTS_OF_EDGE)
+    values = exact(places.reshape(-1, 2)).reshape(weights.shape)
+    shapes = np.stack([1 - share, share])  # (2, n_points)
+    nodes, ends = np.unique(surface.segments, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    right = np.bincount(ends.ravel(), np.einsum("ep,sp->se", shapes, values * weights).ravel(), len(nodes))
+    entries = np.einsum("ep,fp,sp->sef", shapes, shapes, weights).ravel()
+    rows, columns = np.repeat(ends, 2, axis=1).ravel(), np.tile(ends, (1, 2)).ravel()
+    mass = sparse.csc_array((entries, (rows, columns)), shape=(len(nodes), len(nodes)))
+    best = linalg.spsolve(mass, right)
+    return float(np.sqrt(np.average((best[ends] @ shapes - values) ** 2, weights=weights))) / scale
 
 
 def displacement_error(

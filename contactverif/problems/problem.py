@@ -19,6 +19,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import (
     Field,
     Solution,
+    best_pressure_error,
     displacement_error,
     force_error,
     pressure_error,
@@ -73,6 +74,12 @@ class ProblemInstance:
             needed = f"{state.interface.nodes.shape}, a force for each node"
             raise MisuseError("ProblemInstance.forces", f"shape {forces.shape}", needed)
         return forces
+
+    @property
+    def best_pressure(self) -> float:
+        """The error of the best continuous pressure that is linear between the slave's nodes, as `errors` counts it."""
+        guess = self.first_guess
+        return best_pressure_error(guess.interface.slave, guess.positions, self.pressure, self.pressure_scale)
 
     def errors(self, solution: Solution) -> Errors:
         """Return the errors of a solution by kind."""

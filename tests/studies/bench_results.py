@@ -41,6 +41,7 @@ def make_results(
         targets=dict.fromkeys(scenes, tuple(targets)),
         segments=meshes.astype(np.int64),
         unknowns=(4 * meshes).astype(np.int64),
+        best_pressure=0.1 / meshes,
         outcomes=np.where(unsolved, int(Outcome.NOT_SOLVED), int(Outcome.SOLVED)),
         errors=np.repeat(np.where(unsolved, np.nan, errors)[..., None], len(ERRORS), axis=-1),
         counts=np.repeat(systems[..., None].astype(np.int64), len(COUNTS), axis=-1),

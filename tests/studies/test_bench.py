@@ -42,10 +42,11 @@ from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
 from contactverif.studies.bench import bench_plan
 from contactverif.studies.bench.bench_journal import FinishedCell, Header, Journal
-from contactverif.studies.bench.bench_plan import BenchPlan, make_plan, pose, vary
+from contactverif.studies.bench.bench_plan import BenchPlan, largest_errors, make_plan, pose, vary
 from contactverif.studies.bench.bench_study import run_bench
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, SolutionRecord, run_cell
-from contactverif_reports.bench.results import COUNTS, VARIANTS, Cell, Outcome
+from contactverif_mortar import segment_to_segment
+from contactverif_reports.bench.results import COUNTS, RULE, VARIANTS, Cell, Outcome
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
 WAVY = Cell("wavy", 8, 0)
@@ -379,3 +380,32 @@ def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_secon
         stored = resumed["timing/evaluation_seconds"].values[:, 0, 0].tolist()
     expected = [run["evaluation"] for run in record["runs"].values()]
     assert stored == expected  # What was measured before the kill was not measured again.
+
+
+@pytest.mark.parametrize(("cell", "change"), [(Cell("wavy", 16, 0), 1e-10), (Cell("hertz", 20, 0), 0.03)])
+def test_more_points_on_a_cell_do_not_change_the_errors_of_sts(
+    cell: Cell, change: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page says so: its curve is the floor of forces and displacements."""
+    errors = []
+    for count in (3, 12):
+        monkeypatch.setattr(segment_to_segment, "N_POINTS", count)
+        subject = Subject("sts", segment_to_segment.sts)
+        instance = pose(cell, RULE.penalty, subject.traits, 0)
+        errors.append(largest_errors(instance, solve_for_accuracy(instance.scene, subject)))
+    for kind in ("forces", "displacement"):
+        assert errors[1][kind] == pytest.approx(errors[0][kind], rel=change)
+
+
+@pytest.mark.parametrize("scene", ["wavy", "hertz"])
+def test_the_best_pressure_is_that_of_the_normal_equations_and_no_formulation_is_far_better(scene: str) -> None:
+    """Its error is p1 k² h²/√720 of a wave on equal segments, and of first order of Hertz' pressure."""
+    meshes = {"wavy": (16, 32), "hertz": (20, 40)}[scene]
+    instances = [PROBLEMS[scene].pose(mesh, RULE.penalty, Traits(), Variation()) for mesh in meshes]
+    coarse, fine = (instance.best_pressure for instance in instances)
+    assert 0.6 < np.log2(coarse / fine) < 2.1
+    if scene == "wavy":
+        formula = (2 * np.pi / 16) ** 2 / np.sqrt(720) / np.sqrt(2)
+        assert coarse == pytest.approx(formula, rel=0.03)
+    points = solve_for_accuracy(instances[0].scene, load_subject("sts"))
+    assert instances[0].errors(points)[PRESSURE] > 0.5 * coarse

@@ -97,6 +97,7 @@ def collect_results(
         targets=plan.targets,
         segments=np.array([record.segments for record in first], np.int64),
         unknowns=np.array([record.unknowns for record in first], np.int64),
+        best_pressure=np.array([record.best_pressure for record in first], np.float64),
         outcomes=_array(rows, lambda solution: solution.outcome, np.int64),
         errors=_array(rows, lambda solution: [solution.errors.get(kind, nan) for kind in ERRORS], np.float64),
         counts=_array(rows, lambda solution: [solution.counts.get(name, 0) for name in COUNTS], np.int64),

@@ -62,6 +62,7 @@ class CellRecord:
     segments: int  # The number of slave segments
     unknowns: int  # The number of free components of all bodies; 0 in further processes
     runs: dict[str, RunRecord]  # The runs by formulation
+    best_pressure: float = 0.0  # The error of the best linear pressure on the slave's mesh; 0 in further processes
 
 
 def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True) -> CellRecord:
@@ -74,6 +75,17 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool 
             _solve_variants(cell, subject, instance, seed, whole, run)
             run.calls = evaluate(subject, instance, counted=True).calls
     forget_bodies()
+    _time_evaluations(subjects, instances, runs)
+    names = (subject.name for subject in subjects)
+    size = 0 if whole is None else whole.size
+    best = 0.0 if whole is None else instances[0].best_pressure
+    return CellRecord(len(instances[0].scene.interface.slave), size, dict(zip(names, runs, strict=True)), best)
+
+
+def _time_evaluations(
+    subjects: Sequence[Subject], instances: Sequence[ProblemInstance], runs: Sequence[RunRecord]
+) -> None:
+    """Time one evaluation of each formulation in turns, of which each begins with another one."""
     gc.collect()
     with without_collector():
         for turn in range(TURNS):
@@ -81,9 +93,6 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool 
                 number = (place + turn) % len(runs)
                 seconds = evaluate(subjects[number], instances[number], timed=True).seconds
                 runs[number].evaluation = float(np.fmin(runs[number].evaluation, seconds))
-    names = (subject.name for subject in subjects)
-    size = 0 if whole is None else whole.size
-    return CellRecord(len(instances[0].scene.interface.slave), size, dict(zip(names, runs, strict=True)))
 
 
 def _solve_variants(

@@ -87,6 +87,7 @@ class BenchResults:
     targets: Mapping[str, tuple[float, ...]]  # {scene: errors that cost is measured at, from large to small}
     segments: IntArray  # (n_cells,) The numbers of slave segments and of free unknowns of all bodies.
     unknowns: IntArray
+    best_pressure: FloatArray  # (n_cells,) The error of the best continuous linear pressure on the slave's mesh.
     outcomes: IntArray  # (n_formulations, n_cells, n_variants) The outcomes, see `Outcome`.
     # (n_formulations, n_cells, n_variants, n_errors) The errors, in the order of `ERRORS`; NaN where nothing is solved,
     # or nothing is reported.

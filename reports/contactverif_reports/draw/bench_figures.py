@@ -6,6 +6,7 @@ penalty of the rule, dashed ones the best afterwards.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, inf, isnan
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from contactverif_reports.bench.bench_text import (
     picture_of_each,
 )
 from contactverif_reports.bench.cost_tables import costs_at, format_share, ratios_at
-from contactverif_reports.bench.costs import REFERENCE, curve, rank, runtimes
+from contactverif_reports.bench.costs import REFERENCE, ROUNDOFF, curve, rank, runtimes
 from contactverif_reports.bench.results import BEST, ERRORS, RULE, BenchResults
 from contactverif_reports.draw.case_figure import save
 from contactverif_reports.draw.curve_names import name_curves
@@ -37,6 +38,7 @@ _AXES = {"evaluation": "one evaluation / ms", "factorisation": "one factorisatio
 _GREY: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 0}
 _STYLE: dict[Any, Any] = {"font.size": 8.5, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 3.5}
 _N_COLUMNS = 3
+_STROKES = f"solid: {RULE.penalty:g} E/h, dashed: the best penalty,\ndotted: the best linear pressure, grey: others"
 
 
 def draw_bench(results: BenchResults, folder: Path) -> None:
@@ -90,6 +92,7 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
                     _draw_curve(axes, results, scene, (name, kind, number), pens.get(name))
                 axes.grid(color="0.93", linewidth=0.5)
             row[0].set_ylabel(f"error of the {kind}")
+        _draw_best_pressure(panels[list(ERRORS).index("pressure")], results, scene)
         for axes, label in zip(panels[-1], _AXES.values(), strict=True):
             axes.set_xlabel(label)
         for axes in panels.reshape(-1):
@@ -98,10 +101,18 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
         figure.draw_without_rendering()  # Labels stand where the layout has put the panels.
         for axes in panels[:, -1]:
             name_curves(axes, {pen["color"]: name for name, pen in pens.items()})
-        words = f"solid: {RULE.penalty:g} E/h, dashed: the best penalty"
-        others = ", grey: others" if len(pens) < len(results.formulations) else ""
-        figure.suptitle(words + others, fontsize=8, color="0.3")
+        figure.suptitle(_STROKES, fontsize=8, color="0.3")
     return figure
+
+
+def _draw_best_pressure(panels: Sequence[Axes], results: BenchResults, scene: str) -> None:
+    """Draw what the mesh allows pressures, at the times of the reference."""
+    best = np.median(results.best_pressure[results.ladders(scene)], axis=0)
+    if REFERENCE not in results.formulations or not (best > ROUNDOFF).all():  # Uniform pressures have no error.
+        return
+    for axes, number in zip(panels, _AXES, strict=True):
+        x, _ = curve(results, REFERENCE, scene, "pressure", number)
+        axes.plot(1e3 * x, best, color="0.45", linewidth=1.0, linestyle=":", zorder=1)
 
 
 def _draw_curve(

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench.results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
@@ -67,6 +68,7 @@ def _check_shapes(results: BenchResults) -> None:
     for name, shape in {
         "segments": (n_cells,),
         "unknowns": (n_cells,),
+        "best_pressure": (n_cells,),
         "outcomes": solutions,
         "errors": (*solutions, len(ERRORS)),
         "counts": (*solutions, len(COUNTS)),
@@ -110,6 +112,7 @@ def _labels(results: BenchResults) -> dict[str, Any]:
     targets = [[*results.targets[scene], *[np.nan] * (n_targets - len(results.targets[scene]))] for scene in scenes]
     instance = "number of the variation, the same on all meshes"
     size = "number of free unknowns of all bodies"
+    best = "error of the best continuous pressure that is linear between the slave's nodes"
     return {
         "formulation": words(["formulation"], list(results.formulations), "formulation, as on the command line"),
         "scene": codes(["cell"], [scenes[cell.scene] for cell in cells], scenes, "scene of the cell"),
@@ -121,6 +124,7 @@ def _labels(results: BenchResults) -> dict[str, Any]:
         "target": numbers(["scene_name", "target_number"], targets, "errors that cost is measured at", RATIO),
         "slave_segments": numbers(["cell"], results.segments, "number of slave segments", RATIO),
         "unknowns": numbers(["cell"], results.unknowns, size, RATIO),
+        "best_pressure_error": numbers(["cell"], results.best_pressure, best, RATIO),
         **{
             f"{kind}_kind": words([f"{kind}_kind"], list(table), meaning, "; ".join(map(": ".join, table.items())))
             for kind, table, meaning in (
@@ -188,6 +192,7 @@ def _results(root: Group, timing: Group) -> BenchResults:
         targets=dict(zip(scenes, targets, strict=True)),
         segments=root["slave_segments"].values.astype(np.int64),
         unknowns=root["unknowns"].values.astype(np.int64),
+        best_pressure=_best_pressure(root),
         outcomes=outcomes,
         errors=root["error"].values,
         counts=root["count"].values.astype(np.int64),
@@ -198,6 +203,12 @@ def _results(root: Group, timing: Group) -> BenchResults:
         not_loaded={} if not_loaded == NONE else dict(_split(line) for line in not_loaded.splitlines()),
         provenance={name: value for name, value in attributes.items() if name not in structure},
     )
+
+
+def _best_pressure(root: Group) -> FloatArray:
+    """Return the errors of the best pressures, NaN in an older file."""
+    name = "best_pressure_error"
+    return root[name].values if name in root else np.full(len(root["slave_segments"].values), np.nan)
 
 
 def _cells(root: Group, scenes: list[str]) -> tuple[Cell, ...]:
