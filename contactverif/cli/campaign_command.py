@@ -10,10 +10,10 @@ import typer
 
 from contactverif.api.settings import read_settings
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.run_endings import say_what_was_doubted, show_what_plugins_printed
+from contactverif.cli.run_endings import show_what_plugins_printed
 from contactverif.cli.shared_options import PropertyGlobs, SamplingOptions, formulation_argument
 from contactverif.cli.verify_command import select_names
-from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job
+from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, say_what_was_doubted
 
 if TYPE_CHECKING:
     from contactverif.journals.run_journal import Journal

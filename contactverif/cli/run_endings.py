@@ -136,13 +136,6 @@ def say_how_many_are_unproven(result: Run) -> None:
         typer.echo(f"outcomes from a journal that proves nothing: {doubt}")
 
 
-def say_what_was_doubted(journal: Journal) -> None:
-    """Name the records of a journal that were not believed."""
-    for remark in journal.remarks:
-        _warn(remark)
-    journal.remarks.clear()
-
-
 def _warn(words: str) -> None:
     """Print a line about a file that could not be written."""
     typer.echo(f"contactverif: {' '.join(words.split())}", err=True)

@@ -20,7 +20,6 @@ from contactverif.api.run_files import RUN_FILES
 from contactverif.api.settings import Settings
 from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import OutputFiles, PictureFolder
-from contactverif.cli.run_endings import say_what_was_doubted
 from contactverif.cli.shared_options import PlaceOptions, SamplingOptions, WorkerOptions
 from contactverif.contract.errors import MisuseError
 
@@ -226,6 +225,13 @@ class VerifyJob:
                 raise
             finally:
                 say_what_was_doubted(journal)
+
+
+def say_what_was_doubted(journal: Journal) -> None:
+    """Name the records of a journal that were not believed."""
+    for remark in journal.remarks:
+        typer.echo(f"contactverif: {' '.join(remark.split())}", err=True)
+    journal.remarks.clear()
 
 
 def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:

@@ -18,7 +18,8 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.case_counts import exceeds
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
-from contactverif.contract.first_answers import FirstAnswers, ask_first
+from contactverif.contract.first_answers import FirstAnswers
+from contactverif.contract.first_questions import ask_first
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject

@@ -7,7 +7,8 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.first_answers import FirstAnswers, ask_first
+from contactverif.contract.first_answers import FirstAnswers
+from contactverif.contract.first_questions import ask_first
 from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.property import Property
