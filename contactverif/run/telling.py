@@ -8,6 +8,7 @@ behind the others, because a reader can follow a few springs, and hardly a solut
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, Row
@@ -23,8 +24,8 @@ ORDER = (
     "projection.forces",
     "projection.activity",
     "unilateral",
-    "purity.long",
     "projection.place",
+    "purity.long",
     "patch.flat.nodal",
     "objectivity",
     "nodal-push",
@@ -32,8 +33,8 @@ ORDER = (
     "renumbering",
     "hard.touch",
     "stability.translation",
-    "stability.local",
     "patch.flat.normal",
+    "stability.local",
     "scaling",
     "remote",
     "patch.flat.single",
@@ -54,8 +55,8 @@ ORDER = (
     "scale",
     "hard.steep-slave",
     "patch.tilted.nodal",
-    "hard.search",
     "hard.deep",
+    "hard.search",
     "swap",
     "hard.node-hit",
     "hard.offset",
@@ -79,14 +80,17 @@ ORDER = (
     "hard.dead-zone",
     "patch.flat.single.solve",
     "patch.dead-zone",
-    "hard.short-segment",
     "hard.stiff",
+    "hard.short-segment",
     "hard.contrast",
     "patch.flat.solve",
     "hard.c",
     "patch.variants",
     "hard.zero-load",
 )
+# Two answers that differ do not say which is right. Where forces are also wrong beside an exact answer, that is shown.
+_SAME_ANSWER = "objectivity", "mirror", "renumbering", "scaling", "remote", "swap"
+_EXACT = "patch.flat.normal", "patch.flat.single", "patch.flat.resultant", "patch.flat.transmission"
 _RANK = {property_id: rank for rank, property_id in enumerate(ORDER)}
 
 
@@ -109,16 +113,18 @@ def by_telling(rows: Iterable[Row]) -> list[Row]:
     """Return rows, the most telling first, each group by `ORDER`.
 
     Crashes come first, then breaches of the contract, answers that depend on earlier calls, other failures, and the
-    rest. A property of another author is shown before ours, since it was installed for a purpose.
+    rest. A property of another author is shown before ours, since it was installed for a purpose. Where a flat patch
+    has wrong forces, two answers that differ are shown behind it.
     """
-    return sorted(rows, key=_key)
+    rows = list(rows)
+    exact = [_RANK[row.property_id] for row in rows if row.verdict is Verdict.FAIL and row.property_id in _EXACT]
+    return sorted(rows, key=partial(_key, behind=min(exact, default=-1)))
 
 
-def _key(row: Row) -> tuple[bool, bool, bool, bool, int]:
+def _key(row: Row, behind: int) -> tuple[bool, bool, bool, bool, float]:
     failed = row.verdict in (Verdict.FAIL, Verdict.CRASHED)
     impure = failed and row.property_id in PURITY
-    return row.verdict is not Verdict.CRASHED, not row.breach, not impure, not failed, _rank(row)
-
-
-def _rank(row: Row) -> int:
-    return _RANK.get(row.property_id, -1)
+    rank: float = _RANK.get(row.property_id, -1)
+    if row.property_id in _SAME_ANSWER and rank < behind:
+        rank = behind + rank / len(ORDER)
+    return row.verdict is not Verdict.CRASHED, not row.breach, not impure, not failed, rank

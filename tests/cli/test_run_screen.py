@@ -13,6 +13,7 @@ from contactverif.cli.run_screen import RunScreen
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Row, Run
 from contactverif.contract.traits import PatchPromises, Promises, Traits
+from contactverif.run.telling import by_telling
 
 CHEAP = ("purity", "balance.*", "patch.flat.*", "hard.node-hit", "swap", "scale", "unilateral")
 OPTIONS = (*(word for name in CHEAP for word in ("-p", name)), "--examples", "4", "--seed", "1")
@@ -109,3 +110,17 @@ def test_what_could_not_be_judged_is_not_called_wrong() -> None:
     with console.capture() as capture:
         console.print(RunScreen(Run((row,))))
     assert "mine: 1 not judged\nnot judged:\n  purity  stopped: 3 of 100 cases judged\n" in capture.get()
+
+
+def test_a_wrong_force_beside_an_exact_one_is_shown_before_two_answers_that_differ() -> None:
+    rows = [
+        Row("mine", load_property(name).info, verdict, True)
+        for name, verdict in (
+            ("mirror", Verdict.FAIL),
+            ("patch.flat.resultant", Verdict.FAIL),
+            ("purity", Verdict.FAIL),
+        )
+    ]
+    assert [row.property_id for row in by_telling(rows)] == ["purity", "patch.flat.resultant", "mirror"]
+    alone = [rows[0], Row("mine", load_property("patch.flat.resultant").info, Verdict.PASS, True)]
+    assert by_telling(alone)[0].property_id == "mirror"
