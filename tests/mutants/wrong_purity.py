@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from handles import ReusesItsHandle
 from mutate import Mutant, replaces, wrap
-from subjects import Changed
+from subjects import Changed, ResidualAlone
 
 import contactverif_nts
 from contactverif.contract.arrays import dense
@@ -50,6 +50,18 @@ def _keeps_first_interface(*, penalty: float) -> Any:
         return right(first.setdefault(interface.nodes.shape, interface), pairing, z)
 
     return wrap(penalty, residual=residual)
+
+
+class _KeepsFirstLengths(ResidualAlone):
+    """Springs as stiff as if the longest slave segment were that of the first residual of an instance."""
+
+    first: float | None = None
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        ends = z[: interface.n_unknowns].reshape(-1, 2)[interface.slave.segments]
+        length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1).max())
+        self.first = length if self.first is None else self.first
+        return super().residual(interface, pairing, z) * (self.first / length)
 
 
 def _caches_by_positions(*, penalty: float) -> Any:
@@ -187,6 +199,8 @@ MUTANTS = (
         )
     ),
     Mutant("residual of the first interface", PURITY, _keeps_first_interface),
+    Mutant("lengths of the first residual, kept by segment", PURITY,
+           lambda *, penalty: _KeepsFirstLengths(contactverif_nts.vts_ppt_balanced(penalty=penalty))),
     Mutant("residual kept by its positions alone", PURITY, _caches_by_positions),
     Mutant("penalty of the last instance", PURITY, _shares_its_penalty),
     Mutant("residual kept for any penalty", PURITY, _shares_its_answers),

@@ -20,14 +20,16 @@ from contactverif.contract.subject import CheckedFormulation
 BOTH = "residual_and_tangent"
 # The questions are two states of one interface, 0 and 1, and a state of another interface, 2. The first and the last
 # call before a question, of any method, on its interface or on any, differ between the orders for at least one
-# question. So a memory of such a call shows. The first order ends with its first question again, after contact points.
+# question. So a memory of such a call shows. The second order begins with positions that the first does not begin with
+# (those of 2 are those of 0), so that what the first call fills for good differs. The first order ends with its first
+# question again, after contact points.
 _ORDERS = (
     (
         *(("residual", 0), ("tangent", 1), ("residual", 2), ("tangent", 0), ("residual", 1), (BOTH, 0), (BOTH, 1)),
         *(("contact_points", 0), ("contact_points", 1), ("residual", 0)),
     ),
     (
-        *(("contact_points", 1), ("residual", 2), ("residual", 1), ("tangent", 0), ("tangent", 1)),
+        *(("contact_points", 1), ("residual", 1), ("tangent", 0), ("residual", 2), ("tangent", 1)),
         *(("residual", 0), ("contact_points", 0), (BOTH, 1), (BOTH, 0)),
     ),
 )
