@@ -103,6 +103,10 @@ def verify(
     >>> report.count("fails as stated")
     2
     """
+    if not isinstance(place, Interface | Case | None):
+        raise MisuseError(
+            "place", _describe(place), "an Interface or a Case: `read_interface` and `read_scene` make them"
+        )
     questions = _load_questions(properties)
     items = _items(formulations, "formulations", _FORMULATIONS)
     names = [item for item in items if isinstance(item, str)]

@@ -128,7 +128,7 @@ def indent_below(title: str, *lines: str) -> Text:
 
 def fold(words: str, width: int, style: str = "", *, indent: int = 6) -> Text:
     """Return words of any length, indented, to stand below a line."""
-    lines = textwrap.wrap(words, max(width - indent, 20))
+    lines = textwrap.wrap(words, max(width - indent, 20), break_on_hyphens=False)
     return line("\n".join(" " * indent + each for each in lines), style)
 
 

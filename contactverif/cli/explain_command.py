@@ -20,7 +20,9 @@ def explain(
     *,
     name: Annotated[
         str | None,
-        typer.Argument(help="A property, a term or a symbol.", metavar="NAME", autocompletion=complete_property),
+        typer.Argument(
+            help="A property, a term, a symbol or a trait.", metavar="NAME", autocompletion=complete_property
+        ),
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="A report, whose numbers are put into the tolerances.", metavar="REPORT")
@@ -28,7 +30,7 @@ def explain(
     case: CaseId = None,
     isolation: IsolationOptions,
 ) -> None:
-    """Explain a property or a term; without NAME, list the terms.
+    """Explain a property, a term or a trait; without NAME, list the terms.
 
     Of a property it says what is asked and why, the tolerance with its
     reasons, and who is known to fail. With --report come the numbers of the
@@ -44,8 +46,8 @@ def explain(
       contactverif explain balance.force --report ppt.nc
       contactverif explain --report ppt.nc --case vts-ppt.balance.force
     """
-    from contactverif.contract.names import unknown_name_error
-    from contactverif.explanations.terms import list_of_terms, symbol_meanings, term_text, term_texts
+    from contactverif.explanations.terms import list_of_terms, term_text
+    from contactverif.explanations.trait_text import trait_text
     from contactverif.plugins.registry import property_ids
 
     run, examples = _read(name, report, case)
@@ -55,10 +57,25 @@ def explain(
         _explain_property(name, run, examples, report, isolation)
     elif name is None:
         _show(list_of_terms())
-    elif text := term_text(name):
+    elif text := term_text(name) or trait_text(name):
         _show(text)
     else:
-        raise unknown_name_error("NAME", name, [*property_ids(), *term_texts(), *symbol_meanings()])
+        raise _unknown(name)
+
+
+def _unknown(name: str) -> MisuseError:
+    """Return the error for a name that nothing explains."""
+    from difflib import get_close_matches
+
+    from contactverif.explanations.terms import symbol_meanings, term_texts
+    from contactverif.explanations.trait_text import trait_names
+    from contactverif.plugins.registry import property_ids
+
+    names = [*property_ids(), *dict.fromkeys([*term_texts(), *symbol_meanings(), *trait_names()])]
+    if near := get_close_matches(name, names):
+        return MisuseError("NAME", repr(name), f"a name that exists; the nearest: {', '.join(near)}")
+    needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
+    return MisuseError("NAME", repr(name), needed)
 
 
 def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run | None, list[Counterexample]]:
@@ -85,7 +102,7 @@ def _examples_of(name: str | None, run: Run, report: Path) -> list[Counterexampl
 
     every = counterexamples(run).values()
     examples = [example for example in every if example.property_id == name]
-    if not examples:
+    if not examples and name not in {row.property_id for row in run.rows}:
         failing = ", ".join(dict.fromkeys(example.property_id for example in every))
         needed = f"one of which {report} has a counterexample: {failing}" if failing else "no --report"
         raise MisuseError("NAME", "nothing" if name is None else repr(name), needed)
@@ -107,6 +124,8 @@ def _explain_property(
 
     question = the_property(name)
     _show(property_text(question))
+    if run is not None and not examples:
+        _say_results(name, run)
     for example in examples:
         say("")
         diagnosis = run.diagnoses.get(example.formulation, "") if run is not None else ""
@@ -115,6 +134,15 @@ def _explain_property(
     say("")
     # The formulations come last, because a reader need not wait until they are loaded.
     _show(stated_failures(question, load_formulations(isolation.limits())))
+
+
+def _say_results(name: str, run: Run) -> None:
+    """Say how each formulation of a report did, where no counterexample shows it."""
+    from contactverif.cli.console import say
+
+    for row in run.rows:
+        if row.property_id == name:
+            say(f"\n{row.formulation}: {row.result}{': ' if row.reason else ''}{row.reason}")
 
 
 def _show(markdown: str) -> None:

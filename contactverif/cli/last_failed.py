@@ -13,16 +13,19 @@ if TYPE_CHECKING:
 
 
 def ask_what_failed(job: VerifyJob) -> int:
-    """Judge the remembered failures of a job, show what became of them, and return 1 if one is left, else 0."""
+    """Judge what a job remembers, show what became of it, and return 1 if a promise is not kept, else 0."""
     from contactverif.cli.console import show
     from contactverif.cli.run_endings import show_what_plugins_printed
     from contactverif.cli.run_screen import RunScreen
     from contactverif.run.failure_memory import FailureMemory
 
-    if job.files.names or job.resumes or job.place is not None:
-        raise MisuseError(
-            "--last-failed", "--out, --resume, a mesh or a scene beside it", "--last-failed without these"
-        )
+    options = {
+        "--out": job.files.names and not job.resumes,
+        "--resume": job.resumes,
+        "a mesh or a scene": job.place is not None,
+    }
+    if others := [option for option, is_there in options.items() if is_there]:
+        raise MisuseError("--last-failed", f"{' and '.join(others)} beside it", "--last-failed alone")
     names, memory = (job.options.names, job.options.properties), FailureMemory()
     failures = memory.recall(*names)
     if not failures:
@@ -34,7 +37,7 @@ def ask_what_failed(job: VerifyJob) -> int:
     show(RunScreen(result))
     left = len(memory.recall(*names))  # What cannot be judged now is left, too.
     show(f"{left} of {len(failures)} failures of earlier runs are left.")
-    return 1 if left else 0
+    return 0 if result.promises_kept else 1
 
 
 def _judge(job: VerifyJob, failures: Failures) -> Run:

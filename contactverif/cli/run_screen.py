@@ -34,6 +34,7 @@ from contactverif.run.telling import by_telling, most_telling, wrong_rows
 _MOST_ROWS = 12  # The rows of a part that have a line each.
 _MOST_WRONG = 8  # The same of those that are wrong beside the most telling one.
 _MOST_IDS = 4  # The ids of a family that are listed in a sentence.
+_LEAST_NAME = 12  # Columns of the name of a number that are left.
 _LEAST_WORDS = 30  # Columns that are left for words beside a name, however long it is.
 _PARTS = {  # The results that show no mistake and have a line for each row, and the title above them.
     Result.FAIL: "fails, and promises nothing",
@@ -114,7 +115,7 @@ def _other_failures(rows: Sequence[Row], width: int, *, in_full: bool) -> Iterat
     """Yield the failures that break no promise, and what was left open; in full with a line for each."""
     for result, title in _PARTS.items():
         part = by_telling(row for row in rows if row.result is result)
-        if in_full:
+        if in_full or result is Result.NOT_JUDGED:  # Such a row makes a run fail, too: its reason is wanted.
             yield from _part(title, part, width)
         elif part:
             yield fold(f"{title}: {', '.join(row.property_id for row in part)}", width, indent=0)
@@ -128,9 +129,8 @@ def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -
     listed = rows if len(rows) <= most + 1 else rows[:most]
     names = max(len(row.property_id) for row in listed)
     for row in listed:
-        words = _words(row)
         room = max(width - names - 4, _LEAST_WORDS)
-        text = line(f"  {row.property_id:{names}}  {words if len(words) <= room else words[: room - 1] + '…'}".rstrip())
+        text = line(f"  {row.property_id:{names}}  {_words(row, room)}".rstrip())
         text.stylize(STYLES.get(row.result, ""), 2, 2 + len(row.property_id))
         yield text
     if others := rows[len(listed) :]:
@@ -145,15 +145,23 @@ def _remarks(rows: Sequence[Row], width: int) -> Iterator[Text]:
             yield fold(f"{row.property_id} passes, and says: {words}", width, "yellow", indent=0)
 
 
-def _words(row: Row) -> str:
-    """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none."""
-    number = row.closest.number if row.closest is not None else None
-    parts = [] if row.unexpected in ("", BROKEN_BY_FAILING, NOT_JUDGED) else [row.unexpected]
-    if row.verdict is Verdict.FAIL and not row.breach and number is not None:
-        parts.append(f"{number.quantity.name} {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}")
-    elif row.reason:
-        parts.append(row.reason)
-    return "; ".join([*parts, *([f"known: {row.known}"] if row.known else [])])
+def _words(row: Row, room: int) -> str:
+    """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none.
+
+    Where there is no room for all, it is the name of the number that is cut.
+    """
+    before = f"{row.unexpected}; " if row.unexpected not in ("", BROKEN_BY_FAILING, NOT_JUDGED) else ""
+    behind = f"; known: {row.known}" if row.known else ""
+    if row.verdict is not Verdict.FAIL or row.breach or row.closest is None or row.fails_in_words:
+        return _shorten(f"{before}{row.reason}{behind}".removesuffix("; "), room)
+    number = row.closest.number
+    behind = f" {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}{behind}"
+    return _shorten(f"{before}{_shorten(number.quantity.name, room - len(before) - len(behind))}{behind}", room)
+
+
+def _shorten(words: str, room: int) -> str:
+    """Return words that fit, with an ellipsis at their end where they do not."""
+    return words if len(words) <= room else f"{words[: max(room, _LEAST_NAME) - 1].rstrip()}…"
 
 
 def _families(rows: Sequence[Row], width: int) -> Iterator[Text]:

@@ -174,7 +174,7 @@ def remark_of(row: Row) -> str:
     parts = [
         row.unexpected if row.result is Result.BROKEN_PROMISE else "",
         f"known: {row.known}" if row.known else "",
-        row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) else "",
+        row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) or row.fails_in_words else "",
         f"fails in: {_list(row.failing_names)}" if row.failing_names else "",
         f"{row.undecided} undecided" if row.undecided else "",
         f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",

@@ -245,6 +245,11 @@ class Row:
         return self.tally.closest
 
     @property
+    def fails_in_words(self) -> bool:
+        """True if the row fails although every number keeps its tolerance: its reason says what is wrong."""
+        return self.verdict is Verdict.FAIL and (self.closest is None or self.closest.number.ratio <= 1)
+
+    @property
     def closest_name(self) -> str:
         """The name of the planned case with the closest number; empty if the case has none, or is the witness."""
         if self.closest is None or self.closest.case is None:

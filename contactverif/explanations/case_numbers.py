@@ -126,10 +126,12 @@ def _number_line(number: CheckedNumber, numbers: Mapping[str, float]) -> str:
     quantity, tolerance = number.quantity, f"{number.tolerance:.3g}"
     symbols = symbols_of(quantity.tolerance)
     known = [f"{symbol} = {numbers[symbol]:.3g}" for symbol in symbols if symbol in numbers and symbol != "g"]
+    formula, _, further = quantity.tolerance.partition("; ")
     if filled := _formula_that_fits(number, numbers):
-        tolerance = f"{quantity.tolerance} = {filled} = {tolerance}"
+        tolerance = f"{formula} = {filled} = {tolerance}"
     elif symbols:
-        tolerance = f"{quantity.tolerance} = {tolerance}{', where the case has ' if known else ''}{', '.join(known)}"
+        tolerance = f"{formula} = {tolerance}{', where the case has ' if known else ''}{', '.join(known)}"
+    tolerance += f" ({further})" if further else ""
     return f"- **{plain(quantity.name)}:** {number.value:.3g}, must be {quantity.sense} {plain(tolerance)}."
 
 

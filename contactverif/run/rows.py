@@ -273,19 +273,26 @@ def open_row(
         )
     if source is None:
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=f"{NOT_HERE}{_needs_of(question, sampling)}")
-    if stopped:
-        return replace(row, verdict=Verdict.NOT_JUDGED, reason=f"{OMITTED}{stopped}")
     # The formulation fails on some scene, not on every one, and where it reports what shows it.
     if promise is False and (_is_on_scene(question, sampling) or question.shown_by - subject.provides):
         row = replace(row, promise=None)
-    return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None))
+    return _with_witness(OpenRow(row, subject, question, source if isinstance(source, tuple) else None), stopped)
+
+
+def lacks_witness(subject: Subject, question: Property, sampling: Sampling) -> bool:
+    """Return whether a formulation states that it fails, and names no case that shows so, where it is asked for one."""
+    if question.refusal(subject.traits) or (question.needs | question.shown_by) - subject.provides:
+        return False
+    stated = question.promise(subject.traits) is False and not _is_on_scene(question, sampling)
+    return stated and subject.traits.witness(question.id) is None
 
 
 def _traits_of_promise(question: Property, subject: Subject) -> str:
     """Return the traits from which a promise to pass follows, in words."""
     if not question.promise(subject.traits):
         return ""
-    return ", ".join(f"{name}={value!r}" for name, value in traits_behind(question.promise, subject.traits).items())
+    traits = traits_behind(question.promise, subject.traits)
+    return ", ".join(f"{name}={value!r}" for name, value in traits.items() if value is not False)
 
 
 def row_of_case(question: Property, subject: Subject, outcome: Outcome) -> Row:
@@ -312,14 +319,17 @@ def _needs_of(question: Property, sampling: Sampling) -> str:
     return needs_of_place(question.cases)
 
 
-def _with_witness(row: OpenRow) -> OpenRow | Row:
-    """Return a row with the case that proves what the formulation states, if it states that it fails."""
+def _with_witness(row: OpenRow, stopped: str) -> OpenRow | Row:
+    """Return a row with the case that proves what the formulation states, if it states that it fails.
+
+    Where the formulation is asked nothing more, only a missing case is reported.
+    """
     try:
         witness = find_witness(row.subject, row.question, row.listed or ()) if row.row.promise is False else None
     except MisuseError as error:
         return replace(row.row, verdict=Verdict.CRASHED, reason=f"{OF_TRAITS}{error}")
     row.set_witness(witness)
-    return row
+    return replace(row.row, verdict=Verdict.NOT_JUDGED, reason=f"{OMITTED}{stopped}") if stopped else row
 
 
 def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -> Case:

@@ -35,6 +35,7 @@ from contactverif.run.rows import (
     OpenRow,
     Shrinking,
     judge_cases,
+    lacks_witness,
     open_row,
     row_of_case,
     shrink_case,
@@ -95,6 +96,7 @@ class RunJobs:
         look_at_journal(self._journal, self._subjects, self._questions, self._sampling, scheduler)
         if not self._keep_going:
             self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
+            self._stopped |= self._without_witnesses()
         scheduler.work(self._earlier_failures())
         if not self._keep_going:
             # All jobs of these properties end before it is known who is asked more, so that it does not depend on time.
@@ -104,6 +106,12 @@ class RunJobs:
         scheduler.work(self)
         if self._share is None:
             scheduler.work(self._explain_most_telling())
+
+    def _without_witnesses(self) -> dict[str, str]:
+        """Return why formulations are not asked that state a failure and name no case that shows it."""
+        pairs = product(self._subjects, self._questions)
+        lacking = [subject.name for subject, question in pairs if lacks_witness(subject, question, self._sampling)]
+        return dict.fromkeys(lacking, "the traits state a failure without a witness")
 
     def _stop_wrong(self) -> None:
         """Note the formulations of which the first properties have shown what may explain every failure to come."""

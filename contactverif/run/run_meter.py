@@ -30,6 +30,8 @@ class RunMeter:
         self._cases, self._seconds = Counter[tuple[bool, bool]](), defaultdict[tuple[bool, bool], float](float)
         self._started: float | None = None
         for subject, question in product(subjects, questions):
+            if sampling.interface is not None and sampling.source(question) is None:
+                continue  # It has no cases on this mesh.
             is_list = sampling.interface is None and getattr(question.cases, "is_list", False)
             self._kinds[question.id] = question.bodies, is_list
             if not (question.refusal(subject.traits) or question.needs - subject.provides):

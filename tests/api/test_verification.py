@@ -154,3 +154,8 @@ def test_the_place_of_the_project_is_that_of_a_name(tmp_path: Any, monkeypatch: 
     with pytest.raises(MisuseError, match="found 'jail'; needed box, landlock, process or inline"):
         verify("vts-me", FORCES)
     assert verify([load_formulation("vts-me")], FORCES, examples=2, seed=1).rows  # It is here already.
+
+
+def test_a_name_is_no_place() -> None:
+    with pytest.raises(MisuseError, match=r"place: found .*; needed an Interface or a Case: `read_interface`"):
+        verify("nts", "purity", place="own.msh")  # type: ignore[arg-type]

@@ -401,7 +401,7 @@ def test_the_bar_is_for_a_terminal_and_leaves_a_pipe_alone() -> None:
     finally:
         os.close(ours)
     alone = subprocess.run(arguments, env=environment(), capture_output=True, text=True, check=True)
-    assert b"nts  purity" in shown_bytes
+    assert b"nts purity: judging" in shown_bytes
     assert out == alone.stdout
     assert "\x1b" not in out
     assert "\r" not in out

@@ -12,12 +12,13 @@ from contactverif.cli.console import QuietConsole
 from contactverif.cli.run_tables import _COLUMNS
 from contactverif.cli.terminal_markdown import TerminalMarkdown
 from contactverif.contract.result import Result
+from contactverif.contract.traits import Traits
 from contactverif.explanations.known_failures import planted_mistakes, smallest_mesh, stated_failures
 from contactverif.explanations.terms import symbol_meanings, term_text, term_texts
 from contactverif.plugins import registry
 from contactverif.plugins.registry import load_formulations, property_ids
 
-COLUMNS = 80
+COLUMNS, OPTIONS = 80, ("--seed", "1", "--examples", "3")
 INSTALLED = load_formulations()
 HOOKS = Path(__file__).parents[2] / "docs" / "hooks"
 PARTS = ("Question.", "Why it matters.", "How it is judged.", "Undecided.", "Source.", "Promised by:", "Usual causes:")
@@ -93,7 +94,7 @@ def test_the_failures_that_are_known_come_from_traits_and_from_the_tables_of_pla
 @pytest.fixture
 def report(ask: Ask, tmp_path: Path) -> Path:
     path = tmp_path / "nts.nc"
-    ask("verify", "nts", "-p", "patch.flat.transmission", "-p", "swap", "--seed", "1", "--examples", "3", "--out", path)
+    ask("verify", "nts", "-p", "patch.flat.transmission", "-p", "swap", "-p", "purity", *OPTIONS, "--out", path)
     return path
 
 
@@ -120,10 +121,11 @@ def test_a_mistake_is_answered_with_what_is_needed(report: Path, ask: Ask) -> No
     nearest = "needed a name that exists; the nearest:"
     failing = r"needed one of which \S+ has a counterexample: .*swap.*"
     for arguments, message in (
-        (["witnes"], rf"NAME: found 'witnes'; {nearest} witness"),
+        (["witnes"], rf"NAME: found 'witnes'; {nearest} witness.*"),
         (["patch.flat.noda"], rf"NAME: found 'patch.flat.noda'; {nearest} patch.flat.nodal.*"),
         (["swap", "--case", "nts.swap"], r"--report: found nothing; needed the report that has the case 'nts.swap'"),
-        (["purity", "--report", report], rf"NAME: found 'purity'; {failing}"),
+        (["xyzzy"], "NAME: found 'xyzzy'; needed a property, a term, a symbol or a trait; .*"),
+        (["scale", "--report", report], rf"NAME: found 'scale'; {failing}"),
         (["--report", report], rf"NAME: found nothing; {failing}"),
         (["swap", "--report", report, "--case", "nts.swa"], r"--case: found 'nts.swa'; needed an id like nts.swap.*"),
         (
@@ -132,3 +134,16 @@ def test_a_mistake_is_answered_with_what_is_needed(report: Path, ask: Ask) -> No
         ),
     ):
         check_mistake(ask("explain", *arguments), message)
+
+
+def test_a_trait_is_explained_by_the_words_of_its_group(ask: Ask) -> None:
+    answer = ask("explain", "flat=True", columns=COLUMNS)
+    assert answer.status == 0
+    assert "Traits(promises=Promises(patch=PatchPromises(flat=" in answer.out
+    assert "the master covers the slave" in " ".join(answer.out.split())
+    assert all(ask("explain", name).status == 0 for name in Traits().by_name())
+
+
+def test_a_row_without_a_counterexample_is_explained_with_its_result(report: Path, ask: Ask) -> None:
+    answer = ask("explain", "purity", "--report", report)
+    assert (answer.status, "\nnts: pass\n" in answer.out) == (0, True)

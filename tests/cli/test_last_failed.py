@@ -67,7 +67,7 @@ def test_nothing_is_kept_without_a_memory(ask: Ask, folder: Path) -> None:
 def test_what_cannot_be_judged_is_left(ask: Ask, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert ask("verify", "mine", *OPTIONS, "--seed", "1").status == 1
     check_mistake(
-        ask("verify", "mine", *OPTIONS, "--last-failed", "--out", "mine.nc"), "--last-failed: found --out, .*"
+        ask("verify", "mine", *OPTIONS, "--last-failed", "--out", "mine.nc"), "--last-failed: found --out beside it; .*"
     )
     install_formulations(monkeypatch, mine="no_such_module:make")
     answer = ask("verify", "mine", *OPTIONS, "--last-failed")

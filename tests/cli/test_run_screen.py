@@ -10,9 +10,11 @@ from subjects import ResidualAlone, load_property
 import contactverif_nts
 from contactverif.cli.console import QuietConsole
 from contactverif.cli.run_screen import RunScreen
-from contactverif.contract.property import Verdict
+from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Row, Run
 from contactverif.contract.traits import PatchPromises, Promises, Traits
+from contactverif.problems.named_states import named_case
 from contactverif.run.telling import by_telling
 
 CHEAP = ("purity", "balance.*", "patch.flat.*", "hard.node-hit", "swap", "scale", "unilateral")
@@ -124,3 +126,17 @@ def test_a_wrong_force_beside_an_exact_one_is_shown_before_two_answers_that_diff
     assert [row.property_id for row in by_telling(rows)] == ["purity", "patch.flat.resultant", "mirror"]
     alone = [rows[0], Row("mine", load_property("patch.flat.resultant").info, Verdict.PASS, True)]
     assert by_telling(alone)[0].property_id == "mirror"
+
+
+def test_a_failure_in_words_is_not_shown_by_a_number_that_keeps_its_tolerance() -> None:
+    question = load_property("hard.free-end")
+    number = next(iter(question.info.quantities)).check(0.5, 4.0)
+    case = named_case("a1")
+    measured = Measurement([number], broken="a force of 2 on a slave that faces no master")
+    outcomes = (Outcome(case, Verdict.FAIL, measured.broken, measured),)
+    other = Row("mine", load_property("purity").info, Verdict.FAIL, True, reason="it remembers")
+    row = Row("mine", question.info, Verdict.FAIL, True, reason=measured.broken, planned=1, outcomes=outcomes)
+    console = QuietConsole(COLUMNS)
+    with console.capture() as capture:
+        console.print(RunScreen(Run((other, row))))
+    assert "hard.free-end  a force of 2 on a slave that faces no master\n" in capture.get()

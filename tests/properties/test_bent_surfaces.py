@@ -243,3 +243,18 @@ def test_multipliers_whose_inf_sup_constant_falls_promise_no_mean_on_rings(name:
     assert any(outcome.verdict is Verdict.FAIL for outcome in outcomes)
     assert question.promise(subject.traits) is None
     assert question.promise(load_subject("mortar-lm").traits) is True
+
+
+def test_springs_beside_multipliers_are_no_force_on_an_arc() -> None:
+    """An augmented form, λ − c g, has half of its force from springs where both press alike."""
+
+    def add_springs(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.array(right(interface, pairing, z))
+        n = interface.n_unknowns
+        springs = load_subject("mortar").with_penalty(1.0).plugin
+        positions = np.asarray(z)[..., :n]
+        forces[..., :n] += springs.residual(interface, springs.pair(interface, np.real(positions)), positions)
+        return forces
+
+    subject = change("mortar-lm", residual=add_springs)
+    assert [outcome.verdict for outcome in judge_all("accuracy.arc", subject)] == [Verdict.PASS] * 2

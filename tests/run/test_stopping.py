@@ -4,14 +4,16 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
-from subjects import ResidualAlone, load_property
+from subjects import Changed, ResidualAlone, load_property
 
 import contactverif_nts
 from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Promises, Traits
 from contactverif.run.run import run
+from contactverif_nts import nts
 
+FAILS = Promises(conserves_force=False)
 IDS = ("balance.force", "hard.node-hit", "purity")
 
 
@@ -68,3 +70,18 @@ def test_a_known_failure_stops_nothing() -> None:
 def test_what_is_asked_alone_is_asked() -> None:
     (row,) = judge_few("state", ids=("hard.node-hit",)).rows
     assert row.judged == row.planned > 0
+
+
+def test_traits_that_name_no_witness_are_told_before_anything_is_asked() -> None:
+    """The person mends the traits first; what else there is would have to be asked again."""
+    questions = [load_property(id_) for id_ in IDS]
+    unproven = Subject("mine", lambda *, penalty: Changed(nts(penalty=penalty), traits=Traits(FAILS)))
+    for keep_going, others in ((False, Result.OMITTED), (True, Result.PASS)):
+        rows = {
+            row.property_id: row
+            for row in run([unproven], questions, examples=4, seed=1, keep_going=keep_going, shrink="none").rows
+        }
+        assert rows["balance.force"].result is Result.WRONG_TRAITS
+        assert "witness" in rows["balance.force"].reason
+        assert rows["purity"].result is others
+    assert rows["purity"].judged == 4
