@@ -6,6 +6,8 @@ a normal meets the master once, and penetrations are small against its segments:
 
 from __future__ import annotations
 
+from itertools import pairwise, product
+
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
@@ -21,6 +23,7 @@ _MASTER = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=3)
 _SLOPES = st.lists(st.integers(1, 8), min_size=2, max_size=5)  # Sixteenths; their signs alternate along the master.
 _DEPTHS = st.lists(st.integers(1, 8), min_size=1, max_size=3)  # Thirty-seconds of the unit length.
 _PLACES = st.integers(0, 12)
+_PARALLEL = 2.0**-10  # The largest difference of parallel slopes: what opens in so short a time looks like a jump.
 _MARGIN = 3.0  # The length of master on both sides of what the slave passes.
 
 
@@ -29,7 +32,8 @@ _MARGIN = 3.0  # The length of master on both sides of what the slave passes.
 def sliding_cases(draw: DrawFn) -> Case:
     """Return slaves that slide along a bent master by the length of a segment; None for a given mesh.
 
-    The parameter "path" (n_unknowns,) holds the way of each node, a length each: states are z + t path, 0 ≤ t ≤ 1.
+    The parameter "path" (n_unknowns,) holds the way of each node, a length each: states are z + t path, 0 ≤ t ≤ 1. The
+    parameter "opens" is 1 if a length of the slave leaves the master in one moment of the way, or enters it, else 0.
     """
     steps = draw(_SLAVE)
     way = max(steps)
@@ -44,7 +48,24 @@ def sliding_cases(draw: DrawFn) -> Case:
     nodes = np.vstack([slave, line[::-1]])
     moved = nodes + np.where(np.arange(len(nodes)) < len(slave), way, 0.0)[:, None] * [1.0, 0.0]
     z, end = motion(nodes[order]).reshape(-1), motion(moved[order]).reshape(-1)
-    return Case(interface, z, penalty, {"path": end - z}, seed)
+    opens = _opens_at_once(slave, line, way)
+    return Case(interface, z, penalty, {"path": end - z, "opens": np.array(float(opens))}, seed)
+
+
+def _opens_at_once(slave: FloatArray, line: FloatArray, way: float) -> bool:
+    """Return whether a length of the slave (n, 2), which slides by a way, leaves the line (m, 2) in one moment.
+
+    It is parallel to a segment of the line then, and both are in touch there after a share of the way.
+    """
+    for (a, b), (p, q) in product(pairwise(slave), pairwise(line)):
+        slope, other = ((end[1] - start[1]) / (end[0] - start[0]) for start, end in ((a, b), (p, q)))
+        if abs(slope - other) > _PARALLEL:
+            continue
+        share = (a[1] - p[1] + other * (p[0] - a[0])) / (slope * way)
+        overlap = min(q[0], b[0] + share * way) - max(p[0], a[0] + share * way)
+        if -_PARALLEL <= share <= 1 + _PARALLEL and overlap > 0:
+            return True
+    return False
 
 
 def _bent_line(lengths: list[float], slopes: list[int], start: float, end: float) -> FloatArray:

@@ -6,7 +6,8 @@ At a kink two right formulations may give different forces. What they have in co
 - No gap is longer than the interface, so no force is larger than the springs on that gap.
 - Where `penalty` and `area` are stated, weights are positive and add up to the slave's length. So the total lies
   between the least and the largest gap times that length. A formulation that states its rule for gaps (`gap`) gets the
-  bounds of a push along normals of segments; any other gets those of any direction in between.
+  bounds of a push along normals of segments. Any other gets those of any direction in between on a straight master,
+  and none at a kink, since it may smooth the master there.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ def measure_bounded(case: Case, subject: Subject) -> Measurement:
         broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
     else:
         numbers.append(DIRECTION.check(ratio(_outside(total, case.parameters["edges"]), size), tolerance))
-        if knows_total(subject.traits):
+        # A master that is smoothed through its nodes bulges at a kink, and who states no rule for gaps may do that.
+        straight = bool((case.parameters["edges"][0] == case.parameters["edges"][1]).all())
+        if knows_total(subject.traits) and (straight or subject.traits.rules.gap is not None):
             along = float(total @ case.parameters["axis"])
             numbers.append(TOTAL.check(max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1]), tolerance))
     details = {"share of the upper bound": ratio(float(total @ case.parameters["axis"]), float(bounds[1]))}
@@ -92,9 +95,10 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The direction of a node's force may jump by the kink's angle as it crosses, since the nearest
     segment does. What every right formulation fulfils: each push is along a normal between those of the two segments,
     and each side has one gap, d cos a ∓ δ sin a (a half of the kink, d the depth straight down, δ the distance from the
-    bisector). So where `penalty` and `area` are stated, the vertical force is ε̂ L cos a times a number between these
-    two gaps, on both sides of the bisector: as δ goes to 0 it is continuous. A formulation that states no rule for gaps
-    may look straight up at the vertex, and is allowed the gap d there. The tolerance is u(8X/min(|g|, ℓ) + 4N).
+    bisector). So where `penalty`, `area` and `gap` are stated, the vertical force is ε̂ L cos a times a number between
+    these two gaps, on both sides of the bisector: as δ goes to 0 it is continuous. A formulation that states no rule
+    for gaps may smooth the master, which then bulges at the vertex, and is asked for the direction alone. The tolerance
+    is u(8X/min(|g|, ℓ) + 4N).
 
     **Undecided.** Never: on the bisector itself the bounds allow for either segment.
     """
@@ -113,9 +117,8 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** All gaps are d. Normals are along the axes, so the sum of both components of the total force
     is ε̂ d times the area that is felt: that of the parts that face a face along its normal at least, and the slave's
-    length at most. A formulation that states no rule for gaps may push along the diagonal, and may lose what is at the
-    node alone. No force pulls. The tolerance is u(8X/min(|g|, ℓ) + 4N). Totals are asked where `penalty` and `area` are
-    stated, directions of everybody.
+    length at most. No force pulls. The tolerance is u(8X/min(|g|, ℓ) + 4N). Totals are asked where `penalty`, `area`
+    and `gap` are stated, directions of everybody.
 
     **Undecided.** Never: which face takes the node is left open by the bounds.
     """

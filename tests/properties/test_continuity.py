@@ -12,7 +12,7 @@ from textbook_cells import ClippedCells, WeightedGaps
 from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
 from contactverif.sampling.draw import draw_cases
-from contactverif.strategies.sliding import sliding_cases
+from contactverif.strategies.sliding import _opens_at_once, sliding_cases
 from contactverif_properties.continuity import N_STEPS, continuity, find_jumps
 
 
@@ -72,3 +72,22 @@ def test_jumps_of_a_function_are_told_from_its_slope() -> None:
     jumps = find_jumps(function, samples, 20, 2.0**-12)
     sizes = {round(place, 4): size for place, size in jumps if size > 1e-3}
     assert sizes == {0.77: pytest.approx(4e-2, rel=1e-2), 0.3: pytest.approx(2e-2, rel=1e-2)}
+
+
+@pytest.mark.parametrize(("depth", "opens"), [(1 / 16, 1), (1 / 2, 0), (-1 / 16, 0)])
+def test_a_length_that_leaves_the_master_in_one_moment_opens(depth: float, opens: int) -> None:
+    """The slave is parallel to the second facet, and slides down its slope, by 1/4 in all."""
+    line = np.array([[-3.0, 0.0], [0.0, 0.75], [6.0, -0.75]])
+    slave = np.array([[1.0, 0.5 - depth], [3.0, -depth]])
+    assert _opens_at_once(slave, line, 1.0) == opens
+
+
+def test_the_slope_is_asked_on_most_ways() -> None:
+    cases = draw_cases(sliding_cases(), seed="1", examples=100).cases
+    opening = [case for case in cases if case.parameter("opens")]
+    assert 2 < len(opening) < 25
+    smooth = Subject("cloud", Cloud)
+    measured = [continuity.measure(case, smooth) for case in (opening[0], *cases[:8])]
+    with_slope = [len(measurement.numbers) == 2 for measurement in measured]
+    assert not with_slope[0]
+    assert sum(with_slope) >= 6
