@@ -14,6 +14,7 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.errors import ContractError
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
@@ -94,16 +95,16 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     """
     system = System(scene_of(case), subject.for_case(case))
     trace = solve(system.scene, system.formulation)
-    undecided = _find_excuse(trace)
+    undecided = _find_excuse(system, trace)
     for load_steps in newton_solution.LOAD_STEPS:  # Smaller load steps overshoot less, so that the pairing may settle.
         if not undecided:
             break
         trace = solve(system.scene, system.formulation, load_steps=load_steps)
-        undecided = _find_excuse(trace)
+        undecided = _find_excuse(system, trace)
     details, series = newton_solution.solution_details(trace), history(trace)
     if undecided:
         return Measurement(details=details, series=series, undecided=undecided)
-    begin = _first_final_iterate(trace)
+    begin = _first_final_iterate(system, trace)
     arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NOISE))
     iterations = float(max(arrived[0] - begin, 0)) if _is_solved(trace) else inf
     details["finite"] = float(iterations <= 1)
@@ -115,18 +116,32 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     )
 
 
-def _settling_iterate(trace: Trace) -> int:
-    """Return the last iterate at which the pairing changed, or 0."""
-    return int(np.flatnonzero(trace.changes > 0)[-1]) if (trace.changes > 0).any() else 0
+def _settling_iterate(system: System, trace: Trace) -> int:
+    """Return the last iterate at which the pairing changed in more than entries that no force depends on, or 0."""
+    for number in np.flatnonzero(trace.changes > 0)[::-1].tolist():
+        if not _gives_same_forces(system, trace.u[number], trace.pairings[number], trace.pairings[number - 1]):
+            return int(number)
+    return 0
+
+
+def _gives_same_forces(system: System, u: FloatArray, pairing: Pairing | None, other: Pairing | None) -> bool:
+    """Return whether two pairings give the same forces at u bit by bit: roundoff may decide what else they hold.
+
+    Far from its own state a pairing may give no forces at all.
+    """
+    try:
+        return pairing == other or bool((system.forces(u, pairing) == system.forces(u, other)).all())
+    except ContractError:
+        return False
 
 
 def _is_solved(trace: Trace) -> bool:
     return trace.converged or (trace.end is End.STAGNATED and bool(trace.roundings.min() <= NOISE))
 
 
-def _find_excuse(trace: Trace) -> str:
+def _find_excuse(system: System, trace: Trace) -> str:
     """Return why the solution decides nothing about the tangent, or an empty string."""
-    last, settled = len(trace.residuals) - 1, _settling_iterate(trace)
+    last, settled = len(trace.residuals) - 1, _settling_iterate(system, trace)
     if _is_solved(trace):
         return f"the pairing does not settle: {trace.end.label}" if settled == last > SHORT else ""
     if last - settled < LONG:
@@ -138,9 +153,9 @@ def _find_excuse(trace: Trace) -> str:
     return ""
 
 
-def _first_final_iterate(trace: Trace) -> int:
+def _first_final_iterate(system: System, trace: Trace) -> int:
     """Return the first iterate with the final pairing and a residual of at most NEAR of the first one."""
-    settled = _settling_iterate(trace)
+    settled = _settling_iterate(system, trace)
     near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
     near = near[near >= settled]
     return int(near[0]) if len(near) else settled
@@ -279,10 +294,10 @@ def spectral_radius(matrix: Any, exact: Any) -> float:
 def _pair_alike(
     system: System, case: Case, pairing: Pairing | None, states: Sequence[FloatArray], reaches: Sequence[float]
 ) -> list[bool]:
-    """Return which states pair as the solution does, or without a pairing, around which differences see no kink."""
+    """Return which states have the forces of the solution's pairing, or without one, around which there is no kink."""
     if pairing is not None:
         pairings = [system.pair(u) for u in states]  # All are asked for before one is looked at.
-        return [other == pairing for other in pairings]
+        return [_gives_same_forces(system, u, pairing, other) for u, other in zip(states, pairings, strict=True)]
     around = (replace(case, z=system.state(u), n_multipliers=system.n_multipliers) for u in states)
     return [
         not find_kink(FrozenState(system.formulation, state, None), reach)

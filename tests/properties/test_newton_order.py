@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, judge_as, load_subject
+from subjects import Changed, change_verbs, judge_as, load_subject
 
 import contactverif_nts
 from contactverif import End, Rectangle, Subject, Trace, Verdict, judge_case, solve, two_blocks
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.pairing import Pairing
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
@@ -186,3 +187,19 @@ def test_where_there_is_no_solution_there_is_one_under_less_load() -> None:
     """A jump of the forces lies where this scene would balance: the last of five cases with seed 17."""
     result = run([load_subject("vts-ppt")], [newton_attainable], examples=5, seed=17)
     assert result.rows[0].judged == 5
+
+
+def test_entries_of_the_pairing_that_change_no_force_leave_nothing_undecided() -> None:
+    """Roundoff decides such an entry at each call, as where a gap is 0 at a solution with multipliers."""
+    inner = load_subject("mortar-lm")
+
+    def pair(right: Any, interface: Any, z: Any) -> Pairing:
+        noise = np.array([hash(z.tobytes()) % 2])
+        return Pairing({**right(interface, z), "noise": noise})
+
+    noisy = Subject("noisy", lambda *, penalty: change_verbs(inner.with_penalty(penalty).plugin, pair=pair))
+    for question in (newton_order, newton_history):
+        [quiet_row], [row] = (
+            run([each], [question], examples=12, seed=3, shrink="none").rows for each in (inner, noisy)
+        )
+        assert (row.verdict, row.undecided) == (Verdict.PASS, quiet_row.undecided)
