@@ -376,6 +376,9 @@ class Run:
     @property
     def praise(self) -> str:
         """The sentence about a run whose promises are kept; what stayed undecided was not judged."""
+        unasked = {row.formulation for row in self.rows} - {row.formulation for row in self.rows if row.planned}
+        if unasked:
+            return f"Nothing was judged of {', '.join(sorted(unasked))}: no property applies. What was judged is kept."
         names = [f"{row.formulation} {row.property_id}" for row in self.rows if row.result is Result.UNDECIDED]
         if not names:
             return "Every promise is kept and every property was judged."

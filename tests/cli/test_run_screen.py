@@ -140,3 +140,11 @@ def test_a_failure_in_words_is_not_shown_by_a_number_that_keeps_its_tolerance() 
     with console.capture() as capture:
         console.print(RunScreen(Run((other, row))))
     assert "hard.free-end  a force of 2 on a slave that faces no master\n" in capture.get()
+
+
+def test_a_run_that_judges_nothing_does_not_say_that_all_was_judged() -> None:
+    info = load_property("purity").info
+    rows = (Row("barrier", info, Verdict.NOT_APPLICABLE, None, reason="not defined in penetration"),)
+    assert Run(rows).praise == "Nothing was judged of barrier: no property applies. What was judged is kept."
+    judged = Row("mine", info, Verdict.PASS, True, planned=1, outcomes=(Outcome(named_case("a1"), Verdict.PASS),))
+    assert Run((judged,)).praise == "Every promise is kept and every property was judged."
