@@ -29,7 +29,7 @@ _ORDERS = (
         *(("contact_points", 0), ("contact_points", 1), ("residual", 0)),
     ),
     (
-        *(("contact_points", 1), ("residual", 1), ("tangent", 0), ("residual", 2), ("tangent", 1)),
+        *(("contact_points", 1), ("residual", 1), ("residual", 2), ("residual", 1), ("tangent", 0), ("tangent", 1)),
         *(("residual", 0), ("contact_points", 0), (BOTH, 1), (BOTH, 0)),
     ),
 )
