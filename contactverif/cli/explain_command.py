@@ -65,17 +65,14 @@ def explain(
 
 def _unknown(name: str) -> MisuseError:
     """Return the error for a name that nothing explains."""
-    from difflib import get_close_matches
-
+    from contactverif.contract.names import unknown_name_error
     from contactverif.explanations.terms import symbol_meanings, term_texts
     from contactverif.explanations.trait_text import trait_names
     from contactverif.plugins.registry import property_ids
 
-    names = [*property_ids(), *dict.fromkeys([*term_texts(), *symbol_meanings(), *trait_names()])]
-    if near := get_close_matches(name, names):
-        return MisuseError("NAME", repr(name), f"a name that exists; the nearest: {', '.join(near)}")
+    names = {*property_ids(), *term_texts(), *symbol_meanings(), *trait_names()}
     needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
-    return MisuseError("NAME", repr(name), needed)
+    return unknown_name_error("NAME", name, names, needed)
 
 
 def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run | None, list[Counterexample]]:

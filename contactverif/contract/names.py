@@ -12,12 +12,17 @@ from typing import Any
 from contactverif.contract.errors import MisuseError
 
 
-def unknown_name_error(argument: str, name: str, names: Iterable[str]) -> MisuseError:
-    """Return the error for a name that does not exist; it suggests the nearest names, or lists all if none is near."""
+def unknown_name_error(argument: str, name: str, names: Iterable[str], otherwise: str = "") -> MisuseError:
+    """Return the error for a name that does not exist; it suggests the nearest names.
+
+    If none is near, it lists all, or says `otherwise` what is needed.
+    """
     every = sorted(names)
     near = difflib.get_close_matches(name, every, n=3)
     if near:
         return MisuseError(argument, repr(name), f"a name that exists; the nearest: {', '.join(near)}")
+    if otherwise:
+        return MisuseError(argument, repr(name), otherwise)
     return MisuseError(argument, repr(name), f"one of {', '.join(every)}" if every else "a name, but there is none")
 
 

@@ -80,9 +80,7 @@ class Progress:
     planned: int
     row: Row | None = None  # The row, once all its cases are judged.
     of_run: RunProgress | None = field(default=None, compare=False)  # How far the run is, with some steps.
-    first_seconds: float | None = (
-        None  # What a pairing and a residual took of a formulation that had been called before.
-    )
+    first_seconds: float | None = None  # Seconds of a pairing and a residual, once the formulation is warm.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -158,4 +158,4 @@ def test_the_place_of_the_project_is_that_of_a_name(tmp_path: Any, monkeypatch: 
 
 def test_a_name_is_no_place() -> None:
     with pytest.raises(MisuseError, match=r"place: found .*; needed an Interface or a Case: `read_interface`"):
-        verify("nts", "purity", place="own.msh")  # type: ignore[arg-type]
+        verify("nts", "purity", place="own.msh")  # type: ignore[arg-type]  # The mistake that is refused

@@ -249,6 +249,7 @@ def test_each_curve_with_a_colour_is_named_beside_its_end() -> None:
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6).map(sorted))
 def test_names_of_curves_do_not_overlap_and_stand_beside_the_panel(heights: list[float]) -> None:
     places = spread(heights)
+    # Heights are of the order of 1; 1e-9 is far above their roundoff, and far below what an eye sees.
     assert all(above - below >= ROOM * (1 - 1e-9) for below, above in pairwise(places))
     assert -1e-9 <= places[0] <= places[-1] <= 1.0 + 1e-9
     if all(above - below >= ROOM for below, above in pairwise(heights)):
