@@ -101,12 +101,19 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
     worst = max(everything, key=lambda outcome: badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         return worst.verdict, _reason_with_name(row, worst)
-    if row.judged < JUDGED_SHARE * (1 - row.info.usual_undecided) * row.planned:
+    if row.judged < _fewest_judged(row):
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
     if reason := _too_idle(row):
         return Verdict.NOT_JUDGED, reason
     return Verdict.PASS, ""
+
+
+def _fewest_judged(row: Row) -> float:
+    """Return the least number of judged cases. Of a few random ones, the one that cannot be judged comes by chance."""
+    fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * row.planned
+    is_list = any(outcome.case_or_summary.name for outcome in row.outcomes[:1])
+    return fewest if is_list else min(fewest, max(row.planned - 1, 1))
 
 
 def _too_idle(row: Row) -> str:
