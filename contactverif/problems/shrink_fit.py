@@ -1,4 +1,4 @@
-"""Two rings that are shrunk onto each other: Lamé's solution, and the scene of a quarter of them.
+"""Two rings that are shrunk onto each other: Lamé's solution, and the scene of a quarter of them, or of the whole.
 
 The pressure between the rings is uniform, and so are the gap and the force, but the interface is bent. That makes the
 rings the patch test of curved surfaces: a mesh of straight segments has an error there, which must vanish as it is
@@ -11,7 +11,8 @@ One force acts on both rings where action equals reaction. Two half passes give 
 own radius, and after the fit the radii differ by the penetration. `ShrinkFit.half_passes` is their fit.
 
 Rules for the next editor: `ShrinkFit` knows no mesh and no formulation, so that it can be used without the harness. The
-scene holds a quarter, cut along both lines of symmetry, so that nothing but contact loads the rings.
+scene holds a quarter, cut along both lines of symmetry, so that nothing but contact loads the rings. A cut has ends of
+both surfaces, and the foot of the slave's end may lie just past that of the master; whole rings have no ends.
 
 References
 ----------
@@ -186,9 +187,14 @@ def _plane_strain(young: float, poisson: float) -> tuple[float, float]:
 
 @cache
 def shrink_fit(
-    problem: ShrinkFit = ShrinkFit(), *, slave: Role = "inner", refine: float = 1, grading: float = GRADE
+    problem: ShrinkFit = ShrinkFit(),
+    *,
+    slave: Role = "inner",
+    refine: float = 1,
+    grading: float = GRADE,
+    quarters: Literal[1, 4] = 1,
 ) -> Scene:
-    """Return the scene of a quarter of both rings.
+    """Return the scene of a quarter of both rings, or of whole rings.
 
     Parameters
     ----------
@@ -200,6 +206,8 @@ def shrink_fit(
         The number of parts that each side of each cell is divided into; numbers of cells are rounded.
     grading : float
         The share by which the angles of the outer ring are graded.
+    quarters : Literal[1, 4]
+        The number of quarters.
 
     Returns
     -------
@@ -214,7 +222,7 @@ def shrink_fit(
     """
     if slave not in SEGMENTS:
         raise MisuseError("slave", repr(slave), "'inner' or 'outer'")
-    rings = {name: _ring(problem, name, refine, grading) for name in ("inner", "outer")}
+    rings = {name: _ring(problem, name, refine, grading, quarters) for name in ("inner", "outer")}
     order = ("inner", "outer") if slave == "inner" else ("outer", "inner")
     facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
     facts["outer_slave"] = np.array(float(slave == "outer"))
@@ -222,21 +230,32 @@ def shrink_fit(
 
 
 @cache
-def _ring(problem: ShrinkFit, ring: Role, refine: float, grading: float) -> Body:
-    """Return a quarter of a ring, nodes ring by ring from the inside, each from angle 0 to a quarter turn."""
+def _ring(problem: ShrinkFit, ring: Role, refine: float, grading: float, quarters: int) -> Body:
+    """Return a ring or a quarter of it, nodes ring by ring from the inside, each from angle 0 onwards.
+
+    A quarter is held across its cuts. Whole rings are held by as few nodes on the axes, away from contact.
+    """
     index = int(ring == "outer")
     contact = problem.contact_radii[index]
     limits = (contact, problem.outer_radius) if index else (problem.inner_radius, contact)
     n_segments, n_layers = round(SEGMENTS[ring] * refine), round(LAYERS[ring] * refine)
     radii, shares = np.linspace(*limits, n_layers + 1), np.linspace(0, 1, n_segments + 1)
     angles = pi / 2 * (shares + (grading if index else 0.0) * shares * (1 - shares))
-    directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    directions[-1] = 0.0, 1.0
-    number = np.arange((n_layers + 1) * (n_segments + 1)).reshape(n_layers + 1, n_segments + 1)
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])  # A row times this matrix is turned by a quarter.
+    quarter = np.column_stack([np.cos(angles), np.sin(angles)])[:-1]
+    whole, cut = quarters == 4, np.array([[0.0, 1.0]])
+    parts = [quarter @ np.linalg.matrix_power(turn, k) for k in range(quarters)]
+    directions = np.vstack(parts if whole else [*parts, cut])
+    number = np.arange((n_layers + 1) * len(directions)).reshape(n_layers + 1, -1)
+    fixed = np.zeros((*number.shape, 2), bool)
+    if whole:
+        free = fixed[-1 if index else 0]  # The circle without contact.
+        free[:: 2 * n_segments, 1] = free[n_segments :: 2 * n_segments, 0] = True
+        number = np.hstack([number, number[:, :1]])  # The last column is the first one.
+    else:
+        fixed[:, 0, 1] = fixed[:, -1, 0] = True
     cells = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
     edge = number[0, ::-1] if index else number[-1]
-    fixed = np.zeros((*number.shape, 2), bool)
-    fixed[:, 0, 1] = fixed[:, -1, 0] = True
     return Body(
         (radii[:, None, None] * directions).reshape(-1, 2),
         cells,
@@ -276,14 +295,17 @@ class RingStudy:
         area: Literal["current", "reference"] = "reference" if traits.rules.area == "reference" else "current"
         return tuple(fit(self.slave, inf if multiplier else self.penalty, area) for fit in kinds)
 
-    def pose(self, refine: float, traits: Traits, grading: float = GRADE) -> ProblemInstance:
+    def pose(
+        self, refine: float, traits: Traits, grading: float = GRADE, quarters: Literal[1, 4] = 1
+    ) -> ProblemInstance:
         """Return the problem on a mesh.
 
         The ends of a quarter are held across their line of symmetry, and bear what contact does there.
         """
         fit, ring = self.fit(traits), int(self.slave == "outer")
         scene = replace(
-            shrink_fit(self.problem, slave=self.slave, refine=refine, grading=grading), penalty=self.penalty
+            shrink_fit(self.problem, slave=self.slave, refine=refine, grading=grading, quarters=quarters),
+            penalty=self.penalty,
         )
         radius = self.problem.contact_radii[ring]
         outwards = (1 if ring else -1) * replace(self.problem, radius=radius).compliances[ring] / radius * fit.force

@@ -98,8 +98,23 @@ def test_the_scene_is_a_quarter_whose_case_tells_its_problem(slave: Role) -> Non
     inner, outer = (radii[:25], radii[25:]) if slave == "inner" else (radii[33:], radii[:33])
     assert inner.mean() - outer.mean() == pytest.approx(problem.interference)
     for body in scene.bodies:
-        assert not body.nodes[body.fixed].any()  # Whatever is held lies on a line of symmetry.
+        assert not body.nodes[body.fixed].any()  # Whatever is nodes lies on a line of symmetry.
         assert np.arctan2(*body.nodes.T[::-1]).max() == pi / 2
+
+
+@pytest.mark.parametrize("slave", RINGS)
+def test_whole_rings_are_four_quarters_without_ends(slave: Role) -> None:
+    quarter, whole = (shrink_fit(slave=slave, refine=2, quarters=quarters) for quarters in (1, 4))
+    for side, body in zip(("slave", "master"), whole.bodies, strict=True):
+        ring, part = (getattr(scene.interface, side) for scene in (whole, quarter))
+        assert len(ring) == 4 * len(part)
+        assert (ring.neighbours >= 0).all()
+        lengths = [surface.lengths(scene.interface.nodes) for surface, scene in ((ring, whole), (part, quarter))]
+        assert np.sort(lengths[0])[::4] == pytest.approx(np.sort(lengths[1]))
+        nodes, component = np.nonzero(body.fixed)
+        assert len(nodes) == 4  # One more than a rigid body needs.
+        assert np.abs(body.nodes[nodes, component]).max() < 1e-15 * np.abs(body.nodes).max()
+        assert not np.isin(nodes, body.contact_nodes).any()
 
 
 def test_nodes_do_not_meet_but_at_the_ends() -> None:

@@ -419,7 +419,9 @@ def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, exam
         return Measurement([ERROR.check(1.0 * (case.seed <= undecided), 0.5)], "a kink")
 
     question = replace(
-        ZERO, cases=lambda _: st.integers(1, examples).map(lambda seed: replace(a_case(1), seed=seed)), measure=sometimes
+        ZERO,
+        cases=lambda _: st.integers(1, examples).map(lambda seed: replace(a_case(1), seed=seed)),
+        measure=sometimes,
     )
     row = one_row(subject(), question, examples=examples)
     assert (row.planned, row.judged, row.verdict) == (examples, examples - undecided, verdict)
