@@ -16,6 +16,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.limits import Limits
+from contactverif.isolation.ordinary import check_ordinary
 from contactverif.mechanics.scene import has_bodies
 from contactverif.plugins.registry import formulation_names, load_formulation, the_formulation, the_property
 from contactverif.problems.catalogue import load_scene
@@ -68,6 +69,7 @@ def _read_stored(report: Path | None, case_id: str | None) -> Counterexample:
     if report is None:
         raise MisuseError("REPORT", f"none, but --case {case_id}", "the report that holds the case")
     if case_id is None:
+        check_ordinary(report, "REPORT", "a report that `contactverif verify --out FILE.nc` wrote, or --scene NAME")
         raise MisuseError("--case", "nothing", f"--case ID; `contactverif replay {report}` lists the ids")
     return read_case(report, case_id)
 

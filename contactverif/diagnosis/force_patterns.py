@@ -10,6 +10,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.flat_state import COARSE, DEPTH, FINE, PENALTY, FlatState, flat_state, pushes_of
+from contactverif.diagnosis.lost_places import diagnose_lost_places
 from contactverif.diagnosis.other_states import (
     diagnose_balance,
     diagnose_digits,
@@ -33,6 +34,8 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     promise the patch test may have them.
     """
     rules, patch = subject.traits.rules, subject.traits.promises.patch
+    if rules.enforcement == "penalty" and (text := diagnose_lost_places(subject)):
+        return text
     if rules.enforcement != "penalty" or rules.penalty == "nodal" or patch.flat is False:
         return ""  # Other forces than the consistent ones are right there.
     patterns = (

@@ -50,8 +50,7 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
     coarser = study.meshes[:-1] if rates else ()
     solved = [_solve(studies, study.pose(mesh, subject.traits), subject) for mesh in coarser] + [(last, failure)]
     meshes = study.meshes[-len(solved) :]
-    failures = ", ".join(f"mesh {mesh}: {end}" for mesh, (_, end) in zip(meshes, solved, strict=True) if end)
-    undecided = f"Newton's method finds no solution on {failures}" if failures else ""
+    undecided = _name_failures({mesh: end for mesh, (_, end) in zip(meshes, solved, strict=True) if end})
     details = {} if ITERATIONS in studies.series.values() else {ITERATIONS: last[ITERATIONS]}
     errors, lengths = _by_kind([row for row, _ in solved]), [study.size(mesh) for mesh in meshes]
     series = {name: np.array(errors[kind]) for name, kind in studies.series.items() if kind in errors}
@@ -61,6 +60,15 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
         if errors.keys() >= set(bound.kinds)
     ]
     return Measurement([*numbers, *sizes], undecided, details=details, series=series)
+
+
+def _name_failures(ends: dict[int, str]) -> str:
+    """Return on which meshes Newton's method ended without a solution, and how; empty if on none."""
+    groups: dict[str, list[str]] = {}
+    for mesh, end in ends.items():
+        groups.setdefault(end, []).append(str(mesh))
+    words = ", ".join(f"mesh{'es' * (len(meshes) > 1)} {' · '.join(meshes)}: {end}" for end, meshes in groups.items())
+    return f"Newton's method finds no solution on {words}" if words else ""
 
 
 def _counts(bound: Bound, group: str, last: Errors, finest: ProblemInstance, fails: bool) -> bool:

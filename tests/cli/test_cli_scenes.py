@@ -89,7 +89,8 @@ def test_every_option_has_a_meaning() -> None:
 DRAW_C = ["draw", "--scene", "c", "-f", "vts-ppt"]
 MISTAKES = [
     (["draw"], r"--scene: found nothing to draw; needed --scene NAME, or REPORT --case ID"),
-    (["draw", "r.nc"], r"--case: found nothing; needed --case ID; `contactverif replay r.nc` lists the ids"),
+    (["draw", "file"], r"--case: found nothing; needed --case ID; `contactverif replay file` lists the ids"),
+    (["draw", "hertz"], r"REPORT: found hertz, which does not exist; needed a report .*, or --scene NAME"),
     (["draw", "--case", "a.b"], r"REPORT: found none, but --case a.b; needed the report that holds the case"),
     (["draw", "r.nc", "--case", "a.b"], r"REPORT: found r.nc, which does not exist; needed a report .*"),
     (["draw", "r.nc", "--case", "a.b", "--scene", "c"], r"--scene: found c and --case a.b; needed one of the two"),

@@ -13,6 +13,7 @@ from wrong_springs import FORCES, TANGENTS, Right
 from contactverif.contract.interface import Interface
 from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.diagnosis.flat_state import flat_state
 from contactverif.oracle import uniform_pressure_weights
@@ -70,6 +71,53 @@ def test_nothing_is_said_of_a_right_formulation_of_a_stranger(name: str) -> None
 def test_nothing_is_said_of_an_included_formulation(name: str) -> None:
     subject = load_subject(name)
     assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
+
+
+class Nodes:
+    """Nodes of the slave against the nearest segment of the master, with areas; some places have no force."""
+
+    traits = Traits(
+        promises=Promises(patch=PatchPromises(normal=True)), rules=Rules(area="reference", penalty="distributed")
+    )
+    first_xi = 0.0
+    n_left_out = 0
+
+    def __init__(self, *, penalty: float) -> None:
+        self.penalty = penalty
+
+    def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
+        x, n = z.reshape(-1, 2), interface.n_slave_nodes
+        forces = np.zeros_like(x)
+        areas = interface.slave.lengths(interface.nodes).repeat(2) / 2
+        area = np.bincount(interface.slave.segments.reshape(-1), areas, n)
+        for a, b in interface.master.segments[: len(interface.master) - self.n_left_out]:
+            along = x[b] - x[a]
+            normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+            xi, gap = (x[:n] - x[a]) @ along / (along @ along), (x[:n] - x[a]) @ normal
+            acts = (xi >= self.first_xi) & (xi < 1) & (gap < 0)
+            force = np.where(acts, self.penalty * gap * area, 0.0)
+            forces[:n] += force[:, None] * normal
+            forces[a] -= ((1 - xi) * force).sum() * normal
+            forces[b] -= (xi * force).sum() * normal
+        return forces.reshape(-1)
+
+
+@pytest.mark.parametrize(
+    ("first_xi", "n_left_out", "words"),
+    [
+        (0.0, 0, ""),
+        (0.0, 1, "slave nodes that face master segment 3 have no force"),
+        (0.02, 0, "slave nodes that face master segment 1 between ξ = 0 and 0.024, or master segment 3 between"),
+        (0.3, 0, "slave nodes have no force between ξ = 0 and 0.31 of a master segment"),
+    ],
+)
+def test_places_without_force_are_named_where_only_matching_nodes_are_promised(
+    first_xi: float, n_left_out: int, words: str
+) -> None:
+    make = type("Lost", (Nodes,), {"first_xi": first_xi, "n_left_out": n_left_out})
+    text = diagnose(Subject("nodes", make), "balance.force")
+    assert text.startswith(words)
+    assert bool(text) == bool(words)
 
 
 def judge_patch(make: type[Right]) -> Run:

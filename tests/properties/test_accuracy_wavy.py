@@ -129,7 +129,7 @@ def test_no_solution_is_undecided() -> None:
 
     outcome = judge_case(accuracy_wavy, _case(accuracy_wavy, NAMES[0]), Subject("w", lambda *, penalty: Wanderer()))
     assert outcome.verdict is Verdict.UNDECIDED
-    assert "finds no solution on mesh 1" in outcome.reason
+    assert "finds no solution on mesh" in outcome.reason
 
 
 @pytest.mark.parametrize(("converges", "locks", "promise"), [

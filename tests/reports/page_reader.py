@@ -67,7 +67,8 @@ class Page(HTMLParser):
             if tag == "caption":
                 self.tables[-1].caption = text
             else:
-                self.tables[-1].rows[-1].append(text)
+                more = int(self._attribute_of_last(tag, "colspan") or 1) - 1  # Columns that the cell covers, too.
+                self.tables[-1].rows[-1] += [text, *[""] * more]
                 if tag == "th" and self._attribute_of_last("th", "scope") == "col":
                     self.tables[-1].headers.append(text)
             self._cell = None
