@@ -50,7 +50,7 @@ _COUNTED = {
     Result.NOT_JUDGED: "not judged",
     Result.OMITTED: "not asked",
     Result.NOT_APPLICABLE: "do not apply",
-    Result.NOT_PROVIDED: "lack a part",
+    Result.NOT_PROVIDED: "need a missing part",
 }
 
 
