@@ -33,8 +33,9 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     """
     row, outcome = example.row, example.outcome
     words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
+    title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}"
     text = indent_below(
-        f"{row.formulation}, {row.property_id}: {row.result}, {example.label}",
+        "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
         *chain.from_iterable(words),
         *([f"promised by {row.promised_by}"] if row.promised_by else []),
         *as_text(outcome.case).splitlines(),

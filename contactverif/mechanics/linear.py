@@ -22,6 +22,8 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 # A singular value counts as zero if it is at most this many units of roundoff, times the size of the matrix, times the
 # largest one.
 RANK_ROUNDOFF = 8.0
+# A whole system has the pattern of its bodies, which is symmetric, and then this ordering fills less.
+_LARGE, _ORDERING = 10_000, {"permc_spec": "MMD_AT_PLUS_A"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +76,8 @@ def scale_factors(matrix: Any, n_positions: int) -> tuple[FloatArray, FloatArray
     if stiffest > 0 and widest > 0:
         columns[n_positions:] = stiffest / widest
         constraints = abs(_scale(matrix, rows, columns)[n_positions:])
-        largest = constraints.toarray().max(axis=1) if sparse.issparse(constraints) else constraints.max(axis=1)
+        largest = constraints.max(axis=1)
+        largest = largest.toarray().reshape(-1) if sparse.issparse(largest) else largest
         rows[n_positions:] = np.where(largest > 0, stiffest / np.where(largest > 0, largest, 1.0), 1.0)
     return rows, columns
 
@@ -130,7 +133,7 @@ def _solve_dense(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | No
 
 def _solve_sparse(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
     try:
-        factors = splu(matrix.tocsc())
+        factors = splu(matrix.tocsc(), **_ORDERING if len(right) > _LARGE else {})
     except RuntimeError:  # The matrix is exactly singular.
         return None, 0.0
     step = factors.solve(right)

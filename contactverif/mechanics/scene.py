@@ -175,11 +175,12 @@ class Scene:
         for index, unknowns, part in zip(self.bodies_in_reach, self.unknowns, self.slices, strict=True):
             body = self.bodies[index]
             nodes, components = np.divmod(unknowns, 2)
-            row = 2 * (first + np.searchsorted(body.contact_nodes, nodes))
+            on_contact = np.flatnonzero(np.isin(nodes, body.contact_nodes))
+            row = 2 * (first + np.searchsorted(body.contact_nodes, nodes[on_contact]))
             for direction in (0, 1):
                 rows.append(row + direction)
-                columns.append(np.arange(part.start, part.stop))
-                values.append(body.frame[direction, components])
+                columns.append(part.start + on_contact)
+                values.append(body.frame[direction, components[on_contact]])
             first += len(body.contact_nodes)
         shape = (self.interface.n_unknowns, self.n_free)
         places = np.concatenate(rows), np.concatenate(columns)

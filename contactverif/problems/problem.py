@@ -34,8 +34,7 @@ FORCES = "slave forces", "master forces"
 MOTIONS = "slave displacement", "master displacement"
 PRESSURE, ITERATIONS = "pressure", "iterations"
 
-NEAR, DEEP = "near", "deep"  # The starts of Newton's method in a bench.
-DEPTH = 10  # The depth of the deep start over that of the near one.
+DEPTHS = {"near": 1, "deep": 10, "deepest": 1000}  # {start of Newton's method in a bench: depth over the guess}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -52,15 +51,17 @@ class ProblemInstance:
     further: Callable[[Solution], Errors] = lambda _: {}  # Further kinds of error
     # (n_free,): the first iterate of a property, which asks for the solution alone; None for the guess of the scene
     start: FloatArray | None = None
-    deep: FloatArray | None = None  # (n_free,): ten times as deep as the guess; None for ten times its displacements
+    # From a number to the iterate (n_free,) that is so many times as deep as the guess; None for as many times its
+    # displacements
+    sink: Callable[[float], FloatArray] | None = None
     step: float | None = None  # The step of differences, a length, where a formulation has no tangent
     best: Mapping[str, float] = field(default_factory=dict)  # The least errors that the mesh allows, where known
 
     @property
     def starts(self) -> dict[str, FloatArray]:
         """The first iterates (n_free,) of a bench, the same for all formulations: near is the guess of the scene."""
-        deep = DEPTH * self.scene.start if self.deep is None else self.deep
-        return {NEAR: self.scene.start, DEEP: deep}
+        sink = self.sink or (lambda times: times * self.scene.start)
+        return {name: sink(times) if times > 1 else self.scene.start for name, times in DEPTHS.items()}
 
     @property
     def first_guess(self) -> Case:

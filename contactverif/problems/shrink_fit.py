@@ -36,7 +36,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
-from contactverif.problems.problem import DEPTH, Problem, ProblemInstance, Variation
+from contactverif.problems.problem import Problem, ProblemInstance, Variation
 
 Role = Literal["inner", "outer"]
 SEGMENTS = {"inner": 12, "outer": 16}  # Numbers of segments along the interface of a quarter, at refine = 1.
@@ -353,7 +353,7 @@ def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation)
     penalty = stiffness * min(problem.young) * SEGMENTS["inner"] * refine / (pi / 2 * problem.radius)
     study = RingStudy(problem, "outer" if variation.swapped else "inner", penalty)
     instance = study.pose(refine, traits, GRADE + 0.1 * variation.grading)
-    return replace(instance, deep=_inflate(instance.scene, (DEPTH - 1) * problem.interference))
+    return replace(instance, sink=lambda times: _inflate(instance.scene, (times - 1) * problem.interference))
 
 
 def _inflate(scene: Scene, way: float) -> FloatArray:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from itertools import product
-from math import inf, pi, sqrt
+from math import inf, log1p, pi, sqrt
 
 import numpy as np
 
@@ -149,24 +149,35 @@ def wavy_scene(
     slave: int = UPPER,
     columns: tuple[int, int] = COLUMNS,
     grading: float = GRADING,
+    growth: float = 0.0,
 ) -> Scene:
     """Return two wavy bodies of quadrilaterals whose meshes do not match, the upper body first.
 
     `columns` are the numbers of cells along the upper and the lower surface at refine = 1. Those of the upper body have
-    equal widths, those of the lower one become narrower. The penalty is 1 if that of the problem is infinite.
+    equal widths, those of the lower one become narrower. Each row of cells is higher by the share `growth` than the one
+    nearer to the interface. The penalty is 1 if that of the problem is infinite.
     """
-    bodies = tuple(_wavy_body(problem, body, columns[body] * refine, grading) for body in (UPPER, LOWER))
+    bodies = tuple(_wavy_body(problem, body, columns[body] * refine, grading, growth) for body in (UPPER, LOWER))
     penalty = problem.penalty if np.isfinite(problem.penalty) else 1.0
     return Scene(bodies, (slave,), (1 - slave,), penalty=penalty, name="wavy")
 
 
+def _depths(height: float, n_equal: float, growth: float) -> FloatArray:
+    """Return the depths (n_rows + 1,) of rows: `n_equal` equal ones, or fewer that grow by a share from row to row."""
+    if not growth:
+        return np.linspace(0.0, height, max(1, round(n_equal)) + 1)
+    n_rows = max(1, round(log1p(growth * n_equal) / log1p(growth)))
+    powers = np.expm1(log1p(growth) * np.arange(n_rows + 1))
+    depths: FloatArray = height * powers / powers[-1]
+    return depths
+
+
 @lru_cache(maxsize=128)
-def _wavy_body(problem: WavyProblem, body: int, n_columns: int, grading: float) -> Body:
+def _wavy_body(problem: WavyProblem, body: int, n_columns: int, grading: float, growth: float) -> Body:
     """Return one of the bodies, the same for both choices of the slave: cells are about square, edges move exactly."""
     t = np.linspace(0.0, 1.0, n_columns + 1)
     x = problem.wavelength * (t if body == UPPER else t + grading * t * (1 - t))
-    into, rows = _into(body), max(1, round(problem.height * (len(x) - 1) / problem.wavelength))
-    depth = np.linspace(0.0, problem.height, rows + 1)
+    into, depth = _into(body), _depths(problem.height, problem.height * n_columns / problem.wavelength, growth)
     levels = into * (depth if body == UPPER else depth[::-1])  # From bottom to top
     flat = np.stack(np.meshgrid(x, levels), axis=-1)  # (n_rows, n_columns, 2)
     fade = 1 - np.abs(flat[..., 1]) / problem.height
@@ -204,6 +215,7 @@ class WavyStudy:
     own_columns: tuple[int, int] = (0, 0)  # The numbers of cells along both surfaces at r = 1, if they are others
     grading: float = GRADING  # That of the lower body
     load: float = 1.0  # The factor of the mean pressure
+    growth: float = 0.0  # By how much each row of cells is higher than the one nearer to the interface
 
     @property
     def columns(self) -> tuple[int, int]:
@@ -232,7 +244,7 @@ class WavyStudy:
         multipliers = traits.rules.enforcement == "multiplier"
         problem = WavyProblem(penalty=inf if multipliers else penalty, amplitude=self.amplitude)
         problem = replace(problem, mean=self.load * problem.mean)
-        scene = wavy_scene(problem, refine, self.slave, self.columns, self.grading)
+        scene = wavy_scene(problem, refine, self.slave, self.columns, self.grading, self.growth)
         if multipliers:
             scene = replace(scene, penalty=penalty)
 
@@ -348,8 +360,13 @@ CURVED_STUDIES = Studies(
 )
 
 
-def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation) -> ProblemInstance:
-    """Return the problem with about so many segments along the upper body, and a third more along the lower one."""
+def pose_wavy(
+    segments: int, stiffness: float, traits: Traits, variation: Variation, growth: float = 0.0
+) -> ProblemInstance:
+    """Return the problem with about so many segments along the upper body, and a third more along the lower one.
+
+    Rows of cells have equal heights, or grow by the share `growth` from one to the next.
+    """
     columns = round(segments * variation.size), round(segments * variation.size * COLUMNS[LOWER] / COLUMNS[UPPER])
     study = WavyStudy(
         LOWER if variation.swapped else UPPER,
@@ -357,6 +374,7 @@ def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation)
         own_columns=columns,
         grading=GRADING + 0.1 * variation.grading,
         load=variation.load,
+        growth=growth,
     )
     return study.pose(1, traits)
 
@@ -365,6 +383,6 @@ WAVY = Problem(
     label="two wavy half-planes in full contact",
     meshes=(8, 16, 32, 64, 128, 256),
     targets=(1e-2, 1e-3, 1e-4, 1e-5),
-    pose=_pose,
+    pose=pose_wavy,
     rank=1,
 )

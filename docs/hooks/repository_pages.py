@@ -11,6 +11,7 @@ PAGES = {
     "reports/README.md": "reference/report.md",
     "reports/stability/README.md": "reference/stability.md",
     "reports/trust/README.md": "reference/trust.md",
+    "reports/trust/bugs.md": "reference/mistakes.md",
     "reports/trust/hostile.md": "reference/hostile-plugins.md",
     "reports/bench/README.md": "reference/speed-against-error.md",
     "CONTRIBUTING.md": "project/contributing.md",

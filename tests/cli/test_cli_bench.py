@@ -36,7 +36,12 @@ def test_a_bench_has_a_table_of_80_columns_sentences_and_files(ask: Ask, tmp_pat
     for file in files:
         assert file.stat().st_size > 0
         assert str(file) in answer.out
-    assert {file.name for file in (tmp_path / "figures").iterdir()} == {"wavy.svg", "cost.svg", "runtimes.svg"}
+    assert {file.name for file in (tmp_path / "figures").iterdir()} == {
+        "wavy.svg",
+        "cost.svg",
+        "runtimes.svg",
+        "starts.svg",
+    }
     assert not (tmp_path / "a.nc.journal").exists()
     again = ask(files[0], "--out", tmp_path / "b.html", columns=80)
     assert again.status == 0

@@ -19,6 +19,7 @@ from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.bulk import assemble_stiffness
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
+from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, two_blocks
 from contactverif_nts import eq6, walk
@@ -479,3 +480,28 @@ def test_no_distance_to_far_segments_of_an_interface_is_evaluated(
     expected = distances(name, Case(interface, z))
     assert expected[0] > 0
     assert distances(name, Case(more, more.nodes.reshape(-1))) == (expected[0], 0)
+
+
+@pytest.mark.parametrize("name", ["vts-ppt", "mortar-lm"])
+@pytest.mark.parametrize("triangles", [False, True])
+def test_a_whole_scene_has_the_solution_of_the_condensed_one(name: str, triangles: bool) -> None:
+    scene = press_blocks()
+    if triangles:
+        scene = replace(scene, bodies=tuple(map(in_triangles, scene.bodies)))
+    whole, subject = WholeScene.of_scene(scene), load_subject(name)
+    assert whole.n_free > scene.n_free
+    formulation = subject.for_case(scene.case())
+    condensed, uncondensed = (newton.solve(each, formulation) for each in (scene, whole))
+    assert condensed.converged
+    assert uncondensed.converged
+    np.testing.assert_allclose(uncondensed.z, condensed.z, rtol=1e-11, atol=1e-11)
+    forces = [trace.scene.nodal_forces(trace.u[-1][: trace.scene.n_free]) for trace in (condensed, uncondensed)]
+    np.testing.assert_allclose(forces[1], forces[0], atol=1e-10 * np.abs(forces[0]).max())
+
+
+def test_a_whole_scene_may_have_a_rigid_body() -> None:
+    punch = block(Rectangle([0, 1, 2], [0, 1]), contact="bottom", approach=0.1, name="punch")
+    scene = Scene((punch, rigid_surface([[3, 0], [-1, 0]], name="floor")), penalty=100.0)
+    formulation = load_subject("sts").for_case(scene.case())
+    traces = [newton.solve(each, formulation) for each in (scene, WholeScene.of_scene(scene))]
+    np.testing.assert_allclose(traces[1].z, traces[0].z, rtol=1e-12, atol=1e-12)

@@ -36,7 +36,7 @@ from contactverif.journals.keys import remove_key
 from contactverif.mechanics.accuracy import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.system import System
-from contactverif.mechanics.whole_system import WholeSystem
+from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.plugins import registry
 from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
@@ -68,11 +68,11 @@ def test_errors_are_small_from_both_starts_and_fall_on_a_finer_mesh(scene: str, 
     errors: list[list[float]] = []
     for mesh in problem.meshes[:3:2]:
         instance = problem.pose(mesh, 10.0, subject.traits, variation)
-        assert list(instance.starts) == ["near", "deep"]
+        assert list(instance.starts) == ["near", "deep", "deepest"]
         formulation = subject.for_case(instance.first_guess)
         errors.append([])
-        for start in instance.starts.values():
-            (trace,) = solve_in_tries(instance.scene, formulation, start, instance.step)
+        for name in ("near", "deep"):
+            (trace,) = solve_in_tries(instance.scene, formulation, instance.starts[name], instance.step)
             assert trace.n_iterations <= 20
             of_solution = instance.errors(solution_of(trace, formulation, nodal=False))
             errors[-1].append(max(of_solution[kind] for kind in FORCES))
@@ -86,13 +86,15 @@ def test_a_deep_start_is_ten_times_as_deep_and_no_start_is_the_solution(scene: s
     instance = problem.pose(problem.meshes[0], 10.0, subject.traits, Variation())
     formulation, scene_ = subject.for_case(instance.first_guess), instance.scene
     depths = []
-    for start in instance.starts.values():
+    for start in map(instance.starts.__getitem__, ("near", "deep")):
         z = scene_.positions(start)
         points = formulation.contact_points(scene_.interface, formulation.pair(scene_.interface, z), z)
         depths.append(-np.nanmin(points.gap))
         (trace,) = solve_in_tries(scene_, formulation, start, instance.step)
         assert trace.n_iterations >= 1
     assert depths[1] == pytest.approx(10 * depths[0], rel=0.3)
+    near, deep, deepest = (instance.starts[name] for name in ("near", "deep", "deepest"))
+    np.testing.assert_allclose(deepest - near, 999 / 9 * (deep - near), rtol=1e-9, atol=1e-12 * np.abs(deepest).max())
 
 
 def test_instances_differ_in_all_that_a_problem_leaves_open_and_are_the_same_for_the_same_seed() -> None:
@@ -147,15 +149,15 @@ def test_the_whole_system_is_that_of_newtons_method_before_it_is_condensed() -> 
     subject = load_subject("mortar-lm")
     instance = pose(Cell("rings", 12, 0), 10.0, subject.traits, 0)
     scene, formulation = instance.scene, subject.for_case(instance.first_guess)
-    system, whole = System(scene, formulation), WholeSystem(scene)
+    system, whole = System(scene, formulation), System(WholeScene.of_scene(scene), formulation)
     u = np.append(scene.start, np.full(system.n_multipliers, 1e-2))
     tangent = system.tangent(u, system.pair(u))
-    matrix = whole.matrix(tangent).toarray()
-    assert matrix.shape == (whole.size + system.n_multipliers,) * 2
+    matrix = dense(whole.stiffness + whole.contact_stiffness(u, None, tangent))
+    assert matrix.shape == (whole.size, whole.size)
     free = [np.flatnonzero(~body.fixed.reshape(-1)) for body in scene.bodies]
     starts = np.cumsum([0, *map(len, free)])
     outer = np.concatenate([np.searchsorted(free[k], scene.unknowns[k]) + starts[k] for k in range(2)])
-    outer = np.append(outer, np.arange(whole.size, len(matrix)))
+    outer = np.append(outer, np.arange(whole.scene.n_free, len(matrix)))
     inner = np.setdiff1d(np.arange(len(matrix)), outer)
     schur = matrix[np.ix_(outer, outer)] - matrix[np.ix_(outer, inner)] @ np.linalg.solve(
         matrix[np.ix_(inner, inner)], matrix[np.ix_(inner, outer)]

@@ -16,6 +16,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from contactverif.contract.errors import ContractError
@@ -24,7 +25,7 @@ from contactverif.mechanics.accuracy import solution_of, solve_in_tries
 from contactverif.mechanics.scene import forget_bodies
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
-from contactverif.mechanics.whole_system import WholeSystem
+from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.problems.problem import ProblemInstance
 from contactverif.studies.bench.bench_plan import is_solved, largest_errors, pose
 from contactverif.studies.bench.meter import Meter, add_meter
@@ -68,7 +69,7 @@ class CellRecord:
 def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True) -> CellRecord:
     """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns."""
     instances = [pose(cell, RULE.penalty, subject.traits, seed) for subject in subjects]
-    whole = WholeSystem(instances[0].scene) if solve else None
+    whole = WholeScene.of_scene(instances[0].scene) if solve else None
     runs = [RunRecord() for _ in subjects]
     for subject, instance, run in zip(subjects, instances, runs, strict=True):
         if whole is not None:
@@ -77,7 +78,7 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool 
     forget_bodies()
     _time_evaluations(subjects, instances, runs)
     names = (subject.name for subject in subjects)
-    size = 0 if whole is None else whole.size
+    size = 0 if whole is None else whole.n_free
     best = 0.0 if whole is None else instances[0].best_pressure
     return CellRecord(len(instances[0].scene.interface.slave), size, dict(zip(names, runs, strict=True)), best)
 
@@ -96,7 +97,7 @@ def _time_evaluations(
 
 
 def _solve_variants(
-    cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeSystem, run: RunRecord
+    cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeScene, run: RunRecord
 ) -> None:
     """Solve all variants of a cell, and measure the whole system at the solution of the rule."""
     for variant in VARIANTS:
@@ -131,14 +132,15 @@ def _solve(subject: Subject, instance: ProblemInstance, start: str, record: Solu
 
 
 def _measure_system(
-    subject: Subject, instance: ProblemInstance, trace: Trace, whole: WholeSystem, run: RunRecord
+    subject: Subject, instance: ProblemInstance, trace: Trace, whole: WholeScene, run: RunRecord
 ) -> None:
     """Count the nonzeros of the tangent at the solution and of the factors, and time the factorisation."""
     formulation: CheckedFormulation = subject.for_case(instance.first_guess)
     system = System(instance.scene, formulation, difference_step=instance.step)
     u = trace.u[-1]
     tangent = system.tangent(u, system.pair(u))
-    matrix = whole.matrix(tangent)
+    whole_system = System(whole, formulation)
+    matrix = sparse.csc_array(whole_system.stiffness + whole_system.contact_stiffness(u, None, tangent))
     n_tangent = int(np.count_nonzero(tangent)) if isinstance(tangent, np.ndarray) else int(tangent.nnz)
     for _ in range(TURNS):
         start = perf_counter()

@@ -14,7 +14,7 @@ from contactverif_reports.bench.cost_tables import (
 from contactverif_reports.bench.costs import REFERENCE
 from contactverif_reports.bench.results import RULE, BenchResults
 
-COST_PICTURE, RUNTIME_PICTURE = "cost.svg", "runtimes.svg"
+COST_PICTURE, RUNTIME_PICTURE, STARTS_PICTURE = "cost.svg", "runtimes.svg", "starts.svg"
 MOST_CURVES = 6  # More curves in one panel cannot be told apart.
 
 
@@ -47,7 +47,11 @@ TOTALS = (
     "The ratio of whole solutions if one linear system costs the reader a tenth of an evaluation of "
     f"{REFERENCE} (cheap bodies), as much (even), or ten times as much (dear)."
 )
-STARTS = "Linear systems from the guess (near), and from ten times its depth (deep), on each mesh."
+DEEPEST_START = "The median number of linear systems from there, on all meshes, and the share that find no solution."
+STARTS = (
+    "Linear systems on each mesh from the guess (near), from ten times its depth (deep), and from a thousand times "
+    "(deepest)."
+)
 
 
 def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> str:
@@ -66,6 +70,11 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
     for scene in results.scenes:
         parts += _scene(results, scene, with_pictures)
     if with_pictures:
+        parts += [
+            "## A thousand times as deep",
+            DEEPEST_START,
+            f"![Who fails from a thousand times the depth of the guess]({STARTS_PICTURE})",
+        ]
         parts += ["## Runtimes", f"![Share of targets that are reached within a time]({RUNTIME_PICTURE})"]
     if report:
         parts.append(

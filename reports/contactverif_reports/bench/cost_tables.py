@@ -89,14 +89,13 @@ def totals_table(results: BenchResults, scene: str, target: float) -> Table:
 
 
 def starts_table(results: BenchResults, scene: str) -> Table:
-    """Return the linear systems from each start on each mesh."""
-    starts, meshes = start_names(), results.meshes_of(scene)
-    heads = [f"{start}, {mesh}" for start in starts for mesh in meshes]
+    """Return the linear systems from each start on each mesh, a row for each formulation and start."""
     rows = [
-        [name, *(text for variant in starts.values() for text in iterations_by_start(results, name, scene, variant))]
+        [f"{name}, {start}", *iterations_by_start(results, name, scene, variant)]
         for name in results.formulations
+        for start, variant in start_names().items()
     ]
-    return heads, rows
+    return list(map(str, results.meshes_of(scene))), rows
 
 
 def cost_sentences(results: BenchResults, scene: str, target: float) -> list[str]:

@@ -54,7 +54,7 @@ class Variant:
     """The penalty and the start of a solution."""
 
     penalty: float  # ε̂ in E/h
-    start: str  # "near" or "deep", as the problem declares them
+    start: str  # "near", "deep" or "deepest", as the problem declares them
 
     @property
     def label(self) -> str:
@@ -64,7 +64,8 @@ class Variant:
 
 RULE = Variant(10.0, "near")  # The penalty that is fixed beforehand.
 DEEP = Variant(10.0, "deep")
-VARIANTS = (RULE, DEEP, Variant(1.0, "near"), Variant(100.0, "near"))
+DEEPEST = Variant(10.0, "deepest")
+VARIANTS = (RULE, DEEP, DEEPEST, Variant(1.0, "near"), Variant(100.0, "near"))
 BEST = tuple(number for number, variant in enumerate(VARIANTS) if variant.start == RULE.start)  # The best afterwards.
 
 

@@ -23,12 +23,13 @@ from contactverif_reports.bench.bench_text import (
     COST_PICTURE,
     MOST_CURVES,
     RUNTIME_PICTURE,
+    STARTS_PICTURE,
     picture_of,
     picture_of_each,
 )
 from contactverif_reports.bench.cost_tables import costs_at, format_share, ratios_at
 from contactverif_reports.bench.costs import REFERENCE, ROUNDOFF, curve, rank, runtimes
-from contactverif_reports.bench.results import BEST, ERRORS, RULE, BenchResults
+from contactverif_reports.bench.results import BEST, DEEPEST, ERRORS, RULE, VARIANTS, BenchResults
 from contactverif_reports.draw.case_figure import save
 from contactverif_reports.draw.curve_names import name_curves
 
@@ -50,6 +51,7 @@ def draw_bench(results: BenchResults, folder: Path) -> None:
                 save(make_each_figure(results, scene), folder / picture_of_each(scene))
     save(make_cost_figure(results), folder / COST_PICTURE)
     save(make_runtime_figure(results), folder / RUNTIME_PICTURE)
+    save(make_starts_figure(results), folder / STARTS_PICTURE)
 
 
 def highlights(results: BenchResults) -> dict[str, dict[str, Any]]:
@@ -226,4 +228,28 @@ def make_runtime_figure(results: BenchResults) -> Figure:
             axes.set_xlabel(label)
         figure.supylabel("share of errors and instances that are reached", fontsize=8.5)
         _legend(figure, results, {name: {"color": pen["color"]} for name, pen in pens.items()})
+    return figure
+
+
+def make_starts_figure(results: BenchResults) -> Figure:
+    """Return a table of who fails from the deepest start: linear systems, and the share without a solution, shaded."""
+    variant = VARIANTS.index(DEEPEST)
+    names, scenes = results.formulations, results.scenes
+    cells = [results.ladders(scene).reshape(-1) for scene in scenes]
+    failed = np.stack([(results.outcomes[:, places, variant] != 0).mean(axis=1) for places in cells], axis=1)
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(1.6 + 0.9 * len(scenes), 0.6 + 0.24 * len(names)), layout="constrained")
+        axes = figure.subplots()
+        axes.pcolormesh(np.where(failed > 0, failed, np.nan), cmap="Reds", vmin=0.0, vmax=1.6)
+        axes.invert_yaxis()
+        for (row, column), share in np.ndenumerate(failed):
+            counts = results.counts_of(names[row], "iterations")[cells[column], variant]
+            solved = counts[results.outcomes[row, cells[column], variant] == 0]
+            words = [f"{np.median(solved):g}"] if len(solved) else []
+            words += [f"{share:.0%} fail"] if share else []
+            axes.text(column + 0.5, row + 0.5, ", ".join(words), ha="center", va="center", fontsize=7.5)
+        axes.set_xticks(np.arange(len(scenes)) + 0.5, scenes, parse_math=False)
+        axes.xaxis.tick_top()
+        axes.set_yticks(np.arange(len(names)) + 0.5, names, parse_math=False)
+        axes.tick_params(length=0)
     return figure

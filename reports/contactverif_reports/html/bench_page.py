@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from contactverif_reports.bench.bench_text import HOW_TO_READ, MOST_CURVES, STARTS, THREE_NUMBERS, TOTALS
+from contactverif_reports.bench.bench_text import (
+    DEEPEST_START,
+    HOW_TO_READ,
+    MOST_CURVES,
+    STARTS,
+    THREE_NUMBERS,
+    TOTALS,
+)
 from contactverif_reports.bench.changes import Change
 from contactverif_reports.bench.cost_tables import (
     cost_sentences,
@@ -23,14 +30,25 @@ _FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version
 
 def bench_page(results: BenchResults, changes: Sequence[Change] = ()) -> str:
     """Return the page of a bench."""
-    from contactverif_reports.draw.bench_figures import make_cost_figure, make_runtime_figure  # Importing it is slow.
+    from contactverif_reports.draw.bench_figures import (  # Importing it is slow.
+        make_cost_figure,
+        make_runtime_figure,
+        make_starts_figure,
+    )
 
     return render(
         "bench.html.j2",
         results=results,
-        texts={"numbers": THREE_NUMBERS, "reading": HOW_TO_READ, "totals": TOTALS, "starts": STARTS},
+        texts={
+            "numbers": THREE_NUMBERS,
+            "reading": HOW_TO_READ,
+            "totals": TOTALS,
+            "starts": STARTS,
+            "deepest": DEEPEST_START,
+        },
         cost=svg_inline(make_cost_figure(results), "what an error costs"),
         runtimes=svg_inline(make_runtime_figure(results), "runtimes"),
+        deepest=svg_inline(make_starts_figure(results), "who fails from the deepest start"),
         scenes=[_scene(results, scene) for scene in results.scenes],
         failures=_list_failures(results),
         changes=changes,
