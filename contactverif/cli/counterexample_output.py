@@ -123,11 +123,12 @@ def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
     measurement = outcome.measurement
     if measurement is None:
         return [outcome.reason]
-    lines = [measurement.broken] if measurement.broken else []
+    lines = [f"✗ {measurement.broken}"] if measurement.broken else []
     lines += [str(measurement.finding)] if measurement.finding is not None else []
     numbers = checked_numbers(info, measurement)
     wrong = [number for number in numbers if number.ratio > 1]
-    lines += [_checked_line(number, "✗" if wrong else "✓") for number in wrong or numbers]
+    judged = wrong or ([] if measurement.broken else numbers)
+    lines += [_checked_line(number, "✗" if wrong else "✓") for number in judged]
     others = [_detail(name, value) for name, value in measurement.details.items() if not _is_ending(name)]
     return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])
 

