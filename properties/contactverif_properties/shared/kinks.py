@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.oracle import kink_margin
 from contactverif_properties.shared.any_state import random_directions
@@ -28,24 +28,34 @@ N_DIRECTIONS = 4  # The number of random directions in which a state is moved to
 N_AROUND = 16  # The number of those, forth and back, in which the answers around a kink are looked for.
 # Truncation and roundoff of the best central difference, over (uX/ℓ)^(2/3), as in `tangent.directional`.
 DIFFERENCE_ERROR = 30.0
+FAR = 8.0  # A jump so many times too small, in the columns of the largest error, is none of the whole tangent.
 N_RARE = 4  # Answers that are larger, or smaller, than all but so many of those around are no side of the kink.
 
 
-def explain_by_kink(state: FrozenState, reach: float, errors: dict[str, float]) -> str:
+def explain_by_kink(state: FrozenState, reach: float, errors: dict[str, float], columns: IntArray | None = None) -> str:
     """Return why a failure may be the fault of a kink, or an empty string.
 
     The coordinates are rounded by `reach`, a length. `errors` are the largest of an entry of the "forces" or the
-    "tangent", for each of the two that failed.
+    "tangent", for each of the two that failed. `columns` are those in which the tangent's error is the largest. Where
+    it hardly jumps in these, the others are not asked: all of them are many calls, and a wrong tangent fails often.
     """
     reason = find_kink(state, reach)
     if not reason:
         directions = random_directions(state.case.seed, N_DIRECTIONS, state.case.z.size)
         # Differences of all columns are many calls, which a failure of the forces alone does not need.
         if ("forces" not in errors or 4 * measure_jump(state, reach, directions) >= errors["forces"]) and (
-            "tangent" not in errors or 4 * measure_jump_of_slope(state, reach, directions) >= errors["tangent"]
+            "tangent" not in errors or _slope_jumps(state, reach, errors["tangent"] / 4, columns)
         ):
             reason = "a kink: moving the nodes by roundoff changes the answer as much"
     return reason if reason and is_like_its_surroundings(state, reach) else ""
+
+
+def _slope_jumps(state: FrozenState, reach: float, size: float, columns: IntArray | None) -> bool:
+    """Return whether an entry of the derivative changes by a size when the nodes move by `reach`."""
+    directions = random_directions(state.case.seed, N_DIRECTIONS, state.case.z.size)
+    if columns is not None and FAR * measure_jump_of_slope(state, reach, directions, columns) < size:
+        return False
+    return measure_jump_of_slope(state, reach, directions) >= size
 
 
 def is_like_its_surroundings(state: FrozenState, reach: float) -> bool:
@@ -75,15 +85,19 @@ def measure_jump(state: FrozenState, reach: float, directions: FloatArray) -> fl
     return max(float(np.abs(other - force).max()) for other in others)
 
 
-def measure_jump_of_slope(state: FrozenState, reach: float, directions: FloatArray) -> float:
+def measure_jump_of_slope(
+    state: FrozenState, reach: float, directions: FloatArray, columns: IntArray | None = None
+) -> float:
     """Return how much an entry of the derivative changes when the nodes move, as in `measure_jump`.
 
-    It is the change less what differences may be wrong by; or that of a smooth answer, if that is larger.
+    It is the change less what differences may be wrong by; or that of a smooth answer, if that is larger. Only some
+    columns are looked at if they are given.
     """
-    slope, *others = (_differentiate(_pair_at(state, place), place) for place in _places(state, reach, directions))
+    places = _places(state, reach, directions)
+    slope, *others = (_differentiate(_pair_at(state, place), place, columns) for place in places)
     change = max(float(np.abs(other - slope).max()) for other in others)
     noise = DIFFERENCE_ERROR * _rounding_share(state.case) ** (2 / 3) * float(np.abs(slope).max())
-    return float(max(change - noise, reach * _measure_curvature(state, directions)))
+    return float(max(change - noise, reach * _measure_curvature(state, directions, columns)))
 
 
 def _places(state: FrozenState, reach: float, directions: FloatArray) -> list[FloatArray]:
@@ -92,7 +106,7 @@ def _places(state: FrozenState, reach: float, directions: FloatArray) -> list[Fl
     return [z, *(z + sign * reach * direction for direction in directions for sign in (1, -1))]
 
 
-def _measure_curvature(state: FrozenState, directions: FloatArray) -> float:
+def _measure_curvature(state: FrozenState, directions: FloatArray, columns: IntArray | None) -> float:
     """Return by how much an entry of the derivative changes a length of the way, on the pairing of the state.
 
     A segment that is seen nearly edge-on turns the tangent by many times uX/ℓ, and no jump shows it: so small a change
@@ -102,7 +116,7 @@ def _measure_curvature(state: FrozenState, directions: FloatArray) -> float:
     frozen, way = _pair_at(state, z), state.case.shortest_segment * share ** (1 / 6)
     curvature = 0.0
     for direction in directions:
-        back, forth = (_differentiate(frozen, z + sign * way * direction) for sign in (-1, 1))
+        back, forth = (_differentiate(frozen, z + sign * way * direction, columns) for sign in (-1, 1))
         noise = DIFFERENCE_ERROR * share ** (2 / 3) * float(np.abs(forth).max() + np.abs(back).max())
         curvature = max(curvature, (float(np.abs(forth - back).max()) - noise) / (2 * way))
     return curvature
@@ -117,12 +131,13 @@ def _forces(state: FrozenState, z: FloatArray) -> FloatArray:
     return _pair_at(state, z).residual_at(z)
 
 
-def _differentiate(state: FrozenState, z: FloatArray) -> FloatArray:
-    """Return the derivative of the forces at z, on the pairing of a state, by central differences."""
+def _differentiate(state: FrozenState, z: FloatArray, columns: IntArray | None = None) -> FloatArray:
+    """Return the derivative of the forces at z, or columns of it, on the pairing of a state, by central differences."""
     step = state.case.shortest_segment * _rounding_share(state.case) ** (1 / 3)
     moves = step * np.eye(z.size)
+    moves = moves if columns is None else moves[columns]
     forces = state.residual_at(np.concatenate([z + moves, z - moves]))
-    slope: FloatArray = (forces[: z.size] - forces[z.size :]).T / (2 * step)
+    slope: FloatArray = (forces[: len(moves)] - forces[len(moves) :]).T / (2 * step)
     return slope
 
 

@@ -66,6 +66,17 @@ class Change(NamedTuple):
     quantity: Quantity
     change: FloatArray
     size: float  # The size that the largest change counts over, in the unit of the change.
+    # (n_nodes,) The number, in the second state, of each node of the change; None where both have the same numbers.
+    nodes: IntArray | None = None
+
+    def worst_columns(self, number: int) -> IntArray:
+        """Return the columns of the node, or the multiplier, with the largest change, in the first state or second."""
+        n_columns = self.change.shape[-1]
+        node = int(np.abs(self.change).argmax()) % n_columns // 2
+        if self.nodes is None or number == 0:
+            return np.array([2 * node, min(2 * node + 1, n_columns - 1)])
+        other = 2 * int(self.nodes[node])
+        return np.array([other, other + 1])
 
 
 def judge_changes(
@@ -79,9 +90,15 @@ def judge_changes(
     values = {each.quantity: roundoff.ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
     pairs = zip(changes, errors, strict=True)
     failures = {each.part: error for each, error in pairs if values[each.quantity] > tolerance}
+    tangents = [each for each in changes if each.part == "tangent"]
     excuses = (
-        explain_by_kink(state, roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), failures)
-        for state in states
+        explain_by_kink(
+            state,
+            roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate),
+            failures,
+            tangents[0].worst_columns(number) if "tangent" in failures else None,
+        )
+        for number, state in enumerate(states)
     )
     return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
 
@@ -110,7 +127,7 @@ def compare(
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
         change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
         size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
-        changes.append(Change("tangent", quantities[1], change, size))
+        changes.append(Change("tangent", quantities[1], change, size, carry.nodes))
     distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
     tolerance = roundoff.segment_tolerance(case, forces, distance)
     numbers, undecided = judge_changes(changes, tolerance, [first, second] if explain else [])
