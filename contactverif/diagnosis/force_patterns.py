@@ -180,9 +180,10 @@ def _segment_pattern(side: str, pieces: FloatArray, of_pieces: IntArray, pushes:
         return ""
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
-        return f"{_list(side, missed)} {'is' if len(missed) == 1 else 'are'} left out"
+        return f"{_list(side, missed)} {'is' if len(missed) == 1 else 'are'} left out{_ends(missed, len(segments))}"
     words = ", ".join(f"{side} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
-    return f"segments have forces of another size: {words} the exact one, all others right"
+    ends = _ends(segments[wrong].tolist(), len(segments))
+    return f"segments have forces of another size: {words} the exact one, all others right{ends}"
 
 
 def _factors(pieces: FloatArray, of_pieces: IntArray, pushes: FloatArray) -> FloatArray | None:
@@ -205,6 +206,15 @@ def _total(pushes: FloatArray, exact: FloatArray) -> str:
     """Return whether the sum of the forces of a side is right."""
     factor = float(pushes.sum() / exact.sum())
     return "; their sum is right" if abs(factor - 1) <= SAME else f"; their sum is {_times(factor)} the exact one"
+
+
+def _ends(numbers: Sequence[int], total: int) -> str:
+    """Return whether the segments are the first or the last of all."""
+    names = {0: "the first", total - 1: "the last"}
+    if total == 1 or not set(numbers) <= set(names):
+        return ""
+    words = " and ".join(names[number] for number in numbers)
+    return f"; {'it is' if len(numbers) == 1 else 'they are'} {words} of {total}"
 
 
 def _times(factor: float) -> str:

@@ -88,19 +88,18 @@ def judge_changes(
     """
     errors = [float(np.abs(each.change).max()) for each in changes]
     values = {each.quantity: roundoff.ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
-    pairs = zip(changes, errors, strict=True)
-    failures = {each.part: error for each, error in pairs if values[each.quantity] > tolerance}
-    tangents = [each for each in changes if each.part == "tangent"]
-    excuses = (
-        explain_by_kink(
-            state,
-            roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate),
-            failures,
-            tangents[0].worst_columns(number) if "tangent" in failures else None,
-        )
-        for number, state in enumerate(states)
-    )
+    failures = [each for each in changes if values[each.quantity] > tolerance]
+    excuses = (_find_excuse(failures, number, state, largest) for number, state in enumerate(states))
     return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
+
+
+def _find_excuse(failures: Sequence[Change], number: int, state: FrozenState, largest: float | None) -> str:
+    """Return why a kink in the first state, or the second, excuses changes that are too large, or an empty string."""
+    errors = {each.part: float(np.abs(each.change).max()) for each in failures}
+    columns = next((each.worst_columns(number) for each in failures if each.part == "tangent"), None)
+    return explain_by_kink(
+        state, roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), errors, columns
+    )
 
 
 def compare(
