@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from handmade import Handmade, case, over_a_node, subject
 from scipy import sparse
+from subjects import change_verbs, judge_as, load_property, load_subject
 
+from contactverif import Subject, Verdict
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
+from contactverif.diagnosis.flat_state import flat_state
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import (
     explain_by_kink,
@@ -177,3 +180,25 @@ def test_a_force_that_is_missing_at_a_kink_and_on_neither_side_is_not() -> None:
     assert not is_like_its_surroundings(state, REACH)
     assert explain_by_kink(state, REACH, {"forces": 0.1}) == ""
     assert is_like_its_surroundings(at(Dropping, over_a_node(1 / 7)), REACH)
+
+
+def test_a_wrong_tangent_is_asked_for_kinks_in_few_columns() -> None:
+    """Only the columns of its largest error are differentiated."""
+    states: list[int] = []
+
+    def count(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        states.append(np.atleast_2d(z).shape[0])
+        return right(interface, pairing, z)
+
+    def drop_last_column(right: Any, *state: Any) -> Any:
+        tangent = dense(right(*state)).copy()
+        tangent[:, -1] = 0.0
+        return tangent
+
+    def make(*, penalty: float) -> Any:
+        right = load_subject("nts-ar").with_penalty(penalty).plugin
+        return change_verbs(right, residual=count, tangent=drop_last_column)
+
+    state = flat_state().case
+    judge_as(Verdict.FAIL, load_property("objectivity"), state, Subject("wrong", make))
+    assert sum(states) < 300
