@@ -24,11 +24,11 @@ from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole
 from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import Row
 from contactverif.run import scheduler
+from contactverif.run.judge import SLOW_CALL
 
 _BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
 _PAUSE = 5.0  # Seconds between two lines about the whole run, where there is no terminal.
-_SLOW = 0.01  # Seconds of a call of a formulation that are worth a word: the included ones take 1e-4.
 
 
 class _TimeColumn(TimeElapsedColumn):
@@ -81,7 +81,7 @@ class Bar:
         self._of_run = step.of_run or self._of_run
         if step.row is not None:
             self._show_row(step.row)
-        if (step.first_seconds or 0.0) >= _SLOW:
+        if (step.first_seconds or 0.0) >= SLOW_CALL:
             self._print(Text(f"{step.formulation}: a pairing and a residual take {step.first_seconds:.2g} s"))
         words = f"{f'{step.formulation} {step.property_id}'.rstrip()}: {step.phase} {step.count}/{step.planned}"
         if self._progress.disable and monotonic() >= self._next_line:

@@ -34,9 +34,11 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     promise the patch test may have them.
     """
     rules, patch = subject.traits.rules, subject.traits.promises.patch
-    if rules.enforcement == "penalty" and (text := diagnose_lost_places(subject)):
+    if rules.enforcement != "penalty":
+        return ""
+    if text := diagnose_lost_places(subject):
         return text
-    if rules.enforcement != "penalty" or rules.penalty == "nodal" or patch.flat is False:
+    if rules.penalty == "nodal" or patch.flat is False:
         return ""  # Other forces than the consistent ones are right there.
     patterns = (
         diagnose_digits,

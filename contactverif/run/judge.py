@@ -27,7 +27,7 @@ from contactverif.problems.named_states import named_case
 from contactverif.sampling.blas_threads import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
-_SLOW = 0.01  # Seconds. A first call that takes so long is made once more.
+SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
 
 
 def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
@@ -169,7 +169,7 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, named_case(STATES[0]), parts)
             opposite, seconds = _pulls_in_time(subject)
-            if seconds >= _SLOW:  # A busy machine makes one call slow, and hardly two.
+            if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
                 seconds = min(seconds, _pulls_in_time(subject)[1])
             opposite = opposite and all(_pulls(subject, name) for name in STATES[1:])
             if "contact_points" in parts:

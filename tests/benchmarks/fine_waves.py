@@ -2,7 +2,7 @@
 
 `tox -e fine-waves` writes `reports/bench/fine_waves.csv`: the errors of six formulations, their linear systems, the
 entries of their tangent, and the seconds of an evaluation over those of VTS-PPT on the same mesh. Nothing is condensed:
-each system has all unknowns of both bodies. The largest takes some gigabytes, and all take an hour.
+each system has all unknowns of both bodies. The largest takes some gigabytes, and all take hours.
 """
 
 import csv

@@ -72,6 +72,11 @@ def test_the_table_of_the_race_is_that_of_the_file() -> None:
     assert PEER in names
 
 
+def test_the_table_of_fine_waves_is_that_of_the_file() -> None:
+    expected = [[row["formulation"], row["forces"], row["systems"]] for row in rows("fine_waves.csv")]
+    assert table("| | error of the forces |") == expected[: len(table("| | error of the forces |"))]
+
+
 def test_the_powers_of_the_cost_are_those_of_the_file() -> None:
     time = {(row["formulation"], row["segments"]): float(row["median / µs"]) for row in rows("kernels.csv")}
     text = HOW_TO[HOW_TO.index("From 10,000 to 1,000,000 segments") :].partition("\n\n")[0]
