@@ -102,7 +102,7 @@ def solve_for_accuracy(
     interface = scene.interface
     guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
     formulation = subject.for_case(guess)
-    trace = solve_in_tries(scene, formulation, start, step, keep_matrix=True)[-1]
+    trace = solve_in_tries(scene, formulation, start, step, solution_only=True)[-1]
     return solution_of(trace, formulation, nodal=subject.traits.rules.penalty == "nodal")
 
 
@@ -112,12 +112,11 @@ def solve_in_tries(
     start: FloatArray | None = None,
     step: float | None = None,
     *,
-    keep_matrix: bool = False,
+    solution_only: bool = False,
 ) -> tuple[Trace, ...]:
     """Solve a scene with the formulation's tangent; if that does not converge, once more with differences.
 
-    The arguments are those of `solve_for_accuracy`. With `keep_matrix` the matrix of Newton's method is kept, see
-    `solve`.
+    The arguments are those of `solve_for_accuracy`. With `solution_only`, calls are saved, see `solve`.
     """
     ways = (True, False) if "tangent" in formulation.provides else (True,)
     traces = []
@@ -129,7 +128,7 @@ def solve_in_tries(
             tolerance=BALANCED,
             difference_step=step,
             use_tangent=use_tangent,
-            keep_matrix=keep_matrix,
+            solution_only=solution_only,
         )
         traces.append(trace)
         if trace.converged:

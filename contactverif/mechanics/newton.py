@@ -43,7 +43,7 @@ def solve(
     use_tangent: bool = True,
     tolerance: float = 0.0,
     difference_step: float | None = None,
-    keep_matrix: bool = False,
+    solution_only: bool = False,
 ) -> Trace:
     """Solve a scene by Newton's method with full steps.
 
@@ -69,10 +69,11 @@ def solve(
         does not apply to multipliers.
     difference_step : float | None
         The step of differences in positions, a length; None for the one that suits smooth residuals.
-    keep_matrix : bool
-        True keeps the matrix while each iteration makes the residual `KEPT_FALL` times smaller: for whoever asks for
-        the solution alone. The same residual decides about convergence. It does not apply to multipliers, since the
-        matrix says which of them are active.
+    solution_only : bool
+        True saves calls where the iterates do not matter. The same residual decides about convergence. The matrix is
+        kept while each iteration makes the residual `KEPT_FALL` times smaller, but not with multipliers, since it says
+        which of them are active. In place of differences for each unknown it takes any matrix that one difference
+        confirms: the formulation's own tangent, or differences of many unknowns at a time.
 
     Returns
     -------
@@ -93,8 +94,10 @@ def solve(
     for name, number in (("load_steps", load_steps), ("iterations", iterations)):
         if number < 1:
             raise MisuseError(name, f"{number}", "at least 1")
-    system, record = System(scene, formulation, use_tangent=use_tangent, difference_step=difference_step), Record()
-    keep_matrix = keep_matrix and not system.n_multipliers
+    system = System(
+        scene, formulation, use_tangent=use_tangent, difference_step=difference_step, any_matrix=solution_only
+    )
+    record, keep_matrix = Record(), solution_only and not system.n_multipliers
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
         behind = f", or ({system.size},) with multipliers" if system.n_multipliers else ""

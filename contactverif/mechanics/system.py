@@ -7,20 +7,26 @@ an iteration goes on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.errors import ContractError
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics import linear
+from contactverif.mechanics.force_differences import Differences
 from contactverif.mechanics.scene import Scene
 
 ROUNDOFF_FACTOR = 8.0  # A residual is zero if it is at most this many units of roundoff of its largest terms.
+# Forces at a node depend on its neighbours, on the segments that these face, and on the neighbours of those: the
+# longest slave segment and the longest master segment together, times this.
+REACH = 1.5
 
 
 @dataclass(slots=True)
@@ -38,6 +44,8 @@ class System:
     use_tangent: bool = True
     # The step of differences in positions, a length; None for the one that suits smooth residuals.
     difference_step: float | None = None
+    # True takes any matrix that one difference confirms in place of differences for each unknown.
+    any_matrix: bool = False
     n_multipliers: int = field(init=False)  # The number of multipliers of the formulation on the scene's interface.
     # (n_unknowns + n_multipliers, n) The scene's transformation from unknowns to positions, with the multipliers
     # behind both.
@@ -81,7 +89,7 @@ class System:
         z = self.state(u)
         if self._asks_tangent:
             return self.formulation.tangent(self.scene.interface, pairing, z)
-        return self.differences(pairing, z)
+        return self._differences(pairing, z)
 
     def forces_and_tangent(
         self, u: FloatArray, pairing: Pairing | None, *, later: bool = False
@@ -176,21 +184,37 @@ class System:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
         return linear.solve_step(matrix, right, self.scene.n_free, floor)
 
-    def differences(self, pairing: Pairing | None, z: FloatArray) -> FloatArray:
+    def _differences(self, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the derivative (n_unknowns, n_unknowns) of the contact forces at z, by central differences."""
-        n_positions = self.scene.interface.n_unknowns
-        positions, multipliers = z[:n_positions], z[n_positions:]
-        shortest = min(side.lengths(positions.reshape(-1, 2)).min() for side in self._sides())
-        smooth = shortest * (UNIT_ROUNDOFF * np.abs(positions).max() / shortest) ** (1 / 3)
+        interface = self.scene.interface
+        positions, multipliers = z[: interface.n_unknowns], z[interface.n_unknowns :]
+        lengths = [side.lengths(positions.reshape(-1, 2)) for side in (interface.slave, interface.master)]
+        shortest, largest = min(part.min() for part in lengths), float(np.abs(positions).max())
+        smooth = shortest * (UNIT_ROUNDOFF * largest / shortest) ** (1 / 3)
         steps = np.full(z.size, smooth if self.difference_step is None else self.difference_step)
+        sizes = np.full(z.size, largest)
         if len(multipliers):  # The residual is linear in them: a step of their size, or of the bodies' stiffness.
             size = np.abs(multipliers).max() or (abs(self.scene.stiffness).max() if self.scene.n_free else 0.0)
-            steps[n_positions:] = size or 1.0
-        shifts = np.diag(steps)
-        states = np.concatenate([z + shifts, z - shifts])
-        forces = self.formulation.residual(self.scene.interface, pairing, states)
-        derivative: FloatArray = (forces[: z.size] - forces[z.size :]).T / (2 * steps)
-        return derivative
+            steps[len(positions) :] = sizes[len(positions) :] = size or 1.0
+        residual = partial(self.formulation.residual, interface, pairing)
+        differences = Differences(residual, z, steps, sizes, len(positions))
+        return self._guess(differences, pairing, REACH * sum(part.max() for part in lengths))
 
-    def _sides(self) -> tuple[Any, Any]:
-        return self.scene.interface.slave, self.scene.interface.master
+    def _guess(self, differences: Differences, pairing: Pairing | None, reach: float) -> Any:
+        """Return the derivative by differences for each unknown, or by what is cheaper, where that will do."""
+        if self.any_matrix:
+            differences = differences.away_from_kinks()
+            for matrix in self._guesses(differences, pairing, reach):
+                if matrix is not None and differences.confirm(matrix):
+                    return matrix
+        return differences.by_unknown()
+
+    def _guesses(self, differences: Differences, pairing: Pairing | None, reach: float) -> Iterator[Any]:
+        """Yield matrices that may be the derivative: the formulation's tangent, then that of forces of some reach."""
+        if "tangent" in self.formulation.provides:
+            try:
+                yield self.formulation.tangent(self.scene.interface, pairing, differences.z)
+            except ContractError:
+                yield None  # A tangent that breaks the contract is no fault of the forces.
+        if not self.n_multipliers:
+            yield differences.by_groups(reach)

@@ -247,7 +247,7 @@ def hard_zero_load(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never.
     """
     scene, formulation = scene_of(case), subject.for_case(case)
-    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, solution_only=True)
     u = trace.u[int(np.argmin(trace.residuals))] if trace.converged else np.zeros(trace.u.shape[1])
     q = u[: scene.n_free]
     end = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])

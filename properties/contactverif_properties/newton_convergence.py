@@ -212,7 +212,7 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
         by_differences = replace(system, use_tangent=False)
         exact, _ = by_differences.matrix(solution, trace.pairing)
         details["spectral radius"] = spectral_radius(matrix, exact)
-        if not fit_steps(by_differences, case, trace, exact, condition).order >= QUADRATIC:
+        if not fit_steps(by_differences, case, trace, exact, condition, [steps.worst]).order >= QUADRATIC:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     linear = steps.order == inf  # One step solves a linear problem, which has no order.
     return Measurement(
@@ -230,18 +230,26 @@ class Steps:
     order: float  # The lower order of the directions; NaN if none decides.
     rate: float  # The higher rate of the directions.
     count: int  # The number of steps that started with the pairing of the solution.
+    worst: int  # The direction with the lowest order.
 
 
-def fit_steps(system: System, case: Case, trace: Trace, matrix: Any, condition: float) -> Steps:
+def fit_steps(
+    system: System,
+    case: Case,
+    trace: Trace,
+    matrix: Any,
+    condition: float,
+    directions: Sequence[int] = range(N_DIRECTIONS),
+) -> Steps:
     """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
 
-    The matrix is the one at the solution, and the condition its reciprocal condition.
+    The matrix is the one at the solution, and the condition its reciprocal condition. Directions have numbers.
     """
     solution, pairing, length = trace.u[-1], trace.pairing, case.shortest_segment
     units = scale_factors(matrix, system.scene.n_free)[1]
     floor = newton_solution.solution_floor(system.scene, solution, units, condition)
     fits, count = [], 0
-    for direction in random_directions(case.seed, N_DIRECTIONS, system.size):
+    for direction in random_directions(case.seed, N_DIRECTIONS, system.size)[list(directions)]:
         before, after = [], []
         distances = [distance * length for distance in DISTANCES]
         states = [solution + distance * direction * units for distance in distances]
@@ -255,8 +263,10 @@ def fit_steps(system: System, case: Case, trace: Trace, matrix: Any, condition: 
             before.append(distance)
             after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
         fits.append(fit_order(np.array(before), np.array(after), floor))
-    decisive = [(order, rate) for order, rate in fits if not np.isnan(order)] or [(np.nan, np.nan)]
-    return Steps(min(order for order, _ in decisive), max(rate for _, rate in decisive), count)
+    numbered = [(*fit, number) for number, fit in zip(directions, fits, strict=True)]
+    decisive = [fit for fit in numbered if not np.isnan(fit[0])] or [(np.nan, np.nan, 0)]
+    order, _, worst = min(decisive)
+    return Steps(order, max(rate for _, rate, _ in decisive), count, worst)
 
 
 def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:

@@ -188,10 +188,10 @@ def _solve(
     that is not in balance there is judged where it comes nearest to balance afterwards. Distances from the exact
     solution are measured by its penetration p/ε̂.
     """
-    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    trace = solve(scene, formulation, iterations=ITERATIONS, use_tangent=False, solution_only=True)
     if is_solved(trace, exact, penetration):
         return trace, trace.u[-1], False
-    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, keep_matrix=True)
+    again = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, solution_only=True)
     return trace, nearest_to_balance(again), again.end is End.SINGULAR and len(again.u) == 1
 
 

@@ -474,7 +474,7 @@ def test_every_end_has_its_number_and_its_words() -> None:
 @pytest.mark.parametrize("name", ["vts-ppt", "mortar"])
 def test_a_kept_matrix_leads_to_the_same_solution(name: str) -> None:
     scene = catalogue.load_scene("c-prime")
-    traces = [solve(scene, on(name, scene), use_tangent=False, keep_matrix=keep) for keep in (False, True)]
+    traces = [solve(scene, on(name, scene), use_tangent=False, solution_only=keep) for keep in (False, True)]
     assert all(trace.converged for trace in traces)
     size = np.abs(traces[0].solution).max()
     assert np.abs(traces[1].solution - traces[0].solution).max() <= 1e-12 * size
@@ -484,7 +484,7 @@ def test_a_kept_matrix_stops_where_the_matrix_of_that_state_would() -> None:
     """The first guess penetrates 60 times too deep. Its floor is 50 times that of the solution."""
     slave, master = Rectangle([0, 0.125], [2, 3]), Rectangle([0, 0.125], [-3, -2, 2])
     scene = two_blocks(slave, master, penalty=80, approach=0.75)
-    trace = solve(scene, on("vts-ppt", scene), use_tangent=False, keep_matrix=True)
+    trace = solve(scene, on("vts-ppt", scene), use_tangent=False, solution_only=True)
     system = System(scene, on("vts-ppt", scene), use_tangent=False)
     pairing = system.pair(trace.solution)
     _, floor = system.matrix(trace.solution, pairing)

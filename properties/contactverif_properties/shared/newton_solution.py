@@ -24,7 +24,13 @@ def find_solution(system: System) -> Trace:
     that is there, because they overshoot into another pairing.
     """
     for use_tangent, load_steps in ((True, 1), *((False, number) for number in (1, *LOAD_STEPS))):
-        trace = solve(system.scene, system.formulation, use_tangent=use_tangent, load_steps=load_steps)
+        trace = solve(
+            system.scene,
+            system.formulation,
+            use_tangent=use_tangent,
+            load_steps=load_steps,
+            solution_only=not use_tangent,
+        )
         if trace.converged:
             break
     return trace

@@ -100,6 +100,7 @@ def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> 
     Start and solution are (n_free + n_multipliers,). The solution is None unless the residual gets down to its own
     roundoff. A formulation without a pairing decides anew at each iterate.
     """
+    system.any_matrix = True
     for use_tangent in (True, False):
         system.use_tangent = use_tangent
         if (solution := _iterate(system, start, pairing)) is not None:
