@@ -267,7 +267,7 @@ def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
 
 def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
     """Return `make(*, penalty)` for the text, with its options and its inner formulation filled in."""
-    _check_length(text)
+    _check_name(text)
     outer, slash, inner_text = text.partition("/")
     name, options = parse_name("formulation", outer, _FORM)
     installed = _entries_by_name(FORMULATIONS)
@@ -293,10 +293,13 @@ def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
     return partial(make, **options, inner=inner)
 
 
-def _check_length(text: str) -> None:
-    """Refuse a name that is too long, or that has too many wrappers."""
+def _check_name(text: str) -> None:
+    """Refuse a name that is too long, that has too many wrappers, or that is a file."""
     if len(text) > LONGEST_NAME:
         raise MisuseError("formulation", repr(name_line(text)), _SHORT_NAME)
+    if text.partition(":")[0].endswith(".py"):
+        needed = "an installed name (`contactverif new NAME` begins one); in Python, contactverif.verify takes a class"
+        raise MisuseError("formulation", f"a file, {text!r}", needed)
     if text.count("/") > _MOST_WRAPPERS:
         raise MisuseError("formulation", f"{text.count('/')} wrappers in {text!r}", f"at most {_MOST_WRAPPERS}")
 

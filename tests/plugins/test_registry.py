@@ -169,6 +169,8 @@ def test_values_are_whole_numbers_numbers_truth_or_words() -> None:
         ("nts/vts-me", ["nts wraps nothing"]),
         ("twice/vts-m", ["found 'vts-m'", "nearest: vts-me"]),
         ("twice/vts-me:n=0", ["n: found 0"]),
+        ("twice/twice/twice/twice/nts", ["found 4 wrappers", "at most 3"]),
+        ("a/b/c/d/mine.py:Mine", ["found a file, 'a/b/c/d/mine.py:Mine'", "contactverif new NAME"]),
     ],
 )
 @pytest.mark.usefixtures("entries")
