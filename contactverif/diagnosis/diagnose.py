@@ -43,7 +43,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
                 return diagnose_memory(subject)
             every = (property_id, *others)
             if all(name.startswith(OF_TANGENTS) for name in every):
-                return diagnose_tangent(subject)
+                return _introduce(diagnose_tangent(subject))
             in_full = property_id.startswith("patch.") or subject.traits.promises.patch.flat is True
             text = diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
@@ -52,3 +52,8 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             return text or (diagnose_tangent(subject) if property_id.startswith(OF_TANGENTS) else "")
     except ContractError:
         return ""
+
+
+def _introduce(text: str) -> str:
+    """Return what is said of a tangent where no property of forces fails; empty if there is nothing to say."""
+    return f"only the tangent fails: {text}" if text else ""

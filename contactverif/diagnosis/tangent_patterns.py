@@ -134,9 +134,9 @@ def _one_line(pair: Tangents) -> str:
         if len(places) == 1:
             place = int(places[0])
             missing = not np.take(pair.tangents, place, axis=axis).any()
-            return (
-                f"{name} {place} ({_unknown(place, pair)}) is {'missing' if missing else 'wrong'}, all others are right"
-            )
+            rank = {0: "the first, ", len(lines) - 1: "the last, "}.get(place, "")
+            change = "missing" if missing else "wrong"
+            return f"{name} {place} ({rank}{_unknown(place, pair)}) is {change}, all others are right"
     return ""
 
 
