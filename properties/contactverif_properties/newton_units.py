@@ -28,7 +28,7 @@ from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, ratio
 
 LARGEST_LENGTH, LARGEST_MODULUS = 60, 30  # The largest exponents of 2 and of 4.
 STEP_ROUNDINGS = 1e3  # A linear system is solved to so many roundoffs over its reciprocal condition.
-ITERATIONS = 20  # What wanders longer takes steps like those before.
+ITERATIONS = 20  # A method that wanders longer takes steps like those before.
 POSITION_ROUNDINGS = 30.0  # A position, and a difference quotient, are rounded to so many roundoffs.
 STEPS = Quantity(
     "difference of a step in other units",
