@@ -90,7 +90,7 @@ class Differences:
         before, after = self._ends
         change = np.abs(after - before).max(initial=0.0)
         rounded = float((self.sizes / self.steps)[0]) * change + np.abs(forces).max(initial=0.0)
-        bend = np.abs(before - 2 * forces + after).max(initial=0.0)
+        bend = np.abs(before - 2 * forces + after).max(initial=0.0)  # Four forces, each of which is rounded.
         return bool(bend > KINK * change + 4 * ROUNDOFF_FACTOR * UNIT_ROUNDOFF * rounded)
 
     @cached_property
