@@ -91,6 +91,8 @@ ROOMS = {
     # The three folders of extension points. The judge shares no code with the judged.
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
+    # An engine writes files and starts programs; its code is imported inside `solve`.
+    "contactverif_engines": Room(("contract",), ("numpy", "scipy", "skfem", "ngsolve", "netgen", "KratosMultiphysics")),
     "properties.shared": Room(
         ("contract", "oracle", "mechanics", "problems", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),

@@ -62,7 +62,8 @@ def check_share(share: float) -> None:
 def audit_report(report: Path, share: float, place: PlaceOptions, isolation: IsolationOptions) -> int:
     """Audit a report, and show what differs; return the exit status."""
     from contactverif.cli.run_endings import show_what_plugins_printed
-    from contactverif.plugins.registry import the_formulation, the_property
+    from contactverif.plugins.engines import the_subject
+    from contactverif.plugins.registry import the_property
     from contactverif.run.audit import audit as audit_run
     from contactverif_reports.netcdf.differences import same_data
     from contactverif_reports.netcdf.read import read_run
@@ -71,7 +72,7 @@ def audit_report(report: Path, share: float, place: PlaceOptions, isolation: Iso
     check_share(share)
     run = read_run(report, consistent=False)
     sampling = _sampling(run, place)
-    subjects = [the_formulation(name, isolation.limits()) for name in run.formulations]
+    subjects = [the_subject(name, isolation.limits()) for name in run.formulations]
     questions = [the_property(id_) for id_ in run.properties]
     result = audit_run(run, subjects, questions, sampling, share)
     with TemporaryDirectory() as folder:

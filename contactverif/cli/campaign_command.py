@@ -11,7 +11,13 @@ import typer
 from contactverif.api.settings import read_settings
 from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.run_endings import show_what_plugins_printed
-from contactverif.cli.shared_options import PropertyGlobs, SamplingOptions, formulation_argument
+from contactverif.cli.shared_options import (
+    EngineNames,
+    PropertyGlobs,
+    SamplingOptions,
+    formulation_argument,
+    with_engines,
+)
 from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, say_what_was_doubted
 
@@ -26,7 +32,8 @@ _SEED = 0  # The seed if there is none: all shards must have the same.
 
 def campaign(
     *,
-    names: Annotated[list[str], formulation_argument("Formulations, as in verify.")],
+    names: Annotated[list[str] | None, formulation_argument("Formulations, as in verify.")] = None,
+    engines: EngineNames = None,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
     shard: Annotated[str, typer.Option(help="The shard: its number from 1, and the number of all.", metavar="I/N")],
@@ -55,7 +62,7 @@ def campaign(
 
     piece = Shard.parse(shard)
     options = VerifyOptions(
-        tuple(select_names(names, False, isolation.limits())),
+        tuple(select_names(with_engines(names, engines), False, isolation.limits())),
         tuple(properties or ()),
         sampling,
         keep_going=True,

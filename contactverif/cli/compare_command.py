@@ -15,6 +15,7 @@ from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import OutputFiles
 from contactverif.cli.shared_options import (
     RESULT_FILES,
+    EngineNames,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
@@ -22,6 +23,7 @@ from contactverif.cli.shared_options import (
     WorkerOptions,
     formulation_argument,
     formulation_option,
+    with_engines,
 )
 from contactverif.cli.verify_job import COMPARE, VerifyOptions, new_job, resumed_job
 from contactverif.contract.errors import MisuseError
@@ -30,6 +32,7 @@ from contactverif.contract.errors import MisuseError
 def compare(
     *,
     names: Annotated[list[str] | None, formulation_argument("Formulations; or two reports, OLD.nc NEW.nc.")] = None,
+    engines: EngineNames = None,
     against: Annotated[list[str] | None, formulation_option("The one formulation to compare with.")] = None,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
@@ -76,17 +79,19 @@ def compare(
     \bExamples
       contactverif compare mine --against vts-ppt
       contactverif compare mine nts-ar --against vts-ppt --seed 7 --out mine.html
+      contactverif compare --engine calculix --against engine/control
       contactverif compare --resume mine.nc
       contactverif compare old.nc new.nc
     """
     reference = _only_one("--against", against or [])
-    reports = _reports_among(names or [])
+    names = with_engines(names, engines)
+    reports = _reports_among(names)
     if reports:
         _check_no_run_options(sampling, place, workers, screen, against=reference, pictures=pictures, resume=resume)
         nothing_worse = _compare_reports(reports, properties or [], out)
         raise typer.Exit(0 if nothing_worse else 1)
     options = VerifyOptions(
-        tuple([reference or "", *(names or ())] if reference or names else ()),
+        tuple([reference or "", *names] if reference or names else ()),
         tuple(properties or ()),
         sampling,
         tuple(out or ()),

@@ -53,7 +53,7 @@ def explain(
     run, examples = _read(name, report, case)
     if run is not None:
         name = name or examples[0].property_id
-    if name in property_ids():
+    if name in property_ids(engines=True):
         _explain_property(name, run, examples, report, isolation)
     elif name is None:
         _show(list_of_terms())
@@ -70,7 +70,7 @@ def _unknown(name: str) -> MisuseError:
     from contactverif.explanations.trait_text import trait_names
     from contactverif.plugins.registry import property_ids
 
-    names = {*property_ids(), *term_texts(), *symbol_meanings(), *trait_names()}
+    names = {*property_ids(engines=True), *term_texts(), *symbol_meanings(), *trait_names()}
     needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
     return unknown_name_error("NAME", name, names, needed)
 

@@ -29,7 +29,8 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
-from contactverif.plugins.registry import formulation_names, load_formulation, load_properties, the_formulation
+from contactverif.plugins.engines import load_subject, the_subject
+from contactverif.plugins.registry import formulation_names, load_properties
 from contactverif.run.judge import forces_on
 from contactverif.run.rows import find_gap
 from contactverif.run.scheduler import worker_pool
@@ -46,12 +47,12 @@ def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
     if not names:
         others = ", ".join(name for name in formulation_names() if name != reference_name)
         raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")
-    limits, properties = job.limits(), load_properties(job.options.properties)
+    limits, properties = job.limits(), load_properties(job.options.properties, engines=True)
     try:
-        reference = the_formulation(reference_name, limits)
+        reference = the_subject(reference_name, limits)
     except MisuseError as error:
         raise MisuseError("--against", error.found, error.needed) from None
-    return reference, Plugins([reference, *(load_formulation(name, limits) for name in names)], properties)
+    return reference, Plugins([reference, *(load_subject(name, limits) for name in names)], properties)
 
 
 def compare_formulations(job: VerifyJob, screen: ScreenOptions) -> int:

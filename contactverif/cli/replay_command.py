@@ -9,7 +9,7 @@ import typer
 
 from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.cli.output_files import PICTURES, OutputFiles
-from contactverif.cli.shared_options import CaseId, ReportPath, formulation_option, output_option
+from contactverif.cli.shared_options import CaseId, ReportPath, formulation_option, output_option, with_engines
 
 
 def replay(
@@ -18,6 +18,9 @@ def replay(
     case: CaseId = None,
     formulation: Annotated[
         str | None, formulation_option("Judge this formulation instead of the one that failed.")
+    ] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="Judge this engine instead of the one that failed.", metavar="NAME[:OPTIONS]")
     ] = None,
     out: Annotated[list[Path] | None, output_option("Draw the case to FILE.png or FILE.svg. Repeatable.")] = None,
     isolation: IsolationOptions,
@@ -41,7 +44,8 @@ def replay(
     from contactverif.cli.console import say, show
     from contactverif.cli.counterexample_output import announce_stored, draw_outcome, ending_lines, replay_table
     from contactverif.contract.property import Verdict
-    from contactverif.plugins.registry import the_formulation, the_property
+    from contactverif.plugins.engines import the_subject
+    from contactverif.plugins.registry import the_property
     from contactverif.run.judge import judge_if_applicable
     from contactverif_reports.draw import as_text
     from contactverif_reports.netcdf.read import case_ids, read_case
@@ -52,7 +56,8 @@ def replay(
         say("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
     example = read_case(report, case)
-    subject = the_formulation(formulation or announce_stored(example.formulation), isolation.limits())
+    instead = formulation if engine is None else with_engines(None, [engine])[0]
+    subject = the_subject(instead or announce_stored(example.formulation), isolation.limits())
     question = the_property(example.property_id)
     outcome = judge_if_applicable(question, example.case, subject)
     for picture in files.pictures():  # before anything is printed, in case a file cannot be written

@@ -40,6 +40,7 @@ KEEP_GOING_HELP = (
     "Ask all properties, even if the first show an opposite sign, a crash, a breach of the contract, or answers that "
     "depend on earlier calls."
 )
+ENGINE_HELP = "A whole contact code, judged by the displacements that it finds. Repeatable."
 LAST_FAILED_HELP = "Ask nothing but the cases that failed in earlier runs, which `.contactverif` keeps."
 NO_MEMORY_HELP = "Neither ask first what failed in earlier runs, nor keep what fails now."
 JOBS_HELP = (
@@ -59,7 +60,14 @@ def complete_property(incomplete: str) -> list[str]:
     """Return the installed properties whose id begins so, for the shell."""
     from contactverif.plugins.registry import property_ids
 
-    return [property_id for property_id in property_ids() if property_id.startswith(incomplete)]
+    return [property_id for property_id in property_ids(engines=True) if property_id.startswith(incomplete)]
+
+
+def with_engines(names: list[str] | None, engines: list[str] | None) -> list[str]:
+    """Return the names of formulations, and those of engines as they stand beside them."""
+    from contactverif.contract.engine_subject import ENGINE
+
+    return [*(names or ()), *(f"{ENGINE}{name.removeprefix(ENGINE)}" for name in engines or ())]
 
 
 def formulation_argument(words: str) -> Any:
@@ -77,6 +85,7 @@ def output_option(words: str) -> Any:
     return typer.Option("--out", help=words, metavar="FILE")
 
 
+EngineNames = Annotated[list[str] | None, typer.Option("--engine", help=ENGINE_HELP, metavar="NAME[:OPTIONS]")]
 FormulationNames = Annotated[
     list[str] | None,
     formulation_argument("Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference."),
@@ -125,6 +134,15 @@ class FailureOptions:
     keep_going: Annotated[bool, typer.Option("--keep-going", help=KEEP_GOING_HELP)] = False
     last_failed: Annotated[bool, typer.Option("--last-failed", help=LAST_FAILED_HELP)] = False
     no_memory: Annotated[bool, typer.Option("--no-memory", help=NO_MEMORY_HELP)] = False
+
+
+@dataclass(frozen=True, slots=True)
+class SubjectOptions:
+    """The formulations and engines that are judged."""
+
+    names: FormulationNames = None
+    engines: EngineNames = None
+    all_: Annotated[bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")] = False
 
 
 @dataclass(frozen=True, slots=True)

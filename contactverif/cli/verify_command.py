@@ -29,12 +29,13 @@ from contactverif.cli.run_endings import (
 from contactverif.cli.shared_options import (
     RESULT_FILES,
     FailureOptions,
-    FormulationNames,
     PlaceOptions,
     PropertyGlobs,
     SamplingOptions,
     ScreenOptions,
+    SubjectOptions,
     WorkerOptions,
+    with_engines,
 )
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, resumed_job
 from contactverif.contract.errors import MisuseError
@@ -47,8 +48,7 @@ if TYPE_CHECKING:
 
 def verify(
     *,
-    names: FormulationNames = None,
-    all_: Annotated[bool, typer.Option("--all", help="Check every installed formulation that wraps no other.")] = False,
+    subjects: SubjectOptions,
     properties: PropertyGlobs = None,
     sampling: SamplingOptions,
     out: Annotated[list[Path] | None, RESULT_FILES] = None,
@@ -89,11 +89,12 @@ def verify(
       contactverif verify nts -p 'patch.*' --seed 7
       contactverif verify mine --mesh punch.msh --slave punch --master base
       contactverif verify vts-me --scene c -p 'patch.*'
+      contactverif verify --engine calculix -p 'patch.*'
       contactverif verify --resume vts-ppt.nc
       contactverif verify mine --last-failed
     """
     typed = VerifyOptions(
-        tuple(names or ()),
+        tuple(with_engines(subjects.names, subjects.engines)),
         tuple(properties or ()),
         sampling,
         tuple(out or ()),
@@ -108,7 +109,7 @@ def verify(
     if resume is not None:
         job = resumed_job(resume, typed)
     else:
-        selected = tuple(select_names(names or [], all_, isolation.limits()))
+        selected = tuple(select_names([*typed.names], subjects.all_, isolation.limits()))
         job = new_job(replace(typed, names=selected).with_settings(settings))
     if failures.last_failed:
         raise typer.Exit(ask_what_failed(job))
@@ -209,5 +210,5 @@ def select_names(names: list[str], every: bool, limits: Limits | None = None) ->
     if every:
         return list(standalone_names(limits))
     if not names:
-        raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
+        raise MisuseError("NAME", "nothing", f"--all, --engine, or some of {', '.join(formulation_names())}")
     return names

@@ -57,12 +57,14 @@ class VerifyOptions:
     def with_settings(self, settings: Settings) -> VerifyOptions:
         """Return the options with those of the project where nothing is typed; of `isolation` see there."""
         from contactverif.contract.names import unknown_name_error
+        from contactverif.plugins.engines import has_engine
         from contactverif.plugins.registry import matching_ids, property_ids
 
         properties = self.properties or settings.properties
-        for unknown in settings.known.keys() - {*property_ids()}:
-            raise unknown_name_error("known failure", unknown, property_ids())
-        matching = {*matching_ids(properties or ("*",))} - _known_failures(self.known).keys()
+        ids, engines = property_ids(engines=True), has_engine(self.names)
+        for unknown in settings.known.keys() - {*ids}:
+            raise unknown_name_error("known failure", unknown, ids)
+        matching = {*matching_ids(properties or ("*",), engines=engines)} - _known_failures(self.known).keys()
         known = (f"{name}={reason}" for name, reason in settings.known.items() if name in matching)
         return replace(
             self,
@@ -111,11 +113,12 @@ class VerifyJob:
 
     def load(self) -> Plugins:
         """Load the formulations and the properties."""
-        from contactverif.plugins.registry import load_formulation, load_properties
+        from contactverif.plugins.engines import load_subject
+        from contactverif.plugins.registry import load_properties
 
         limits = self.limits()
-        questions = load_properties(self.options.properties)
-        return Plugins([load_formulation(name, limits) for name in self.options.names], questions)
+        questions = load_properties(self.options.properties, engines=True)
+        return Plugins([load_subject(name, limits) for name in self.options.names], questions)
 
     def limits(self) -> Limits | None:
         """Return the limits of the plugins' processes; in a box they do not see what this run writes."""
@@ -236,6 +239,7 @@ def say_what_was_doubted(journal: Journal) -> None:
 
 def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:
     """Return the job of options as they were typed. Where nothing says the seed it is the fresh one, or a new one."""
+    from contactverif.plugins.engines import has_engine
     from contactverif.plugins.registry import matching_ids
     from contactverif.run.profiles import profile_named
 
@@ -247,7 +251,7 @@ def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: s
     folder = PictureFolder.make(options.pictures)
     settled = replace(
         options,
-        properties=matching_ids(options.properties or ("*",)),
+        properties=matching_ids(options.properties or ("*",), engines=has_engine(options.names)),
         isolation=options.isolation.settle(),
         sampling=replace(sampling, examples=profile.examples, seed=profile.seed, profile=profile.name),
     )

@@ -16,6 +16,7 @@ from typing import Any, TypedDict, Unpack
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
+from contactverif.contract.engine_subject import SOLVE, EngineSubject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import clean, refuse
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
@@ -114,6 +115,7 @@ class OtherAttributes(TypedDict, total=False):
     asks: frozenset[str]
     shown_by: frozenset[str]
     bodies: bool
+    engines: bool
     exact: Callable[[Case], FloatArray] | None
 
 
@@ -140,6 +142,9 @@ class Property(PropertyInfo):
         not held against the formulation.
     bodies : bool
         The cases are scenes, which are solved; else they are states of an interface alone.
+    engines : bool
+        Displacements alone answer the question, so that engines are asked it too. A property of which `needs` holds
+        "solve" is asked of engines alone.
     exact : Callable[[Case], FloatArray] | None
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
@@ -154,6 +159,7 @@ class Property(PropertyInfo):
     asks: frozenset[str] = WITHOUT_BARRIER
     shown_by: frozenset[str] = frozenset()
     bodies: bool = False
+    engines: bool = False
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""
 
@@ -185,8 +191,13 @@ class Property(PropertyInfo):
         """The plain data alone."""
         return PropertyInfo(**{part.name: getattr(self, part.name) for part in fields(PropertyInfo)})
 
-    def refusal(self, traits: Traits) -> str:
-        """Return why the property is not asked of a formulation, or an empty string."""
+    def refusal(self, subject: Subject) -> str:
+        """Return why the property is not asked of a formulation or an engine, or an empty string."""
+        traits = subject.traits
+        if isinstance(subject, EngineSubject) and not self.engines:
+            return "displacements alone do not answer it"
+        if SOLVE in self.needs - subject.provides:
+            return "it is asked of whole codes"
         if PLANE not in traits.abilities.dimensions:
             return "the interfaces are plane, and the formulation takes none of them"
         if traits.rules.enforcement in self.asks:

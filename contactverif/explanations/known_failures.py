@@ -59,9 +59,7 @@ def stated_failures(question: Property, installed: Iterable[object]) -> str:
     failing = [
         f"`{subject.name}` (`{subject.traits.witness(question.id)}`)"
         for subject in installed
-        if isinstance(subject, Subject)
-        and question.promise(subject.traits) is False
-        and not question.refusal(subject.traits)
+        if isinstance(subject, Subject) and question.promise(subject.traits) is False and not question.refusal(subject)
     ]
     if not failing:
         return "No installed formulation states that it fails.\n"

@@ -13,6 +13,7 @@ from math import inf
 from time import monotonic
 from typing import Any
 
+import numpy as np
 import psutil
 
 from contactverif.contract.arrays import Array
@@ -34,6 +35,8 @@ from contactverif.isolation.messages import (
     Request,
     ShareInterface,
     SharePairing,
+    Solve,
+    Solved,
     encode,
 )
 from contactverif.isolation.one_core import JUDGE
@@ -63,7 +66,7 @@ class Host:
         self._process: PluginProcess | None = None
         self._shelf: OrderedDict[int, tuple[Any, int]] = OrderedDict()
         # One list, so that an interrupt leaves no request whose question is missing.
-        self._queue: list[tuple[Request, Question | None]] = []
+        self._queue: list[tuple[Request | Solve, Question | None]] = []
         self._forgotten: list[int] = []
         self._number = 0
         self._last_words = b""
@@ -111,7 +114,7 @@ class Host:
         self._number += 1
         return self._number
 
-    def _put(self, verb: str, request: Load | Ask, size: int = 0) -> Question:
+    def _put(self, verb: str, request: Load | Ask | Solve, size: int = 0) -> Question:
         question = Question(request.question, verb, size)
         self._queue.append((request, question))
         return question
@@ -158,6 +161,18 @@ class Host:
         packed = None if z is None else PackedArray.pack(z)
         ask = Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed, counted)
         return self._put(verb, ask, 0 if z is None else z.size)
+
+    def solve(self, arrays: Mapping[str, Array]) -> Solved:
+        """Let the engine solve a scene, after a new start where its process has ended."""
+        if self._process is None:
+            raise_failure(self.load(), loading=True)
+        packed = {name: PackedArray.pack(array) for name, array in arrays.items()}
+        question = self._put("solve", Solve(self._next_number(), packed), sum(map(np.size, arrays.values())))
+        self.flush()
+        reply = raise_failure(question.result)
+        if not isinstance(reply, Solved):
+            raise PluginError("solve: another reply than a solution", "channel")
+        return reply
 
     def _share(self, item: Interface | Pairing) -> int:
         """Return the number of something there, after a request to keep it if it is not there."""
@@ -211,7 +226,7 @@ class Host:
         self._process = None
 
     def _exchange(
-        self, process: PluginProcess, waiting: list[tuple[Request, Question | None]], questions: list[Question]
+        self, process: PluginProcess, waiting: list[tuple[Request | Solve, Question | None]], questions: list[Question]
     ) -> None:
         """Send requests and receive the answers: all together if they are small and quick, else one after another."""
         frame = encode([request for request, _ in waiting])
@@ -258,7 +273,8 @@ def _answer_all(questions: Sequence[Question], error: PluginError) -> None:
 def answer_of(question: Question) -> Answer:
     """Return the answer to a question, or raise the ContractError that came instead of it."""
     answer = question.answer if isinstance(question.answer, Answer) else raise_failure(question.result)
-    assert isinstance(answer, Answer)  # No other reply to it is decoded.
+    if not isinstance(answer, Answer):
+        raise PluginError(f"{question.verb}: the reply of an engine", "channel")
     return answer
 
 

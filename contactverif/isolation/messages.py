@@ -75,6 +75,24 @@ class Ask(msgspec.Struct, array_like=True, tag="ask"):
     counted: bool = False  # The methods that run in the call are counted.
 
 
+class Solve(msgspec.Struct, array_like=True, tag="solve"):
+    """Let an engine solve a scene, whose arrays have names."""
+
+    question: int
+    arrays: dict[str, PackedArray]
+
+
+class Solved(msgspec.Struct, array_like=True, tag="solved"):
+    """The answer of an engine: its arrays by name, how it ended, and the time of the solution there."""
+
+    question: int
+    arrays: Annotated[dict[str, PackedArray], msgspec.Meta(max_length=_MOST_NAMES)]
+    converged: bool
+    iterations: int
+    message: str
+    seconds: float
+
+
 class Answer(msgspec.Struct, array_like=True, tag="answer"):
     """The arrays of an answer by name, the time of the call there, and the number of methods that ran in it."""
 
@@ -117,20 +135,20 @@ class Wraps(msgspec.Struct, array_like=True, tag="wraps"):
     summary: str
 
 
-Request = Load | Make | ShareInterface | SharePairing | Forget | Ask
-Reply = Answer | Failure | Loaded | Unloaded | Wraps
+Request = Load | Make | ShareInterface | SharePairing | Forget | Ask  # An engine gets Load and Solve alone.
+Reply = Answer | Solved | Failure | Loaded | Unloaded | Wraps
 
 _encoder = msgspec.msgpack.Encoder()
 _request_decoder: msgspec.msgpack.Decoder[list[Request]] = msgspec.msgpack.Decoder(list[Request])
-_answer_decoder: msgspec.msgpack.Decoder[list[Answer | Failure]] = msgspec.msgpack.Decoder(
-    Annotated[list[Answer | Failure], msgspec.Meta(max_length=MOST_QUESTIONS)]
+_answer_decoder: msgspec.msgpack.Decoder[list[Answer | Solved | Failure]] = msgspec.msgpack.Decoder(
+    Annotated[list[Answer | Solved | Failure], msgspec.Meta(max_length=MOST_QUESTIONS)]
 )
 _load_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(
     Annotated[list[Loaded | Unloaded | Wraps | Failure], msgspec.Meta(max_length=1)]
 )
 
 
-def encode(messages: Sequence[Request] | Sequence[Reply]) -> bytes:
+def encode(messages: Sequence[Request | Solve] | Sequence[Reply]) -> bytes:
     """Return messages as bytes."""
     return _encoder.encode(messages)
 

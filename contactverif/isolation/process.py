@@ -28,6 +28,7 @@ from contactverif.isolation.box import enclose, temporary_folder
 from contactverif.isolation.box import environment as box_environment
 from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
 from contactverif.isolation.child import Child, name_of_signal
+from contactverif.isolation.confinement import MEMORY
 from contactverif.isolation.control_group import ControlGroup
 from contactverif.isolation.limits import MEGABYTE, Limits
 from contactverif.isolation.mapped_code import list_libraries
@@ -38,7 +39,6 @@ from contactverif.isolation.plugin_folder import plugin_folder, remove_plugin_fo
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
 PROGRESS = "CONTACTVERIF_PROGRESS"  # The number of an open file of one byte, see `docs/reference/protocol.md`.
-MEMORY = "CONTACTVERIF_MEMORY"  # The megabytes that the process may take.
 _run = uuid.uuid4().hex
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36

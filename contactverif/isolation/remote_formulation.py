@@ -28,6 +28,7 @@ from contactverif.isolation.host import Host, answer_of, host_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
+from contactverif.isolation.remote_engine import RemoteEngineSubject
 
 _COMPRESSED = ("csr", "csc")
 _MOST_SECONDS = 1e9
@@ -57,17 +58,18 @@ class RemoteSubject(Subject):
 
 def count_ends(subject: Subject) -> int:
     """Return how often the process of a formulation has ended before it was told to; 0 if it has none of its own."""
-    return subject.host.n_ended if isinstance(subject, RemoteSubject) else 0
+    return subject.host.n_ended if isinstance(subject, RemoteSubject | RemoteEngineSubject) else 0
 
 
 def places(subjects: Iterable[Subject]) -> dict[str, str]:
     """Return {attribute of the report: value}: where formulations lived, what was open to them, and their libraries."""
     facts: dict[str, set[str]] = {"isolation": set(), "opened": set(), "libraries": set()}
     for subject in subjects:
-        box = subject.box if isinstance(subject, RemoteSubject) else None
-        if isinstance(subject, RemoteSubject):
+        remote = isinstance(subject, RemoteSubject | RemoteEngineSubject)
+        box = subject.box if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None
+        if isinstance(subject, RemoteSubject | RemoteEngineSubject):
             facts["libraries"] |= set(subject.host.libraries)
-        inside = "process" if isinstance(subject, RemoteSubject) else "inline"
+        inside = "process" if remote else "inline"
         facts["isolation"].add(inside if box is None else box.kind)
         facts["opened"] |= set(box.opened) if box is not None else set()
     return {name: "; ".join(sorted(values)) for name, values in facts.items() if values}

@@ -7,7 +7,6 @@ judge's own process.
 
 from __future__ import annotations
 
-import faulthandler
 import mmap
 import os
 from collections.abc import Callable, Mapping
@@ -27,10 +26,9 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject, copy_entries
-from contactverif.isolation.box import PROCESSES
 from contactverif.isolation.channel import Channel, ClosedError
-from contactverif.isolation.child import FORKS, limit_memory, limit_processes, socket_of_parent
-from contactverif.isolation.landlock import WRITABLE, keep_to
+from contactverif.isolation.child import FORKS, socket_of_parent
+from contactverif.isolation.confinement import confine
 from contactverif.isolation.messages import (
     Answer,
     Ask,
@@ -50,8 +48,7 @@ from contactverif.isolation.messages import (
 )
 from contactverif.isolation.method_calls import MethodCalls
 from contactverif.isolation.packed import PackedArray
-from contactverif.isolation.parent_death import die_with_parent
-from contactverif.isolation.process import MEMORY, PROGRESS
+from contactverif.isolation.process import PROGRESS
 from contactverif.isolation.survey_copy import survey_in_copy
 
 _SHORT = 1e-3  # Seconds. Other processes have used the caches before a call, so a shorter one is timed when repeated.
@@ -63,13 +60,7 @@ Loader = Callable[[str], Any]  # {name: a `Subject`, a `NotLoaded`, or a `Wrappe
 
 def main(load: Loader, survey: Loader) -> None:
     """Answer the judge until it is gone. `survey` loads a name with the defaults of its options, also of a wrapper."""
-    die_with_parent()
-    faulthandler.enable()
-    limit_memory(int(os.environ[MEMORY]))
-    if PROCESSES in os.environ:
-        limit_processes(int(os.environ[PROCESSES]))
-    if WRITABLE in os.environ:
-        keep_to(os.environ[WRITABLE].split(os.pathsep))
+    confine()
     channel, desk = Channel(socket_of_parent()), Desk(load, survey)
     progress = mmap.mmap(int(os.environ[PROGRESS]), 1)
     while True:

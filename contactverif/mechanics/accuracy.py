@@ -25,15 +25,11 @@ from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.trace import End, Trace
 
 Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), or to numbers (n,).
 
-# Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
-BALANCED = 1e-9
 _PARTS_OF_EDGE = (
     32  # A pressure may end inside a segment with a vertical tangent: so many parts leave 1e-3 of its error.
 )
@@ -50,16 +46,17 @@ class Solution:
     points: ContactPoints | None = None  # None if none are reported
     nodal: bool = False  # Pressures of points are nodal forces (trait `penalty="nodal"`).
     trace: Trace | None = None  # Newton's method, iterate by iterate; None if another code solved the scene.
+    no_solution: str = ""  # What another code says where it found none.
 
     @classmethod
-    def from_displacements(cls, scene: Scene, displacements: FloatArray) -> Solution:
+    def from_displacements(cls, scene: Scene, displacements: FloatArray, no_solution: str = "") -> Solution:
         """Return the solution of another code from its displacements (n_nodes, 2) of the interface's nodes.
 
         The forces are those that the bodies need for these displacements, supports included.
         """
         state = Case(scene.interface, (scene.interface.nodes + displacements).reshape(-1), scene.penalty)
         q = scene.transformation.T @ displacements.reshape(-1)
-        return cls(scene, state, scene.nodal_forces(np.asarray(q)))
+        return cls(scene, state, scene.nodal_forces(np.asarray(q)), no_solution=no_solution)
 
     @property
     def interface(self) -> Interface:
@@ -78,72 +75,17 @@ class Solution:
 
     @property
     def end(self) -> str:
-        """The end of Newton's method, in words."""
-        return self.trace.end.label if self.trace is not None else ""
+        """The end of Newton's method, in words, or what another code says where it found no solution."""
+        return self.trace.end.label if self.trace is not None else self.no_solution
 
     @property
     def balanced(self) -> bool:
-        """True if Newton's method found a solution (up to BALANCED), or came as near to one as roundoff lets it."""
-        return self.trace is None or self.trace.end in (End.CONVERGED, End.STAGNATED)
+        """True if Newton's method found a solution, or came as near to one as roundoff lets it."""
+        return self.trace.end in (End.CONVERGED, End.STAGNATED) if self.trace is not None else not self.no_solution
 
     def is_balanced_to(self, force: float) -> bool:
         """Return whether it is a solution, or out of balance by no more than a force."""
         return self.balanced or (self.trace is not None and bool(self.trace.residuals[-1] <= force))
-
-
-def solve_for_accuracy(
-    scene: Scene, subject: Subject, start: FloatArray | None = None, step: float | None = None
-) -> Solution:
-    """Solve a scene at its own penalty, with the formulation's tangent, or with differences where that does not help.
-
-    A nodal formulation gets ε̂ × the mean slave segment. The start (n_free,) is the first guess of the scene by
-    default. The step of differences is a length that is small against the penetration.
-    """
-    interface = scene.interface
-    guess = Case(interface, scene.positions(scene.start), scene.penalty, name=scene.name)
-    formulation = subject.for_case(guess)
-    trace = solve_in_tries(scene, formulation, start, step, solution_only=True)[-1]
-    return solution_of(trace, formulation, nodal=subject.traits.rules.penalty == "nodal")
-
-
-def solve_in_tries(
-    scene: Scene,
-    formulation: CheckedFormulation,
-    start: FloatArray | None = None,
-    step: float | None = None,
-    *,
-    solution_only: bool = False,
-) -> tuple[Trace, ...]:
-    """Solve a scene with the formulation's tangent; if that does not converge, once more with differences.
-
-    The arguments are those of `solve_for_accuracy`. With `solution_only`, calls are saved, see `solve`.
-    """
-    ways = (True, False) if "tangent" in formulation.provides else (True,)
-    traces = []
-    for use_tangent in ways:
-        trace = solve(
-            scene,
-            formulation,
-            start=start,
-            tolerance=BALANCED,
-            difference_step=step,
-            use_tangent=use_tangent,
-            solution_only=solution_only,
-        )
-        traces.append(trace)
-        if trace.converged:
-            break
-    return tuple(traces)
-
-
-def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -> Solution:
-    """Return the last iterate of Newton's method with its forces and contact points."""
-    scene, interface, z = trace.scene, trace.scene.interface, trace.z
-    state = Case(interface, z, scene.penalty, name=scene.name, n_multipliers=len(trace.multipliers))
-    pairing = formulation.pair(interface, z)
-    forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
-    points = formulation.contact_points(interface, pairing, z) if "contact_points" in formulation.provides else None
-    return Solution(scene, state, forces, points, nodal, trace)
 
 
 def shape_integrals(surface: Surface, positions: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A scene in other units, and an interface in another place: the same problem, so that its solution is known.
+"""A scene in other units, other numbers, turned or mirrored, and an interface in another place: the same problem.
 
 Rule for the next editor: only powers of two change units, and only a way that adds no digit to any coordinate moves an
 interface, so that nothing but the exponents, or the place, changes.
@@ -9,9 +9,12 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 from math import frexp
+from typing import Any
 
 import numpy as np
 
+from contactverif.contract.arrays import IntArray
+from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.bulk import CACHE_SIZE
@@ -78,3 +81,55 @@ def move(interface: Interface, way: float) -> Interface:
     if (moved.nodes - way != interface.nodes).any():
         raise MisuseError("move", f"{way}, which rounds a node", "a way that rounds no node")
     return moved
+
+
+def turn(scene: Scene, axis: tuple[float, float]) -> Scene:
+    """Return the scene turned about the origin, so that its x-axis becomes a unit vector; its facts are left out."""
+    rotation = np.array([[axis[0], -axis[1]], [axis[1], axis[0]]])
+    bodies = tuple(replace(body, nodes=body.nodes @ rotation.T, axis=rotation @ body.axis) for body in scene.bodies)
+    return replace(scene, bodies=bodies, facts={})
+
+
+def mirror(scene: Scene) -> Scene:
+    """Return the mirror image in the y-axis; cells and edges run the other way. Its facts are left out.
+
+    The first axis of each body becomes the opposite of its image, so that the second one is its image.
+    """
+    image, first = np.array([-1.0, 1.0]), np.array([-1.0, 1.0])
+    bodies = tuple(
+        replace(
+            body,
+            nodes=body.nodes * image + 0.0,
+            cells=body.cells[:, ::-1],
+            contact=body.contact[:, ::-1],
+            imposed=body.imposed * first + 0.0,
+            load=body.load * first + 0.0,
+            start=body.start * first + 0.0,
+            axis=-image * body.axis + 0.0,
+        )
+        for body in scene.bodies
+    )
+    return replace(scene, bodies=bodies, facts={})
+
+
+def renumber(scene: Scene, random: np.random.Generator) -> tuple[Scene, tuple[IntArray, ...]]:
+    """Return the scene with nodes, cells and edges in a random order, and the new number of each node of each body."""
+    bodies, numbers = [], []
+    for body in scene.bodies:
+        new = random.permutation(len(body.nodes))
+        old = np.argsort(new)
+        arrays: dict[str, Any] = {name: getattr(body, name)[old] for name in ("nodes", "fixed", "imposed", "load")}
+        arrays |= {name: random.permutation(new[getattr(body, name)]) for name in ("cells", "contact")}
+        bodies.append(replace(body, **arrays))
+        numbers.append(new)
+    return replace(scene, bodies=tuple(bodies), facts={}), tuple(numbers)
+
+
+def exchange_roles(scene: Scene) -> Scene:
+    """Return the scene whose slaves are the masters, and the other way round; its facts are left out."""
+    return replace(scene, slave=scene.master, master=scene.slave, facts={})
+
+
+def add_body(scene: Scene, body: Body) -> Scene:
+    """Return the scene with one more slave, behind all other bodies; its facts are left out."""
+    return replace(scene, bodies=(*scene.bodies, body), slave=(*scene.slave, len(scene.bodies)), facts={})

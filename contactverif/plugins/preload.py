@@ -4,5 +4,5 @@ import gc
 
 from contactverif.plugins.registry import load_properties
 
-load_properties()  # One that does not load is `NotLoaded` in each worker, too.
+load_properties(engines=True)  # One that does not load is `NotLoaded` in each worker, too.
 gc.freeze()  # No worker's collection walks over what all of them share.

@@ -18,9 +18,11 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from contactverif.contract.engine_subject import ENGINE
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name
-from contactverif.plugins.registry import FORMULATIONS, PROPERTIES
+from contactverif.plugins.engines import ENGINES
+from contactverif.plugins.registry import ENGINE_PROPERTIES, FORMULATIONS, PROPERTIES
 
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
@@ -105,10 +107,15 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
 
     A version says too little while an author works on a plugin: a run goes on only with the same code.
     """
-    plugins = {_plugin_name(part) for text in formulations for part in text.split("/")}
+    named = {
+        FORMULATIONS: {_plugin_name(part) for text in formulations for part in text.split("/")},
+        ENGINES: {_plugin_name(text.removeprefix(ENGINE)) for text in formulations},
+        PROPERTIES: set(properties),
+        ENGINE_PROPERTIES: set(properties),
+    }
     modules = {"contactverif"}
-    modules |= {entry.module for entry in metadata.entry_points(group=FORMULATIONS) if entry.name in plugins}
-    modules |= {entry.module for entry in metadata.entry_points(group=PROPERTIES) if entry.name in properties}
+    for group, names in named.items():
+        modules |= {entry.module for entry in metadata.entry_points(group=group) if entry.name in names}
     packages = sorted({module.partition(".")[0] for module in modules})
     return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
+ENGINE_PROPERTIES = "contactverif.engine_properties"  # Those that are asked of engines alone.
 PROBLEMS = "contactverif.problems"
 
 _SHORT_NAME = f"at most {LONGEST_NAME} characters"
@@ -55,22 +56,22 @@ def _worker() -> tuple[str, ...]:
 
 def formulation_names() -> tuple[str, ...]:
     """Return the names of the installed formulations and wrappers, sorted; nothing is loaded."""
-    return tuple(_entries_by_name(FORMULATIONS))
+    return tuple(entries_by_name(FORMULATIONS))
 
 
 def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
     """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which."""
     if limits is None:
-        installed = _entries_by_name(FORMULATIONS)
+        installed = entries_by_name(FORMULATIONS)
         return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
     names = formulation_names()
     items = survey(_worker(), names, limits)
     return tuple(name for name, item in zip(names, items, strict=True) if not isinstance(item, Wrapper))
 
 
-def property_ids() -> tuple[str, ...]:
-    """Return the ids of the installed properties, sorted; nothing is loaded."""
-    return tuple(installed_properties())
+def property_ids(*, engines: bool = False) -> tuple[str, ...]:
+    """Return the ids of the installed properties, sorted; with `engines` also those of engines alone."""
+    return tuple(installed_properties(engines=engines))
 
 
 def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
@@ -130,13 +131,15 @@ def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper |
     return tuple(survey(_worker(), formulation_names(), limits))
 
 
-def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded, ...]:
+def load_properties(globs: Sequence[str] = ("*",), *, engines: bool = False) -> tuple[Property | NotLoaded, ...]:
     """Load the properties whose id matches one of the patterns, sorted by id.
 
     Parameters
     ----------
     globs : Sequence[str]
         Patterns such as `patch.*`; none at all means all properties.
+    engines : bool
+        Also those that are asked of engines alone.
 
     Returns
     -------
@@ -148,7 +151,7 @@ def load_properties(globs: Sequence[str] = ("*",)) -> tuple[Property | NotLoaded
     MisuseError
         If a pattern matches nothing.
     """
-    installed = installed_properties()
+    installed = installed_properties(engines=engines)
     return tuple(load_property(name, installed) for name in _matches(globs, installed))
 
 
@@ -162,17 +165,18 @@ def the_formulation(name: str, limits: Limits | None = None) -> Subject:
 
 def the_property(property_id: str) -> Property:
     """Return the property of that id; one that does not load is a mistake here."""
-    if property_id not in property_ids():  # A pattern is no id.
-        raise unknown_name_error("property", property_id, property_ids())
-    (question,) = load_properties([property_id])
+    ids = property_ids(engines=True)
+    if property_id not in ids:  # A pattern is no id.
+        raise unknown_name_error("property", property_id, ids)
+    (question,) = load_properties([property_id], engines=True)
     if isinstance(question, NotLoaded):
         raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
     return question
 
 
-def matching_ids(globs: Sequence[str]) -> tuple[str, ...]:
+def matching_ids(globs: Sequence[str], *, engines: bool = False) -> tuple[str, ...]:
     """Return the ids of the properties that `load_properties` loads; it imports none of them."""
-    return _matches(globs, property_ids())
+    return _matches(globs, property_ids(engines=engines))
 
 
 def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
@@ -182,15 +186,16 @@ def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
     return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
 
 
-def installed_properties() -> Mapping[str, Sequence[EntryPoint]]:
-    """Return the entry points of the installed properties by id, sorted.
+def installed_properties(*, engines: bool = False) -> Mapping[str, Sequence[EntryPoint]]:
+    """Return the entry points of the installed properties by id, sorted; with `engines` also those of engines alone.
 
     To read them takes longer than to load a property, so whoever loads many reads them once.
     """
-    return _entries_by_name(PROPERTIES)
+    of_engines = entries_by_name(ENGINE_PROPERTIES) if engines else {}
+    return dict(sorted((entries_by_name(PROPERTIES) | of_engines).items()))
 
 
-def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
+def entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
     """Return the entry points by name, sorted. A name has several where distributions disagree about it."""
     by_name: dict[str, list[EntryPoint]] = {}
     for entry in sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value)):
@@ -200,7 +205,7 @@ def _entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
     return by_name
 
 
-def _load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
+def load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
     """Return the object that the entry point refers to, or a NotLoaded."""
     if name_line(name) != name:
         return NotLoaded(name, f"its name is too long, or not of characters that can be shown; needed {_SHORT_NAME}")
@@ -220,7 +225,7 @@ def _origin(entry: EntryPoint) -> str:
 
 def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> Property | NotLoaded:
     """Load the property of that id, one of `installed_properties`."""
-    loaded = _load_entry(name, installed[name])
+    loaded = load_entry(name, installed[name])
     if isinstance(loaded, NotLoaded | Property) and getattr(loaded, "id", name) == name:
         return loaded
     description = f"the property {loaded.id!r}" if isinstance(loaded, Property) else f"a {type(loaded).__name__}"
@@ -233,8 +238,8 @@ def load_problems() -> dict[str, Problem | NotLoaded]:
     from contactverif.problems.problem import Problem  # It needs mechanics, which most commands do not.
 
     problems: dict[str, Problem | NotLoaded] = {}
-    for name, entries in _entries_by_name(PROBLEMS).items():
-        loaded = _load_entry(name, entries)
+    for name, entries in entries_by_name(PROBLEMS).items():
+        loaded = load_entry(name, entries)
         if not isinstance(loaded, NotLoaded | Problem):
             needed = "a contactverif.problems.problem.Problem"
             loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}, not {needed}")
@@ -244,7 +249,7 @@ def load_problems() -> dict[str, Problem | NotLoaded]:
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
     """Load what is installed under a name, with the defaults of its options."""
-    wrapper = _load_wrapper(name, _entries_by_name(FORMULATIONS)[name])
+    wrapper = _load_wrapper(name, entries_by_name(FORMULATIONS)[name])
     if wrapper is not None:
         return wrapper
     try:
@@ -255,8 +260,8 @@ def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
 
 def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
     """Return the wrapper of that name; None if the name is that of a formulation or does not load."""
-    make = _load_entry(name, entries)
-    if not callable(make) or not _wraps(_parameters(make)):
+    make = load_entry(name, entries)
+    if not callable(make) or not _wraps(parameters_of(make)):
         return None
     return Wrapper(name, (inspect.getdoc(make) or "").partition("\n")[0].rstrip("."))
 
@@ -270,16 +275,16 @@ def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
     _check_name(text)
     outer, slash, inner_text = text.partition("/")
     name, options = parse_name("formulation", outer, _FORM)
-    installed = _entries_by_name(FORMULATIONS)
+    installed = entries_by_name(FORMULATIONS)
     if name not in installed:
         raise unknown_name_error("formulation", name, installed)
-    make = _load_entry(name, installed[name])
+    make = load_entry(name, installed[name])
     if isinstance(make, NotLoaded):
         return NotLoaded(text, make.reason)
     if not callable(make):
         return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(*, penalty, …)")
-    parameters = _parameters(make)
-    _check_options(text, make, parameters, options)
+    parameters = parameters_of(make)
+    check_options(text, make, parameters, options)
     wraps = _wraps(parameters)
     if wraps and not slash:
         raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
@@ -313,14 +318,15 @@ def _load_inner(text: str) -> Callable[..., Any] | NotLoaded:
     return trial if isinstance(trial, NotLoaded) else make
 
 
-def _parameters(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
+def parameters_of(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of a factory by name; none if it does not say them."""
     try:
         return inspect.signature(make).parameters
     except (TypeError, ValueError):  # A factory written in C has no signature and checks its options itself.
         return {}
 
 
-def _check_options(
+def check_options(
     text: str, make: Callable[..., Any], parameters: Mapping[str, inspect.Parameter], options: Mapping[str, Any]
 ) -> None:
     """Refuse unknown and missing options, and values that do not fit their annotation, without calling the factory."""

@@ -17,6 +17,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.case_counts import exceeds
+from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
@@ -76,7 +77,7 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
 
 def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Outcome:
     """Judge a case; if the property does not apply to the formulation, return an outcome that says so."""
-    if reason := question.refusal(subject.traits):
+    if reason := question.refusal(subject):
         return Outcome(case, Verdict.NOT_APPLICABLE, reason)
     if missing := question.needs - subject.provides:
         return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")
@@ -163,8 +164,8 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
     is called. What else goes wrong here, the properties will say: then there are no answers.
     """
-    if subject.traits.rules.enforcement == "barrier":  # It is not defined in penetration.
-        return FirstCall()
+    if isinstance(subject, EngineSubject) or subject.traits.rules.enforcement == "barrier":
+        return FirstCall()  # One has no forces to ask for, the other is not defined in penetration.
     try:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, named_case(STATES[0]), parts)

@@ -28,7 +28,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from multiprocessing.process import BaseProcess
 from typing import Any, Literal
 
@@ -347,4 +347,4 @@ def _find_registered(property_id: str) -> Any:
     return load_property(property_id, installed) if property_id in installed else None
 
 
-_read_installed = cache(installed_properties)
+_read_installed = cache(partial(installed_properties, engines=True))

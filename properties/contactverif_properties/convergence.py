@@ -19,7 +19,8 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Measure, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces
+from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, traction_forces
+from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.arcs import Arcs
 from contactverif.problems.hertz_studies import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies
@@ -68,7 +69,7 @@ def _name_failures(ends: dict[int, str]) -> str:
     for mesh, end in ends.items():
         groups.setdefault(end, []).append(str(mesh))
     words = ", ".join(f"mesh{'es' * (len(meshes) > 1)} {' · '.join(meshes)}: {end}" for end, meshes in groups.items())
-    return f"Newton's method finds no solution on {words}" if words else ""
+    return f"no solution on {words}" if words else ""
 
 
 def _counts(bound: Bound, group: str, last: Errors, finest: ProblemInstance, fails: bool) -> bool:
@@ -108,6 +109,7 @@ def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
         applicable=refuse_dependent_multipliers,
         series=dict.fromkeys(studies.series, "1"),
         bodies=True,
+        engines=True,
         exact=partial(exact_forces, studies),
     )
 

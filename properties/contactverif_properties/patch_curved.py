@@ -17,7 +17,8 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
+from contactverif.mechanics.accuracy import Solution
+from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.problem import FORCES
 from contactverif.problems.shrink_fit import FIT, SEGMENTS, FiniteFit, RingStudy, Role, shrink_fit
 from contactverif_properties.patch_flat import refuse_unknown_total
@@ -95,6 +96,7 @@ def promise_mean(traits: Traits) -> bool | None:
     promise=promise_mean,
     applicable=refuse_unknown_mean,
     bodies=True,
+    engines=True,
 )
 def patch_curved(case: Case, subject: Subject) -> Measurement:
     """Two rings that are shrunk onto each other find Lamé's pressure, whichever is the slave.
@@ -150,7 +152,8 @@ def _measure(study: RingStudy, coarser: int, subject: Subject, quarters: Literal
         instance = study.pose(refine, subject.traits, quarters=quarters)
         solution = solve_for_accuracy(instance.scene, subject)
         if not solution.balanced:
-            return Measurement(undecided=f"Newton's method: {solution.end} at refine = {refine}")
+            method = "Newton's method: " if solution.trace is not None else ""
+            return Measurement(undecided=f"{method}{solution.end} at refine = {refine}")
         means.append(np.stack([_mean_errors(solution, fit, study.slave, quarters * pi / 2) for fit in fits]))
         details[f"E_F at refine = {refine}"] = instance.errors(solution)[FORCES[0]]
     coarse, fine = _nearest(*means)

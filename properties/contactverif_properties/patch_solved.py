@@ -34,6 +34,8 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
         return solved_patch.measure_once(case, subject)
     moderate = solved_patch.measure_at_penalty(case, subject, case.penalty)
     high = solved_patch.measure_at_penalty(case, subject, HIGH * case.penalty)
+    if not (moderate.numbers and high.numbers):  # A whole code may find no solution.
+        return moderate if moderate.undecided else high
     errors = moderate.values[solved_patch.STRESS.name], high.values[solved_patch.STRESS.name]
     slope = float(np.log(errors[1] / errors[0]) / np.log(HIGH)) if min(errors) > 0 else 0.0
     return Measurement(
@@ -63,7 +65,7 @@ def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -
     return Cases.from_list(make, on_place=on_scene, needs=UNIFORM)
 
 
-_define = partial(Property.define, family="patch", bodies=True, exact=solved_patch.forces_to_draw)
+_define = partial(Property.define, family="patch", bodies=True, engines=True, exact=solved_patch.forces_to_draw)
 _define_at_two_penalties = partial(
     _define, quantities=(*solved_patch.QUANTITIES, *map(_at_high, solved_patch.QUANTITIES), solved_patch.MULTIPLIERS)
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.plugins.registry import load_formulation
 from contactverif.problems.wavy import pose_wavy

@@ -8,7 +8,19 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from contactverif import Case, Cases, Finding, Interface, Measurement, Quantity, Rules, Subject, Traits, named_case
+from contactverif import (
+    Case,
+    Cases,
+    Finding,
+    Interface,
+    Measurement,
+    Quantity,
+    ResidualOnly,
+    Rules,
+    Subject,
+    Traits,
+    named_case,
+)
 from contactverif.contract.property import Outcome, Property, Verdict, judge
 
 MOST = Quantity("defect", "u 8X/|g|", "roundoff of a gap")
@@ -152,9 +164,11 @@ def test_a_defined_property_has_its_question_and_is_pickled_by_its_name() -> Non
 
 
 def test_who_is_not_asked_is_told_why() -> None:
-    refusals = [
-        definition.refusal(Traits(rules=Rules(enforcement=each))) for each in ("penalty", "multiplier", "barrier")
-    ]
+    subject = Subject("no force", lambda *, penalty: ResidualOnly(lambda interface, z: 0 * z))
+    refusals = []
+    for each in ("penalty", "multiplier", "barrier"):
+        subject.traits = Traits(rules=Rules(enforcement=each))
+        refusals.append(definition.refusal(subject))
     assert refusals == [
         "",
         "the enforcement is by a multiplier",

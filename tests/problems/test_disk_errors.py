@@ -14,7 +14,8 @@ from subjects import load_subject
 
 from contactverif import Scene, Surface
 from contactverif.contract.arrays import FloatArray
-from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, solve_for_accuracy, traction_forces
+from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, traction_forces
+from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.disk import disk_on_foundation
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Errors, ProblemInstance
 

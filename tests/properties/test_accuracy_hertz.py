@@ -6,7 +6,7 @@ from subjects import judge_as, load_subject, measure_case, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 
 from contactverif import Case, Subject, Traits, Verdict, judge_case
-from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.hertz_box import COARSEST, mesh_lines
 from contactverif.problems.hertz_studies import BOX, HERTZ_STUDIES, PENALTIES, HertzStudy, hertz_cases
 from contactverif.problems.problem import FORCES, Errors

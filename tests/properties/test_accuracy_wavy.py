@@ -11,7 +11,7 @@ from wave_strangers import Heights
 
 import contactverif_nts
 from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
-from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.problem import PRESSURE
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
 from contactverif.run.run import run

@@ -33,8 +33,8 @@ from contactverif.isolation.process import Question
 from contactverif.isolation.remote_formulation import RemoteSubject
 from contactverif.journals.journal import JournalKey, RecordFile, journal_folder, read_messages, record_files
 from contactverif.journals.keys import remove_key
-from contactverif.mechanics.accuracy import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.bulk import condense
+from contactverif.mechanics.solving import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.system import System
 from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.plugins import registry

@@ -21,8 +21,8 @@ from scipy.sparse.linalg import splu
 
 from contactverif.contract.errors import ContractError
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.accuracy import solution_of, solve_in_tries
 from contactverif.mechanics.scene import forget_bodies
+from contactverif.mechanics.solving import solution_of, solve_in_tries
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
 from contactverif.mechanics.whole_scene import WholeScene

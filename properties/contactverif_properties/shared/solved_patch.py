@@ -13,6 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Surface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
@@ -22,14 +23,15 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import Trace
 from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
+from contactverif_properties.shared.engine_patch import measure_engine
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.shared.uniform_pressure import (
     consistent_forces,
     exact_solution,
+    gap_error,
     nearest_multipliers,
-    normal_of,
 )
 
 ITERATIONS = 25  # A method that transmits a uniform pressure needs one iteration. The others need a few more.
@@ -64,7 +66,7 @@ QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE)
 
 def measure_once(case: Case, subject: Subject) -> Measurement:
     """Solve the scene of the case at its own penalty, or with multipliers, and return the errors."""
-    if subject.traits.rules.enforcement == "multiplier":
+    if subject.traits.rules.enforcement == "multiplier" and not isinstance(subject, EngineSubject):
         return measure_with_multipliers(case, subject)
     return measure_at_penalty(case, subject, case.penalty)
 
@@ -77,6 +79,8 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p; it is missing where the
     formulation reports none, or is nodal and so knows forces only.
     """
+    if isinstance(subject, EngineSubject):
+        return measure_engine(case, subject, penalty, (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP))
     scene, pressure = scene_of(case), pressure_of(case, penalty)
     formulation = subject.for_interface(case.interface, penalty)
     exact = exact_unknowns(scene, pressure, penalty)
@@ -202,21 +206,6 @@ def force_errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: floa
     errors /= pressure * case.slave_length
     n_slave = case.interface.n_slave_nodes
     return float(errors[:n_slave].max()), float(errors[n_slave:].max())
-
-
-def gap_error(case: Case, penetration: float, size: float) -> float:
-    """Return by how much a node departs from a plane slave at `penetration` below a plane master, over `size`.
-
-    A slave node beside the master stands for the place opposite the master's end, since what overhangs may bend.
-    """
-    heights = case.positions @ normal_of(case)
-    n_slave = case.interface.n_slave_nodes
-    slave, master = np.split(case.parameters["along"], [n_slave])
-    order = np.argsort(slave)
-    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
-    level = heights[n_slave:].mean()
-    errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
-    return float(errors.max() / size)
 
 
 def point_errors(state: FrozenState, penalty: float, pressure: float) -> tuple[float, float]:

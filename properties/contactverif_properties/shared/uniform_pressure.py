@@ -26,6 +26,21 @@ def normal_of(case: Case) -> FloatArray:
     return np.array([-along[1], along[0]])
 
 
+def gap_error(case: Case, penetration: float, size: float) -> float:
+    """Return by how much a node departs from a plane slave at `penetration` below a plane master, over `size`.
+
+    A slave node beside the master stands for the place opposite the master's end, since what overhangs may bend.
+    """
+    heights = case.positions @ normal_of(case)
+    n_slave = case.interface.n_slave_nodes
+    slave, master = np.split(case.parameters["along"], [n_slave])
+    order = np.argsort(slave)
+    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
+    level = heights[n_slave:].mean()
+    errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
+    return float(errors.max() / size)
+
+
 def push_apart(case: Case, weights: FloatArray, pressure: float) -> FloatArray:
     """Return the forces (n_nodes, 2) of a pressure over weights (n_nodes,), which push the two bodies apart."""
     sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)

@@ -1,0 +1,1 @@
+"""Engines: whole contact codes that solve scenes. Each is a file, and imports its code inside `solve`."""

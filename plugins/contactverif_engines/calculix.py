@@ -1,0 +1,172 @@
+"""CalculiX (ccx): surfaces that touch by penalty springs or by multipliers of its mortar method.
+
+Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL version 2.20, keywords *CONTACT PAIR, *SURFACE BEHAVIOR, *CONTROLS.
+The deck is a layer of solids in plane strain. ccx reads 20 characters of a number, and prints 7 digits.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, SceneArrays
+from contactverif_engines.layer import Layer, make_layer
+
+FIELD = 20  # The characters of a number that ccx reads.
+Kind = Literal["surface", "nodes", "mortar", "linmortar"]
+_TYPES = {"surface": "SURFACE TO SURFACE", "nodes": "NODE TO SURFACE", "mortar": "MORTAR", "linmortar": "LINMORTAR"}
+# The faces of C3D6 and C3D8 by their corners, as the manual numbers them.
+_FACES = {
+    6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
+_RESIDUAL = 1e-8  # The share of the mean force that may be out of balance; the default is 5e-3.
+
+
+@dataclass(frozen=True)
+class CalculiX:
+    """CalculiX with one of its kinds of contact.
+
+    Parameters
+    ----------
+    kind : Literal['surface', 'nodes', 'mortar', 'linmortar']
+        ``"surface"``: face-to-face springs; ``"nodes"``: a spring at each slave node; ``"mortar"`` and ``"linmortar"``:
+        dual mortar methods. All have linear springs of the stiffness ε̂.
+    program : str
+        The program.
+    """
+
+    kind: Kind = "surface"
+    program: str = "ccx"
+
+    @property
+    def traits(self) -> EngineTraits:
+        """The statements: what the manual states, and the digits that are printed."""
+        passes = None if self.kind == "nodes" else True
+        return EngineTraits("penalty", accuracy=1e-6, inclined_supports=True, passes_flat_patch=passes)
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Write a deck, run ccx on it, and read the displacements that it prints."""
+        layer = make_layer(scene, scene.unit)
+        with tempfile.TemporaryDirectory() as folder:
+            deck = Path(folder, "scene.inp")
+            deck.write_text("\n".join(write_deck(layer, self.kind)) + "\n", encoding="ascii")
+            run = subprocess.run(
+                [self.program, "scene"], cwd=folder, capture_output=True, text=True, errors="replace", check=False
+            )
+            printed = deck.with_suffix(".dat")
+            text = printed.read_text(errors="replace") if printed.exists() else ""
+            history = deck.with_suffix(".sta")
+            steps = history.read_text(errors="replace") if history.exists() else ""
+        displacements, time = read_displacements(text, len(scene.nodes))
+        converged = run.returncode == 0 and time == 1.0
+        iterations = sum(int(line.split()[3]) for line in steps.splitlines() if line.split()[:1] == ["1"])
+        message = "" if converged else _complaint(run.stdout)
+        return EngineAnswer(displacements, converged, iterations or -1, message)
+
+
+def write_deck(layer: Layer, kind: Kind) -> list[str]:
+    """Return the lines of the deck."""
+    scene = layer.scene
+    stiffness = _number(scene.penalty) + (f", {_number(_tension(scene))}" if kind == "nodes" else "")
+    return [
+        "*NODE, NSET=ALL",
+        *_rows(layer.nodes),
+        *_elements_and_surfaces(layer),
+        *_materials(layer),
+        *_turned_nodes(layer),
+        *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness),
+        *(f"*CONTACT PAIR, INTERACTION=TOUCH, TYPE={_TYPES[kind]}", "SLAVE, MASTER"),
+        *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", f"{_RESIDUAL:g}, {_RESIDUAL:g}"),
+        *_supports_and_loads(layer),
+        *("*NODE PRINT, NSET=ALL, GLOBAL=YES", "U", "*END STEP"),
+    ]
+
+
+def _elements_and_surfaces(layer: Layer) -> list[str]:
+    """Return the lines of the elements of each body, and of the faces of both surfaces."""
+    lines, number, faces = [], 1, dict[frozenset[int], tuple[int, int]]()
+    for corners, cells, bodies in ((6, layer.wedges, layer.body_of_wedge), (8, layer.bricks, layer.body_of_brick)):
+        for body in np.unique(bodies):
+            lines.append(f"*ELEMENT, TYPE=C3D{corners}, ELSET=B{body}")
+            for cell in cells[bodies == body]:
+                lines.append(", ".join(map(str, [number, *(cell + 1).tolist()])))
+                sides = enumerate(_FACES[corners], start=1)
+                faces |= {frozenset(cell[list(places)].tolist()): (number, side) for side, places in sides}
+                number += 1
+    for name, surface in (("SLAVE", layer.slave), ("MASTER", layer.master)):
+        lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
+        lines += ["{}, S{}".format(*faces[frozenset(face)]) for face in surface.tolist()]
+    return lines
+
+
+def _materials(layer: Layer) -> list[str]:
+    """Return the lines of the material of each body; that of a rigid one does not matter."""
+    lines, scene = [], layer.scene
+    for body in np.unique(np.concatenate([layer.body_of_wedge, layer.body_of_brick])):
+        young, poisson = (1.0, 0.0) if scene.rigid[body] else (scene.young[body], scene.poisson[body])
+        lines += [f"*MATERIAL, NAME=M{body}", "*ELASTIC", f"{_number(young)}, {_number(poisson)}"]
+        lines.append(f"*SOLID SECTION, ELSET=B{body}, MATERIAL=M{body}")
+    return lines
+
+
+def _supports_and_loads(layer: Layer) -> list[str]:
+    """Return the lines of all imposed displacements, those across the layer among them, and of the loads."""
+    lines = ["*BOUNDARY", *(f"{node + 1}, 3, 3" for node in range(len(layer.nodes)))]
+    for node, part in np.argwhere(layer.fixed).tolist():
+        lines.append(f"{node + 1}, {part + 1}, {part + 1}, {_number(layer.imposed[node, part])}")
+    loaded = np.argwhere(layer.load != 0).tolist()
+    loads = [f"{node + 1}, {part + 1}, {_number(layer.load[node, part])}" for node, part in loaded]
+    return [*lines, "*CLOAD", *loads] if loads else lines
+
+
+def _turned_nodes(layer: Layer) -> list[str]:
+    """Return the lines that give the nodes of inclined bodies axes of their own."""
+    lines: list[str] = []
+    turned = np.flatnonzero((layer.frames != np.eye(2)).any(axis=(1, 2)))
+    axes, groups = np.unique(layer.frames[turned].reshape(-1, 4), axis=0, return_inverse=True)
+    for group, axis in enumerate(axes):
+        lines.append(f"*NSET, NSET=T{group}")
+        lines += [str(node + 1) for node in turned[groups.reshape(-1) == group].tolist()]
+        lines.append(f"*TRANSFORM, NSET=T{group}, TYPE=R")
+        lines.append(", ".join(map(_number, [axis[0], axis[2], 0.0, axis[1], axis[3], 0.0])))
+    return lines
+
+
+def _tension(scene: SceneArrays) -> float:
+    """Return the tension, force per length squared, that springs at nodes keep far from contact: none to speak of."""
+    return 1e-12 * float(scene.penalty) * scene.unit
+
+
+def _rows(nodes: FloatArray) -> list[str]:
+    return [", ".join([str(index), *map(_number, node)]) for index, node in enumerate(nodes.tolist(), start=1)]
+
+
+def _number(value: float) -> str:
+    """Return a number with all the digits that ccx reads."""
+    text = repr(float(value))
+    return text if len(text) <= FIELD else f"{value:.{FIELD - 7}e}"
+
+
+def read_displacements(text: str, n_nodes: int) -> tuple[FloatArray, float]:
+    """Return the displacements (n_nodes, 2) of the front that were printed last, and the time; 0 if none were."""
+    displacements, time = np.zeros((n_nodes, 2)), 0.0
+    for line in text.splitlines():
+        words = line.split()
+        if "displacements" in words:
+            time = float(words[-1])
+        elif len(words) == 4 and 1 <= int(words[0]) <= n_nodes:
+            displacements[int(words[0]) - 1] = [float(words[1]), float(words[2])]
+    return displacements, time
+
+
+def _complaint(text: str) -> str:
+    """Return the line in which ccx says what went wrong."""
+    lines = [line.strip() for line in text.splitlines()]
+    wrong = next((i for i, line in enumerate(lines) if "*ERROR" in line), None)
+    return " ".join(lines[wrong : wrong + 2]) if wrong is not None else (lines or ["no words"])[-1]

@@ -1,0 +1,94 @@
+"""The control: springs between the bodies in the Gauss points of a common mesh of both surfaces, and nothing clever.
+
+It is an engine whose answers are right to the accuracy of its mesh. An accusation of another code stands only if the
+same scene accuses this one not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg
+
+from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, SceneArrays
+from contactverif_engines.body_stiffness import assemble
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_ITERATIONS = 60
+_CONVERGED = 1e-12  # The last step over the largest displacement.
+
+
+@dataclass(frozen=True)
+class Control:
+    """Distributed springs on the common mesh of both surfaces, seen along the normals of the slave's segments."""
+
+    traits = EngineTraits(
+        "penalty",
+        accuracy=1e-10,
+        inclined_supports=True,
+        passes_flat_patch=True,
+        converges=True,
+        source="springs in three Gauss points of each part that a slave and a master segment share",
+    )
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Solve a scene by steps with the stiffness of the springs that are closed, normals and places held."""
+        stiffness, frames = assemble(scene), sparse.block_diag(list(scene.frames()), format="csr")
+        free = np.flatnonzero(~scene.fixed.reshape(-1))
+        u = np.where(scene.fixed, scene.imposed, np.einsum("nij,ni->nj", scene.frames(), scene.start)).reshape(-1)
+        step = np.inf
+        for iteration in range(1, _ITERATIONS + 1):
+            positions = scene.nodes + (frames @ u).reshape(-1, 2)
+            forces, springs = _contact(scene, positions)
+            residual = stiffness @ u + frames.T @ forces - scene.load.reshape(-1)
+            matrix = sparse.csc_array(stiffness + frames.T @ springs @ frames)[free][:, free]
+            try:
+                change = linalg.splu(sparse.csc_matrix(matrix)).solve(-residual[free])
+            except RuntimeError as error:
+                return EngineAnswer((frames @ u).reshape(-1, 2), False, iteration, str(error))
+            if not np.isfinite(change).all():
+                return EngineAnswer((frames @ u).reshape(-1, 2), False, iteration, "a singular matrix")
+            u[free] += change
+            before, step = step, float(np.abs(change).max(initial=0.0))
+            if step <= _CONVERGED * float(np.abs(u).max()) or (step < 1e-9 * np.abs(u).max() and step >= before / 2):
+                break
+        converged = step <= 1e-9 * float(np.abs(u).max())
+        displacements = (frames @ u).reshape(-1, 2)
+        forces, _ = _contact(scene, scene.nodes + displacements)
+        return EngineAnswer(displacements, converged, iteration, "" if converged else "no end", -forces.reshape(-1, 2))
+
+
+def _contact(scene: SceneArrays, positions: FloatArray) -> tuple[FloatArray, sparse.csr_array]:
+    """Return the internal forces (2 n_nodes,) of all springs and their stiffness, normals and places held."""
+    rows, columns, values, size = [], [], [], 2 * len(positions)
+    forces = np.zeros(size)
+    ends = positions[scene.master]
+    for first, second in scene.slave:
+        a, b = positions[first], positions[second]
+        length = float(np.hypot(*(b - a)))
+        tangent = (b - a) / length
+        normal = np.array([-tangent[1], tangent[0]])  # Into the slave's body, which lies on the left.
+        places, heights = (ends - a) @ tangent / length, (ends - a) @ normal
+        low, high = np.clip(places.min(axis=1), 0, 1), np.clip(places.max(axis=1), 0, 1)
+        for index in np.flatnonzero((high > low) & (places[:, 0] > places[:, 1])):  # The master runs against the slave.
+            s = (low[index] + high[index]) / 2 + (high[index] - low[index]) / 2 * _POINTS
+            xi = (s - places[index, 0]) / (places[index, 1] - places[index, 0])
+            gap = -(heights[index, 0] + xi * (heights[index, 1] - heights[index, 0]))
+            weight = scene.penalty * length * (high[index] - low[index]) / 2 * _WEIGHTS
+            shapes = np.stack([1 - s, s, xi - 1, -xi])  # (4, n_points): the slave's place less the master's
+            nodes = np.array([first, second, *scene.master[index]])
+            closed = (gap < 0) & (gap > -2 * length - np.abs(np.diff(heights[index])))
+            if not closed.any():
+                continue
+            unknowns = (2 * nodes[:, None] + [0, 1]).reshape(-1)
+            forces[unknowns] += np.einsum("ap,p,i->ai", shapes, weight * gap * closed, normal).reshape(-1)
+            block = np.einsum("ap,p,bp,i,j->aibj", shapes, weight * closed, shapes, normal, normal).reshape(8, 8)
+            rows.append(np.repeat(unknowns, 8))
+            columns.append(np.tile(unknowns, 8))
+            values.append(block.reshape(-1))
+    if not rows:
+        return forces, sparse.csr_array((size, size))
+    places = np.concatenate(rows), np.concatenate(columns)
+    return forces, sparse.csr_array((np.concatenate(values), places), shape=(size, size))

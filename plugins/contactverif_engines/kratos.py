@@ -1,0 +1,205 @@
+"""Kratos Multiphysics: mortar contact without friction, by an augmented Lagrangian or by penalty springs.
+
+Source: the application ContactStructuralMechanicsApplication of Kratos 10.4, `alm_contact_process.py` and
+`penalty_contact_process.py`, with their default settings.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
+from contactverif_engines.layer import Layer, make_layer
+
+_RESIDUAL = 1e-10  # The share of the first residual that may be left; the default is 1e-4.
+_ROUNDOFF = 1e-13  # The share of loads or reactions that may be left. The default is 1e-9 in whatever unit.
+_ITERATIONS = 60
+_PROCESSES = {
+    "multiplier": ("alm_contact_process", "ALMContactProcess", "ALMContactFrictionless"),
+    "penalty": ("penalty_contact_process", "PenaltyContactProcess", "PenaltyContactFrictionless"),
+}
+
+
+@dataclass(frozen=True)
+class Kratos:
+    """Kratos with one of its kinds of mortar contact.
+
+    Parameters
+    ----------
+    kind : Literal['multiplier', 'penalty']
+        The augmented Lagrangian method with dual multipliers, or penalty springs of the stiffness ε̂.
+    search_factor : float
+        The radius in which pairs are searched, over the size of a condition; 3.5 is the default of Kratos.
+    """
+
+    kind: Literal["multiplier", "penalty"] = "multiplier"
+    search_factor: float = 3.5
+
+    @property
+    def traits(self) -> EngineTraits:
+        """The statements: mortar methods pass the patch test."""
+        return EngineTraits(self.kind, accuracy=1e-8, load_scale=2.0**-10, passes_flat_patch=True)
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Write a model, solve it in a static step, and read the displacements of its nodes."""
+        layer = make_layer(scene)
+        with tempfile.TemporaryDirectory() as folder, _working_in(folder):
+            import KratosMultiphysics as Kratos
+            import KratosMultiphysics.ContactStructuralMechanicsApplication
+            from KratosMultiphysics import StructuralMechanicsApplication as Structural
+            from KratosMultiphysics.StructuralMechanicsApplication.structural_mechanics_analysis import (
+                StructuralMechanicsAnalysis,
+            )
+
+            Path("scene.mdpa").write_text("\n".join(write_model(layer)) + "\n")
+            Path("materials.json").write_text(json.dumps(_materials(scene)))
+            Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
+            model = Kratos.Model()
+            job = StructuralMechanicsAnalysis(model, Kratos.Parameters(json.dumps(self._settings(scene))))
+            job.Initialize()
+            part, flat = model["Structure"], layer.n_front
+            for node in part.Nodes:
+                index = node.Id - 1
+                for axis, variable in enumerate((Kratos.DISPLACEMENT_X, Kratos.DISPLACEMENT_Y)):
+                    if layer.fixed[:flat][index, axis]:
+                        node.Fix(variable)
+                        node.SetSolutionStepValue(variable, float(layer.imposed[index, axis]))
+                x, y = 2 * layer.load[index]  # The front of a layer bears half of it.
+                node.SetSolutionStepValue(Structural.POINT_LOAD, Kratos.Array3([float(x), float(y), 0.0]))
+            solver = job._GetSolver()
+            job.time = solver.AdvanceInTime(job.time)
+            job.InitializeSolutionStep()
+            solver.Predict()
+            converged = bool(solver.SolveSolutionStep())
+            moves = np.array([list(node.GetSolutionStepValue(Kratos.DISPLACEMENT))[:2] for node in part.Nodes])
+            order = np.argsort([node.Id for node in part.Nodes])[: len(scene.nodes)]
+            iterations = int(part.ProcessInfo[Kratos.NL_ITERATION_NUMBER])
+        return EngineAnswer(moves[order], converged, iterations, "" if converged else "no convergence in one step")
+
+    def _settings(self, scene: SceneArrays) -> dict[str, Any]:
+        """Return the parameters of the analysis."""
+        module, name, mortar = _PROCESSES[self.kind]
+        contact: dict[str, Any] = {
+            "model_part_name": "Structure",
+            "contact_model_part": {"0": ["Touching"]},
+            "assume_master_slave": {"0": ["Slave"]},
+            "contact_type": "Frictionless",
+            "search_parameters": {"search_factor": self.search_factor},
+        }
+        if self.kind == "penalty":
+            contact["advance_ALM_parameters"] = {"manual_ALM": True, "penalty": float(scene.penalty)}
+        return {
+            "problem_data": {
+                "problem_name": "scene", "start_time": 0.0, "end_time": 1.0, "parallel_type": "OpenMP", "echo_level": 0
+            },
+            "solver_settings": {
+                "model_part_name": "Structure",
+                "domain_size": 2,
+                "echo_level": 0,
+                "analysis_type": "non_linear",
+                "solver_type": "Static",
+                "time_stepping": {"time_step": 1.1},
+                "model_import_settings": {"input_type": "mdpa", "input_filename": "scene"},
+                "material_import_settings": {"materials_filename": "materials.json"},
+                "contact_settings": {
+                    "mortar_type": mortar,
+                    "contact_residual_relative_tolerance": _RESIDUAL,
+                    "contact_residual_absolute_tolerance": _ROUNDOFF * _largest_force(scene),
+                },
+                "convergence_criterion": "contact_residual_criterion",
+                "residual_relative_tolerance": _RESIDUAL,
+                "residual_absolute_tolerance": _ROUNDOFF * _largest_force(scene),
+                "max_iteration": _ITERATIONS,
+                "linear_solver_settings": {"solver_type": "LinearSolversApplication.sparse_lu"},
+            },
+            "processes": {
+                "contact_process_list": [
+                    {
+                        "python_module": module,
+                        "kratos_module": "KratosMultiphysics.ContactStructuralMechanicsApplication",
+                        "process_name": name,
+                        "Parameters": contact,
+                    }
+                ]
+            },
+        }  # fmt: skip
+
+
+def _largest_force(scene: SceneArrays) -> float:
+    """Return the size of loads or reactions, whichever is larger."""
+    moved = float(np.abs(scene.imposed).max(initial=0.0)) * float(scene.young.max())
+    return max(float(np.abs(scene.load).sum()), moved)
+
+
+@contextmanager
+def _working_in(folder: str) -> Iterator[None]:
+    """Open a block in which this process works in a folder."""
+    before = os.getcwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def write_model(layer: Layer) -> list[str]:
+    """Return the lines of the front of a layer as a model of Kratos: nodes, elements, edges, loads, and its parts."""
+    scene, nodes = layer.scene, layer.nodes[: layer.n_front]
+    lines = ["Begin ModelPartData", "End ModelPartData", "Begin Properties 0", "End Properties"]
+    lines += ["Begin Nodes", *(f"{n} {x!r} {y!r} 0.0" for n, (x, y, _) in enumerate(nodes.tolist(), 1)), "End Nodes"]
+    first, elements = 1, dict[int, list[int]]()
+    kinds = ((3, layer.wedges[:, :3], layer.body_of_wedge), (4, layer.bricks[:, :4], layer.body_of_brick))
+    for corners, cells, bodies in kinds:
+        numbers = range(first, first + len(cells))
+        rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in zip(numbers, cells, strict=True)]
+        lines += [f"Begin Elements SmallDisplacementElement2D{corners}N", *rows, "End Elements"] if rows else []
+        for number, body in zip(numbers, bodies.tolist(), strict=True):
+            elements.setdefault(body, []).append(number)
+        first += len(cells)
+    edges = np.vstack([scene.slave, scene.master])
+    lines += ["Begin Conditions LineCondition2D2N"]
+    lines += [f"{n} 0 {_words(edge + 1)}" for n, edge in enumerate(edges, 1)] + ["End Conditions"]
+    loaded = np.unique(np.flatnonzero(scene.load.any(axis=1))) + 1
+    points = range(len(edges) + 1, len(edges) + len(loaded) + 1)
+    if len(loaded):
+        rows = [f"{n} 0 {node}" for n, node in zip(points, loaded.tolist(), strict=True)]
+        lines += ["Begin Conditions PointLoadCondition2D1N", *rows, "End Conditions"]
+    everything = range(1, len(nodes) + 1)
+    for body, members in elements.items():
+        of_body = [cells[bodies == body].reshape(-1) for _, cells, bodies in kinds]
+        lines += _part(f"Body{body}", (np.unique(np.concatenate(of_body)) + 1).tolist(), members, ())
+    slave = (np.unique(scene.slave) + 1).tolist()
+    lines += _part("Touching", (np.unique(edges) + 1).tolist(), (), range(1, len(edges) + 1))
+    lines += _part("Slave", slave, (), range(1, len(scene.slave) + 1))
+    return lines + (_part("Loaded", loaded.tolist(), (), points) if len(loaded) and everything else [])
+
+
+def _words(numbers: Any) -> str:
+    return " ".join(map(str, numbers.tolist()))
+
+
+def _part(name: str, nodes: Sequence[int], elements: Sequence[int], conditions: Sequence[int]) -> list[str]:
+    """Return the lines of a part of the model."""
+    lines = [f"Begin SubModelPart {name}"]
+    for kind, numbers in (("Nodes", nodes), ("Elements", elements), ("Conditions", conditions)):
+        lines += [f"Begin SubModelPart{kind}", *map(str, numbers), f"End SubModelPart{kind}"]
+    return [*lines, "End SubModelPart"]
+
+
+def _materials(scene: SceneArrays) -> dict[str, Any]:
+    """Return the material of each body; that of a rigid one does not matter."""
+    materials = []
+    for body, (young, poisson, rigid) in enumerate(zip(scene.young, scene.poisson, scene.rigid, strict=True)):
+        values = {"YOUNG_MODULUS": 1.0 if rigid else float(young), "POISSON_RATIO": 0.0 if rigid else float(poisson)}
+        law = {"constitutive_law": {"name": "LinearElasticPlaneStrain2DLaw"}, "Variables": values, "Tables": {}}
+        materials.append({"model_part_name": f"Structure.Body{body}", "properties_id": body + 1, "Material": law})
+    return {"properties": materials}

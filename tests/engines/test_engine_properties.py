@@ -1,0 +1,51 @@
+"""Each question about two scenes catches an engine with the fault that it is about, and accuses no right one."""
+
+import pytest
+from plain_engine import Plain
+
+from contactverif import Property, Verdict, judge_case
+from contactverif.contract.engine_subject import EngineSubject
+from contactverif.plugins.registry import load_properties, property_ids
+from contactverif.sampling.draw import Sampling, draw_cases
+
+MUTANTS = {
+    "engine.purity": "softer at every call",
+    "engine.mirror": "the second node gets more",
+    "engine.renumbering": "the first edge is soft",
+    "engine.scaling": "an absolute length",
+    "engine.swap": "",  # Springs along the slave's normals are no two-sided method.
+    "engine.objectivity": "upright normals",
+    "engine.remote": "as stiff as the mean body",
+}
+EXAMPLES = 12
+
+
+def question_of(name: str) -> Property:
+    (question,) = load_properties([name], engines=True)
+    assert isinstance(question, Property)
+    return question
+
+
+def verdicts(name: str, engine: Plain) -> list[Verdict]:
+    question, subject = question_of(name), EngineSubject("engine/plain", engine)
+    key = Sampling(examples=EXAMPLES, seed=1).key(question)
+    cases = draw_cases(question.cases(None), seed=key, examples=EXAMPLES).cases
+    return [judge_case(question, case, subject).verdict for case in cases]
+
+
+def test_every_question_for_engines_alone_has_its_mutant() -> None:
+    assert set(MUTANTS) == set(property_ids(engines=True)) - set(property_ids())
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_the_mutant_is_caught(name: str) -> None:
+    assert Verdict.FAIL in verdicts(name, Plain(MUTANTS[name]))
+
+
+@pytest.mark.parametrize("name", [name for name, fault in MUTANTS.items() if fault])
+def test_a_right_engine_passes(name: str) -> None:
+    assert verdicts(name, Plain()) == [Verdict.PASS] * EXAMPLES
+
+
+def test_nobody_is_turned_who_takes_no_inclined_supports() -> None:
+    assert set(verdicts("engine.objectivity", Plain(inclined=False))) == {Verdict.UNDECIDED}
