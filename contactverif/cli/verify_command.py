@@ -210,5 +210,5 @@ def select_names(names: list[str], every: bool, limits: Limits | None = None) ->
     if every:
         return list(standalone_names(limits))
     if not names:
-        raise MisuseError("NAME", "nothing", f"--all, --engine, or some of {', '.join(formulation_names())}")
+        raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
     return names

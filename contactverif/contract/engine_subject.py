@@ -9,7 +9,7 @@ import numpy as np
 from contactverif.contract.engine import Engine, EngineAnswer, EngineTraits, SceneArrays
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.contract.foreign_text import describe_error, name_line, place_of_error
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 
 ENGINE = "engine/"  # The names of engines begin so wherever those of formulations stand beside them.
@@ -55,6 +55,10 @@ class EngineSubject(Subject):
         self.traits = _as_traits(traits)
         self.provides = frozenset({SOLVE})
         self.counts_multipliers = False
+
+    def with_penalty(self, penalty: float) -> CheckedFormulation:
+        """Raise a ContractError: nobody can ask an engine for forces."""
+        raise ContractError("an engine gives displacements alone")
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Return the checked answer of the engine to a scene.

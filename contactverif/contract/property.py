@@ -191,13 +191,16 @@ class Property(PropertyInfo):
         """The plain data alone."""
         return PropertyInfo(**{part.name: getattr(self, part.name) for part in fields(PropertyInfo)})
 
-    def refusal(self, subject: Subject) -> str:
+    def refusal_of(self, subject: Subject) -> str:
         """Return why the property is not asked of a formulation or an engine, or an empty string."""
-        traits = subject.traits
         if isinstance(subject, EngineSubject) and not self.engines:
             return "displacements alone do not answer it"
         if SOLVE in self.needs - subject.provides:
             return "it is asked of whole codes"
+        return self.refusal(subject.traits)
+
+    def refusal(self, traits: Traits) -> str:
+        """Return why the property is not asked of a formulation of these traits, or an empty string."""
         if PLANE not in traits.abilities.dimensions:
             return "the interfaces are plane, and the formulation takes none of them"
         if traits.rules.enforcement in self.asks:

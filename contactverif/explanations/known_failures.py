@@ -59,7 +59,9 @@ def stated_failures(question: Property, installed: Iterable[object]) -> str:
     failing = [
         f"`{subject.name}` (`{subject.traits.witness(question.id)}`)"
         for subject in installed
-        if isinstance(subject, Subject) and question.promise(subject.traits) is False and not question.refusal(subject)
+        if isinstance(subject, Subject)
+        and question.promise(subject.traits) is False
+        and not question.refusal_of(subject)
     ]
     if not failing:
         return "No installed formulation states that it fails.\n"

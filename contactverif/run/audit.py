@@ -215,7 +215,7 @@ def _judge_example(
     """Judge a counterexample again, and return in what it differs."""
     subject = next(subject for subject in subjects if subject.name == example.formulation)
     question = next(question for question in questions if question.id == example.property_id)
-    if question.refusal(subject) or question.needs - subject.provides:
+    if question.refusal_of(subject) or question.needs - subject.provides:
         return f"{example.id}: the property is not asked of the formulation"
     (words,) = judge_again(question, subject, [(example.case, example.outcome)], exact)
     return f"{example.id}: {words}" if words else ""

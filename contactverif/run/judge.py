@@ -77,7 +77,7 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
 
 def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Outcome:
     """Judge a case; if the property does not apply to the formulation, return an outcome that says so."""
-    if reason := question.refusal(subject):
+    if reason := question.refusal_of(subject):
         return Outcome(case, Verdict.NOT_APPLICABLE, reason)
     if missing := question.needs - subject.provides:
         return Outcome(case, Verdict.NOT_PROVIDED, f"{', '.join(sorted(missing))}: not provided")

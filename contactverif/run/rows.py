@@ -264,7 +264,7 @@ def open_row(
         promised_by=_traits_of_promise(question, subject),
         known=known,
     )
-    if reason := question.refusal(subject):
+    if reason := question.refusal_of(subject):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
         reason = f"{', '.join(sorted(missing))}: not provided"
@@ -281,7 +281,7 @@ def open_row(
 
 def lacks_witness(subject: Subject, question: Property, sampling: Sampling) -> bool:
     """Return whether a formulation states that it fails, and names no case that shows so, where it is asked for one."""
-    if question.refusal(subject) or (question.needs | question.shown_by) - subject.provides:
+    if question.refusal_of(subject) or (question.needs | question.shown_by) - subject.provides:
         return False
     stated = question.promise(subject.traits) is False and not _is_on_scene(question, sampling)
     return stated and subject.traits.witness(question.id) is None
@@ -445,7 +445,7 @@ def gap_of_rows(result: Run, names: Iterable[str], property_ids: Iterable[str]) 
 
 def _gap_of(row: Row, subject: Subject, question: Property, sampling: Sampling) -> str:
     source = sampling.source(question)
-    if question.refusal(subject) or question.needs - subject.provides or source is None:
+    if question.refusal_of(subject) or question.needs - subject.provides or source is None:
         without_cases = row.verdict in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED)
         return "" if without_cases else f"{row.formulation} {row.property_id}: {row.verdict}"
     count = sum(isinstance(outcome, Outcome) for outcome in row.outcomes)

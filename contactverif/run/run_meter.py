@@ -34,7 +34,7 @@ class RunMeter:
                 continue  # It has no cases on this mesh.
             is_list = sampling.interface is None and getattr(question.cases, "is_list", False)
             self._kinds[question.id] = question.bodies, is_list
-            if not (question.refusal(subject) or question.needs - subject.provides):
+            if not (question.refusal_of(subject) or question.needs - subject.provides):
                 self._planned[subject.name, question.id] = _LIST if is_list else sampling.examples
 
     def measure(self, property_id: str, outcomes: Iterable[Outcome]) -> None:

@@ -25,6 +25,7 @@ _FACES = {
     6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
 }
+_STIFF = 1e7  # The stiffness of springs that stand for supports, over E times a length.
 _RESIDUAL = 1e-8  # The share of the mean force that may be out of balance; the default is 5e-3.
 
 
@@ -47,8 +48,8 @@ class CalculiX:
     @property
     def traits(self) -> EngineTraits:
         """The statements: what the manual states, and the digits that are printed."""
-        passes = None if self.kind == "nodes" else True
-        return EngineTraits("penalty", accuracy=1e-6, inclined_supports=True, passes_flat_patch=passes)
+        passes, turns = None if self.kind == "nodes" else True, self.kind in ("surface", "nodes")
+        return EngineTraits("penalty", accuracy=1e-6, inclined_supports=turns, passes_flat_patch=passes)
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a deck, run ccx on it, and read the displacements that it prints."""
@@ -80,10 +81,11 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
         *_elements_and_surfaces(layer),
         *_materials(layer),
         *_turned_nodes(layer),
+        *(_springs_across(layer) if kind in ("mortar", "linmortar") else ()),
         *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness),
         *(f"*CONTACT PAIR, INTERACTION=TOUCH, TYPE={_TYPES[kind]}", "SLAVE, MASTER"),
         *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", f"{_RESIDUAL:g}, {_RESIDUAL:g}"),
-        *_supports_and_loads(layer),
+        *_supports_and_loads(layer, kind),
         *("*NODE PRINT, NSET=ALL, GLOBAL=YES", "U", "*END STEP"),
     ]
 
@@ -115,9 +117,22 @@ def _materials(layer: Layer) -> list[str]:
     return lines
 
 
-def _supports_and_loads(layer: Layer) -> list[str]:
+def _springs_across(layer: Layer) -> list[str]:
+    """Return the lines of springs that hold the slave's nodes across the layer.
+
+    The mortar methods find no pivot where a node of the slave is held there by a support.
+    """
+    stiffness = _STIFF * float(layer.scene.young.max()) * layer.scene.unit
+    first = len(layer.wedges) + len(layer.bricks) + 1
+    nodes = enumerate(np.unique(layer.slave).tolist(), start=first)
+    lines = ["*ELEMENT, TYPE=SPRING1, ELSET=ACROSS", *(f"{number}, {node + 1}" for number, node in nodes)]
+    return [*lines, "*SPRING, ELSET=ACROSS", "3", _number(stiffness)]
+
+
+def _supports_and_loads(layer: Layer, kind: Kind) -> list[str]:
     """Return the lines of all imposed displacements, those across the layer among them, and of the loads."""
-    lines = ["*BOUNDARY", *(f"{node + 1}, 3, 3" for node in range(len(layer.nodes)))]
+    sprung = set(np.unique(layer.slave).tolist()) if kind in ("mortar", "linmortar") else set[int]()
+    lines = ["*BOUNDARY", *(f"{node + 1}, 3, 3" for node in range(len(layer.nodes)) if node not in sprung)]
     for node, part in np.argwhere(layer.fixed).tolist():
         lines.append(f"{node + 1}, {part + 1}, {part + 1}, {_number(layer.imposed[node, part])}")
     loaded = np.argwhere(layer.load != 0).tolist()

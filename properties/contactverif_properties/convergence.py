@@ -14,6 +14,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Measure, Property
@@ -51,7 +52,8 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
     coarser = study.meshes[:-1] if rates else ()
     solved = [_solve(studies, study.pose(mesh, subject.traits), subject) for mesh in coarser] + [(last, failure)]
     meshes = study.meshes[-len(solved) :]
-    undecided = _name_failures({mesh: end for mesh, (_, end) in zip(meshes, solved, strict=True) if end})
+    solver = "the code" if isinstance(subject, EngineSubject) else "Newton's method"
+    undecided = _name_failures({mesh: end for mesh, (_, end) in zip(meshes, solved, strict=True) if end}, solver)
     details = {} if ITERATIONS in studies.series.values() else {ITERATIONS: last[ITERATIONS]}
     errors, lengths = _by_kind([row for row, _ in solved]), [study.size(mesh) for mesh in meshes]
     series = {name: np.array(errors[kind]) for name, kind in studies.series.items() if kind in errors}
@@ -63,13 +65,13 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
     return Measurement([*numbers, *sizes], undecided, details=details, series=series)
 
 
-def _name_failures(ends: dict[int, str]) -> str:
-    """Return on which meshes Newton's method ended without a solution, and how; empty if on none."""
+def _name_failures(ends: dict[int, str], solver: str) -> str:
+    """Return on which meshes the solver ended without a solution, and how; empty if on none."""
     groups: dict[str, list[str]] = {}
     for mesh, end in ends.items():
         groups.setdefault(end, []).append(str(mesh))
     words = ", ".join(f"mesh{'es' * (len(meshes) > 1)} {' · '.join(meshes)}: {end}" for end, meshes in groups.items())
-    return f"no solution on {words}" if words else ""
+    return f"{solver} finds no solution on {words}" if words else ""
 
 
 def _counts(bound: Bound, group: str, last: Errors, finest: ProblemInstance, fails: bool) -> bool:

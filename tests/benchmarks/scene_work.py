@@ -145,7 +145,7 @@ def main(path: Path) -> None:
     subject = load_formulation("vts-ppt")
     assert isinstance(subject, Subject)
     questions = [item for item in load_properties(["*"]) if isinstance(item, Property)]
-    rows = [measure_work(question, subject) for question in questions if not question.refusal(subject)]
+    rows = [measure_work(question, subject) for question in questions if not question.refusal_of(subject)]
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, [entry.name for entry in fields(Work)])
         table.writeheader()

@@ -26,7 +26,7 @@ def work_as_newton_does() -> None:
 def subject_for(question: Property) -> Subject:
     """Return the formulation that is judged by a property."""
     for subject in map(load_subject, FORMULATIONS):
-        if not question.refusal(subject) and question.needs <= subject.provides:
+        if not question.refusal_of(subject) and question.needs <= subject.provides:
             return subject
     raise AssertionError(f"{question.id} applies to none of {FORMULATIONS}")
 

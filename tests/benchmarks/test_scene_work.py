@@ -13,7 +13,7 @@ MOST_VISITED = 1.5  # Facets that are visited for each one that touches: where c
 @pytest.mark.parametrize("property_id", WITH_BODIES)
 def test_no_body_is_built_twice(property_id: str) -> None:
     subject = load_subject("vts-ppt")
-    if WITH_BODIES[property_id].refusal(subject):
+    if WITH_BODIES[property_id].refusal_of(subject):
         pytest.skip("it does not apply to this formulation")
     work = measure_work(WITH_BODIES[property_id], subject)
     assert work.assembled == work.factorised == work.least_bodies > 0

@@ -15,7 +15,6 @@ from contactverif import (
     Interface,
     Measurement,
     Quantity,
-    ResidualOnly,
     Rules,
     Subject,
     Traits,
@@ -164,11 +163,9 @@ def test_a_defined_property_has_its_question_and_is_pickled_by_its_name() -> Non
 
 
 def test_who_is_not_asked_is_told_why() -> None:
-    subject = Subject("no force", lambda *, penalty: ResidualOnly(lambda interface, z: 0 * z))
-    refusals = []
-    for each in ("penalty", "multiplier", "barrier"):
-        subject.traits = Traits(rules=Rules(enforcement=each))
-        refusals.append(definition.refusal(subject))
+    refusals = [
+        definition.refusal(Traits(rules=Rules(enforcement=each))) for each in ("penalty", "multiplier", "barrier")
+    ]
     assert refusals == [
         "",
         "the enforcement is by a multiplier",

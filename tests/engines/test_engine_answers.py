@@ -141,8 +141,8 @@ def test_another_interpreter_gets_of_this_one_the_harness_alone() -> None:
 
 def test_a_question_about_forces_says_why_an_engine_is_not_asked() -> None:
     subject = EngineSubject("engine/plain", Plain())
-    assert load_property("tangent.directional").refusal(subject) == "displacements alone do not answer it"
-    assert load_property(PATCH).refusal(subject) == ""
+    assert load_property("tangent.directional").refusal_of(subject) == "displacements alone do not answer it"
+    assert load_property(PATCH).refusal_of(subject) == ""
 
 
 def test_a_barrier_is_not_asked_of_scenes_that_penetrate() -> None:

@@ -36,7 +36,7 @@ def caught_at(question: Property, subject: Subject, examples: int | None) -> int
 
     Only the first `examples` cases are asked, or all of them (None).
     """
-    if question.refusal(subject) or question.needs - subject.provides:
+    if question.refusal_of(subject) or question.needs - subject.provides:
         return 0
     promised = question.promise(subject.traits) is True
     for number, case in enumerate(cases(question.id)[:examples], 1):

@@ -80,7 +80,7 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str) -> None:
     subject = load_subject(name)
     decided = planned = 0
     for question in properties():
-        if question.promise(subject.traits) is not True or question.refusal(subject):
+        if question.promise(subject.traits) is not True or question.refusal_of(subject):
             continue
         examples = 10 if question.bodies else 40  # Scenes are slow, and `test_verdicts.py` asks more of each.
         planned += len(cases(question.id, examples))

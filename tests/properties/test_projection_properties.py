@@ -32,7 +32,7 @@ def outcome_of(property_id: str, case: Case, subject: Subject) -> Outcome:
 @pytest.mark.parametrize("property_id", IDS)
 def test_built_in_formulations_with_options_pass(name: str, property_id: str) -> None:
     subject, question = load_subject(name), load_property(property_id)
-    if not question.refusal(subject):
+    if not question.refusal_of(subject):
         assert {outcome_of(property_id, case, subject).verdict for case in cases(property_id)} == {Verdict.PASS}
 
 

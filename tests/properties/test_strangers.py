@@ -32,7 +32,7 @@ CASES = {question.id: cases_of(question) for question in QUESTIONS}
 def test_a_right_formulation_of_a_stranger_is_not_accused_of_anything(name: str) -> None:
     subject, undecided = Subject(name, STRANGERS[name]), []
     for question in QUESTIONS:
-        if question.promise(subject.traits) is not True or question.refusal(subject):
+        if question.promise(subject.traits) is not True or question.refusal_of(subject):
             continue
         if question.needs - subject.provides:
             continue

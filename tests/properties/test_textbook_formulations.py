@@ -31,7 +31,7 @@ def test_a_right_formulation_is_not_accused(property_id: str) -> None:
     cases = draw_cases(source, seed=f"textbook/{property_id}", examples=count).cases
     for make in FORMULATIONS:
         subject = Subject(make.__name__, make)
-        if question.refusal(subject) or question.promise(subject.traits) is None:
+        if question.refusal_of(subject) or question.promise(subject.traits) is None:
             continue
         for case in cases[:: max(1, len(cases) // count)]:
             outcome = judge_case(question, case, subject)

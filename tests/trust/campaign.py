@@ -54,7 +54,7 @@ class Count:
 
     def ask(self, question: Property, cases: Sequence[Case], subject: Subject) -> None:
         """Judge the cases, if the property makes sense for the formulation."""
-        if question.refusal(subject) or question.needs - subject.provides:
+        if question.refusal_of(subject) or question.needs - subject.provides:
             return
         promised = question.promise(subject.traits) is True
         for number, case in enumerate(cases, 1):

@@ -155,7 +155,7 @@ def carrier(question: Property) -> str | None:
     """Return the first formulation that promises to pass a property, or None."""
     for name, make in CARRIERS.items():
         subject = Subject(name, make)
-        if question.promise(subject.traits) is True and not question.refusal(subject):
+        if question.promise(subject.traits) is True and not question.refusal_of(subject):
             return name
     return None
 

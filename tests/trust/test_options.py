@@ -29,7 +29,7 @@ def test_a_formulation_with_an_option_keeps_its_promises(part: int) -> None:
         subject = load_subject(name)
         for property_id in (QUICK[(EACH * number + each) % len(QUICK)] for each in range(EACH)):
             question = load_property(property_id)
-            if question.refusal(subject) or question.needs - subject.provides:
+            if question.refusal_of(subject) or question.needs - subject.provides:
                 continue
             for case in cases_of(property_id):
                 outcome = judge_case(question, case, subject)

@@ -1,0 +1,108 @@
+"""Ask every engine every question that displacements answer, and write the table of `reports/findings`.
+
+`tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question. Engines that come as Python
+packages get environments of their own. A report that is complete is read and not made again, and one that was stopped
+goes on, so that the same command goes on with the whole.
+"""
+
+import csv
+import json
+import shutil
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parents[2] / "reports" / "findings"
+COUNTS, NUMBERS = ("judged", "failed", "planned"), ("number", "value", "tolerance")
+HEADS = ("engine", "question", "verdict", *COUNTS, *NUMBERS, "seconds a case", "reason")
+PARTS = ("StructuralMechanics", "ContactStructuralMechanics", "LinearSolvers")
+KRATOS = ("KratosMultiphysics", *(f"Kratos{part}Application" for part in PARTS))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An engine with options, and the packages that its interpreter needs; none if it lives in this one."""
+
+    name: str
+    options: str = ""
+    packages: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """The name and the options."""
+        return f"{self.name}:{self.options}" if self.options else self.name
+
+    def spelled(self, environments: Path) -> str:
+        """Return the name as on the command line, after its environment is made."""
+        options = [self.options] if self.options else []
+        if self.packages:
+            options.append(f"python={_interpreter(environments / self.name, self.packages)}")
+        return f"{self.name}:{','.join(options)}" if options else self.name
+
+
+CHOICES = (
+    Choice("control"),
+    Choice("calculix"),
+    Choice("calculix", "kind=nodes"),
+    Choice("calculix", "kind=mortar"),
+    Choice("calculix", "kind=linmortar"),
+    Choice("kratos", "", KRATOS),
+    Choice("kratos", "search_factor=50", KRATOS),
+    Choice("kratos", "kind=penalty", KRATOS),
+    Choice("ngsolve", "", ("ngsolve",)),
+    Choice("ngsolve", "order=15", ("ngsolve",)),
+)
+
+
+def _interpreter(folder: Path, packages: tuple[str, ...]) -> Path:
+    """Return the interpreter of an environment with numpy and some packages, which is made if it is not there."""
+    python = folder / "bin" / "python"
+    if not python.exists():
+        venv.create(folder, with_pip=True)
+        subprocess.run([python, "-m", "pip", "install", "-q", "numpy", *packages], check=True)
+    return python
+
+
+def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
+    """Return the lines of an engine, from a report that is made or gone on with."""
+    report = folder / f"{choice.label.replace(':', '-').replace('=', '-').replace(',', '-')}.json"
+    if not report.exists():
+        journal = report.with_name(report.name + ".journal")
+        new = ["--engine", choice.spelled(folder / "environments"), "--seed", "1", "--examples", str(examples)]
+        arguments = ["--resume", str(report)] if journal.exists() else [*new, "--out", str(report), "--no-memory"]
+        command = [sys.executable, "-m", "contactverif", "verify", *arguments, "--keep-going", "-q", "--jobs", "2"]
+        subprocess.run(command, check=False, cwd=folder)
+    document = json.loads(report.read_text(encoding="utf-8"))
+    return [line for row in document["rows"] if (line := _line(choice, row)) is not None]
+
+
+def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
+    """Return the line of a row; None where displacements do not answer the question."""
+    if row["result"] == "not applicable":
+        return None
+    closest = row["closest"] or {"name": "", "value": nan, "tolerance": nan}
+    numbers = [f"{closest[key]:.2e}" if closest[key] == closest[key] else "" for key in ("value", "tolerance")]
+    seconds = f"{row['seconds'] / max(row['planned'], 1):.2g}"
+    counts = (str(row[key]) for key in ("judged", "failed", "planned"))
+    return choice.label, row["property"], row["result"], *counts, closest["name"], *numbers, seconds, row["reason"]
+
+
+def main(folder: Path, examples: int) -> None:
+    """Ask all engines whose program is there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = []
+    for choice in CHOICES:
+        if choice.name == "calculix" and shutil.which("ccx") is None:
+            print("calculix: the program ccx is not installed")
+            continue
+        lines += ask(choice, folder, examples)
+        with (FOLDER / "engines.csv").open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1000)
