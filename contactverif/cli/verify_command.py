@@ -89,7 +89,7 @@ def verify(
       contactverif verify nts -p 'patch.*' --seed 7
       contactverif verify mine --mesh punch.msh --slave punch --master base
       contactverif verify vts-me --scene c -p 'patch.*'
-      contactverif verify --engine calculix -p 'patch.*'
+      contactverif verify --engine control -p patch.flat.solve
       contactverif verify --resume vts-ppt.nc
       contactverif verify mine --last-failed
     """

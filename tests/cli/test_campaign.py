@@ -79,7 +79,8 @@ def test_the_exit_status_of_a_broken_promise_is_that_of_verify(
     """The harness is told that `nts` promises what it cannot keep."""
     question = next(iter(load_properties(["patch.flat.single"])))
     monkeypatch.setattr(
-        "contactverif.plugins.registry.load_properties", lambda globs: [replace(question, promise=lambda traits: True)]
+        "contactverif.plugins.registry.load_properties",
+        lambda globs, **others: [replace(question, promise=lambda traits: True)],
     )
     assert isinstance(question, Property)
     words = ("nts", "-p", "patch.flat.single", "--examples", "4")

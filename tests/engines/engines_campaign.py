@@ -51,7 +51,7 @@ CHOICES = (
     Choice("calculix", "kind=mortar"),
     Choice("calculix", "kind=linmortar"),
     Choice("kratos", "", KRATOS),
-    Choice("kratos", "search_factor=50", KRATOS),
+    Choice("kratos", "search_factor=10000", KRATOS),
     Choice("kratos", "kind=penalty", KRATOS),
     Choice("ngsolve", "", ("ngsolve",)),
     Choice("ngsolve", "order=15", ("ngsolve",)),
@@ -93,7 +93,8 @@ def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
 
 def main(folder: Path, examples: int) -> None:
     """Ask all engines whose program is there."""
-    folder.mkdir(parents=True, exist_ok=True)
+    for place in (folder, FOLDER):
+        place.mkdir(parents=True, exist_ok=True)
     lines = []
     for choice in CHOICES:
         if choice.name == "calculix" and shutil.which("ccx") is None:

@@ -39,7 +39,7 @@ def measure_engine(
     details = {} if answer is None else {ITERATIONS: float(answer.iterations)}
     if solution.no_solution:
         return Measurement(undecided=solution.no_solution, details=details)
-    pressure = pressure_of(case, penalty if traits.enforcement == "penalty" else np.inf)
+    pressure = float(pressure_of(case, penalty if traits.enforcement == "penalty" else np.inf))
     if traits.enforcement == "own":
         mean = _mean_pressure(case, solution)
         details[OWN_PRESSURE] = mean / pressure
@@ -83,7 +83,7 @@ def engine_tolerance(scene: Scene, solution: Solution, accuracy: float, pressure
     nodes = scene.interface.nodes
     shortest = min(float(side.lengths(nodes).min()) for side in (scene.interface.slave, scene.interface.master))
     displacement = float(np.abs(solution.displacements).max())
-    return accuracy * (1 + modulus * displacement / (shortest * pressure)) + 1e-12 * _condition(scene)
+    return float(accuracy * (1 + modulus * displacement / (shortest * pressure)) + 1e-12 * _condition(scene))
 
 
 def _condition(scene: Scene) -> float:
