@@ -46,7 +46,7 @@ class Kratos:
 
     @property
     def traits(self) -> EngineTraits:
-        """The statements. The penalty of Kratos is no stiffness of an area, see `reports/findings`, so it is its own."""
+        """The statements. The penalty of Kratos is no stiffness of an area (`reports/findings`), so it is its own."""
         if self.kind == "penalty":
             return EngineTraits("own", accuracy=1e-8, load_scale=2.0**-10)
         return EngineTraits("multiplier", accuracy=1e-8, load_scale=2.0**-10, passes_flat_patch=True)

@@ -36,7 +36,7 @@ class Choice:
         """The name and the options."""
         return f"{self.name}:{self.options}" if self.options else self.name
 
-    def spelled(self, environments: Path) -> str:
+    def write_name(self, environments: Path) -> str:
         """Return the name as on the command line, after its environment is made."""
         options = [self.options] if self.options else []
         if self.packages:
@@ -72,7 +72,7 @@ def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
     report = folder / f"{choice.label.replace(':', '-').replace('=', '-').replace(',', '-')}.json"
     if not report.exists():
         journal = report.with_name(report.name + ".journal")
-        new = ["--engine", choice.spelled(folder / "environments"), "--seed", "1", "--examples", str(examples)]
+        new = ["--engine", choice.write_name(folder / "environments"), "--seed", "1", "--examples", str(examples)]
         arguments = ["--resume", str(report)] if journal.exists() else [*new, "--out", str(report), "--no-memory"]
         command = [sys.executable, "-m", "contactverif", "verify", *arguments, "--keep-going", "-q", "--jobs", "2"]
         subprocess.run(command, check=False, cwd=folder)

@@ -151,7 +151,7 @@ def test_a_barrier_is_not_asked_of_scenes_that_penetrate() -> None:
             super().__init__()
             self.traits = EngineTraits("barrier")
 
-    assert "barrier" in load_property(PATCH).refusal(EngineSubject("engine/barrier", Barrier()))
+    assert "barrier" in load_property(PATCH).refusal_of(EngineSubject("engine/barrier", Barrier()))
 
 
 def test_a_code_with_a_stiffness_of_its_own_is_judged_by_its_mean_pressure() -> None:
