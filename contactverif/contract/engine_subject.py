@@ -95,11 +95,11 @@ class EngineSubject(Subject):
 
 def _as_traits(traits: EngineTraits) -> Traits:
     """Return the statements of an engine as those of a formulation that is distributed over the current length."""
-    stiff = traits.enforcement in ("multiplier", "own")  # A code's own stiffness is near to none that gives way.
     promises = Promises(
         patch=PatchPromises(flat=traits.passes_flat_patch),
         converges=traits.converges,
-        independent_multipliers=True if stiff else None,
+        independent_multipliers=True if traits.enforcement == "multiplier" else None,
     )
+    # A stiffness of its own is near to none that gives way.
     enforcement = "multiplier" if traits.enforcement == "own" else traits.enforcement
     return Traits(promises, Rules(enforcement, "distributed", "current"))

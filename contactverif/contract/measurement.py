@@ -56,7 +56,7 @@ class Quantity:
         value, tolerance : float
             Both in the unit of the quantity. A NaN value is a failure.
         """
-        return CheckedNumber(self, value, tolerance)
+        return CheckedNumber(self, float(value), float(tolerance))
 
 
 @dataclass(frozen=True, slots=True)
