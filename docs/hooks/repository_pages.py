@@ -14,6 +14,8 @@ PAGES = {
     "reports/trust/bugs.md": "reference/mistakes.md",
     "reports/trust/hostile.md": "reference/hostile-plugins.md",
     "reports/bench/README.md": "reference/speed-against-error.md",
+    "reports/findings/README.md": "reference/findings.md",
+    "reports/findings/engines.md": "reference/engines.md",
     "CONTRIBUTING.md": "project/contributing.md",
     "DECISIONS.md": "project/decisions.md",
     "CHANGELOG.md": "project/changelog.md",

@@ -112,6 +112,7 @@ class Kratos:
                 "material_import_settings": {"materials_filename": "materials.json"},
                 "contact_settings": {
                     "mortar_type": mortar,
+                    "fancy_convergence_criterion": False,
                     "contact_residual_relative_tolerance": _RESIDUAL,
                     "contact_residual_absolute_tolerance": _ROUNDOFF * _largest_force(scene),
                 },

@@ -1,8 +1,8 @@
-"""Ask every engine every question that displacements answer, and write the table of `reports/findings`.
+"""Ask every engine every question that displacements answer, and write the tables of `reports/findings`.
 
-`tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question. Engines that come as Python
-packages get environments of their own. A report that is complete is read and not made again, and one that was stopped
-goes on, so that the same command goes on with the whole.
+`tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question, and the page `engines.md`.
+Engines that come as Python packages get environments of their own. A report that is complete is read and not made
+again, and one that was stopped goes on, so that the same command goes on with the whole.
 """
 
 import csv
@@ -91,6 +91,43 @@ def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
     return choice.label, row["property"], row["result"], *counts, closest["name"], *numbers, seconds, row["reason"]
 
 
+PAGE = """# Contact codes, question by question
+
+Each code was asked every question that its displacements answer
+([what is asked](../../docs/how-to/whole-codes.md#what-is-asked)): the scenes of seed 1, up to {examples} random ones of
+a question, and all that have an exact solution. A cell says how it ended, with the number that is nearest to its
+tolerance or furthest beyond it, over the tolerance (below 1 passes), how many scenes could be judged of how many, and
+the seconds of a scene. A scene is not judged where the code says that it finds no solution.
+
+- **pass** and **fail**: the verdict over all scenes. A fail is no accusation where the code promises nothing: see
+  [the findings](README.md).
+- **not judged**: of more than a tenth of the scenes the code found no solution.
+- **crashed**: it ended, or gave no answer within a minute.
+
+`tox -e engines` wrote this page, and `engines.csv` beside it, which has the reasons.
+
+{tables}
+"""
+
+
+def write_page(lines: list[tuple[str, ...]], examples: int) -> None:
+    """Write the page: a table for each engine."""
+    tables = []
+    for engine in dict.fromkeys(line[0] for line in lines):
+        rows = ["| question | verdict | over tolerance | judged | seconds |", "|---|---|---|---|---|"]
+        for row in (dict(zip(HEADS, line, strict=True)) for line in lines if line[0] == engine):
+            value, tolerance = (float(row[name] or nan) for name in ("value", "tolerance"))
+            least = row["number"].startswith("rate")
+            ratio = tolerance / value if least else value / tolerance if tolerance else nan
+            over = f"{row['number']} {ratio:.2g}" if ratio == ratio else ""
+            rows.append(
+                f"| `{row['question']}` | {row['verdict']} | {over} | {row['judged']} of {row['planned']} | "
+                f"{row['seconds a case']} |"
+            )
+        tables.append("\n".join([f"## {engine}", "", *rows, ""]))
+    (FOLDER / "engines.md").write_text(PAGE.format(examples=examples, tables="\n".join(tables)), encoding="utf-8")
+
+
 def main(folder: Path, examples: int) -> None:
     """Ask all engines whose program is there."""
     for place in (folder, FOLDER):
@@ -103,6 +140,7 @@ def main(folder: Path, examples: int) -> None:
         lines += ask(choice, folder, examples)
         with (FOLDER / "engines.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
+        write_page(lines, examples)
 
 
 if __name__ == "__main__":

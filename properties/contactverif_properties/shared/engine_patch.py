@@ -22,7 +22,7 @@ from contactverif.problems.uniform_stress import stress_error
 from contactverif_properties.shared.uniform_pressure import consistent_forces, gap_error, normal_of
 
 OWN_PRESSURE = "mean pressure over that of hard contact"
-ITERATIONS = "iterations of the code"
+ITERATIONS = "iterations until the code said that it converged"
 
 
 def measure_engine(
