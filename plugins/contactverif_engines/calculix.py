@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -26,7 +26,10 @@ _FACES = {
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
 }
 _STIFF = 1e7  # The stiffness of springs that stand for supports, over E times a length.
-_RESIDUAL = 1e-8  # The share of the mean force that may be out of balance; the default is 5e-3.
+_MODULUS = 1e9
+# The share of the mean force that may be out of balance, and of the step by which it may be corrected (5e-3 and 1e-2 by
+# default); the fifth number is the first one after nine iterations, the last one a residual without further tests.
+_FIELD = "1e-8, 1e-8, , , 1e-8, , , 1e-20"
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,14 @@ class CalculiX:
         dual mortar methods. All have linear springs of the stiffness ε̂.
     program : str
         The program.
+    scaled : bool
+        Forces are given in a unit in which moduli are some 1e9. The tests of convergence of ccx hold absolute numbers:
+        with forces of 1e-5 it ends, and says that it converged, while contact still changes.
     """
 
     kind: Kind = "surface"
     program: str = "ccx"
+    scaled: bool = True
 
     @property
     def traits(self) -> EngineTraits:
@@ -53,7 +60,7 @@ class CalculiX:
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a deck, run ccx on it, and read the displacements that it prints."""
-        layer = make_layer(scene, scene.unit)
+        layer = make_layer(_in_larger_units(scene) if self.scaled else scene, scene.unit)
         with tempfile.TemporaryDirectory() as folder:
             deck = Path(folder, "scene.inp")
             deck.write_text("\n".join(write_deck(layer, self.kind)) + "\n", encoding="ascii")
@@ -71,6 +78,13 @@ class CalculiX:
         return EngineAnswer(displacements, converged, iterations or -1, message)
 
 
+def _in_larger_units(scene: SceneArrays) -> SceneArrays:
+    """Return the scene with forces in a unit in which moduli are some 1e9; its displacements are the same."""
+    factor = 2.0 ** round(np.log2(_MODULUS / scene.young[~scene.rigid].max()))
+    forces = {name: getattr(scene, name) * factor for name in ("young", "load", "penalty")}
+    return replace(scene, **forces)
+
+
 def write_deck(layer: Layer, kind: Kind) -> list[str]:
     """Return the lines of the deck."""
     scene = layer.scene
@@ -84,7 +98,7 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
         *(_springs_across(layer) if kind in ("mortar", "linmortar") else ()),
         *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness),
         *(f"*CONTACT PAIR, INTERACTION=TOUCH, TYPE={_TYPES[kind]}", "SLAVE, MASTER"),
-        *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", f"{_RESIDUAL:g}, {_RESIDUAL:g}"),
+        *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", _FIELD),
         *_supports_and_loads(layer, kind),
         *("*NODE PRINT, NSET=ALL, GLOBAL=YES", "U", "*END STEP"),
     ]
