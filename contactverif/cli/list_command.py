@@ -39,7 +39,7 @@ def list_installed(
     traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
     isolation: IsolationOptions,
 ) -> None:
-    """List the installed formulations with their promises, and the properties.
+    """List the installed formulations with their promises, properties, and engines.
 
     A promise is what a formulation says of itself; verify checks it. A
     witness is a named case on which a formulation says that it fails.
@@ -53,6 +53,7 @@ def list_installed(
     """
     from contactverif.cli.console import plain_table, show
     from contactverif.contract.result import NotLoaded
+    from contactverif.plugins.engines import describe_engines
     from contactverif.plugins.registry import load_formulations, load_properties
 
     table = plain_table("formulations", words=("name",))
@@ -70,6 +71,11 @@ def list_installed(
             table.add_row(question.formulation, _not_loaded(question))
         else:
             table.add_row(question.id, question.summary)
+    show(table)
+    table = plain_table("engines", words=("name",))
+    table.add_column("what it is")
+    for name, words in describe_engines().items():
+        table.add_row(name, words)
     show(table)
 
 

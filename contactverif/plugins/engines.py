@@ -6,6 +6,7 @@ any engine is the interpreter that it lives in.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from importlib.metadata import entry_points
 
@@ -27,6 +28,18 @@ _FORM = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 def engine_names() -> tuple[str, ...]:
     """Return the names of the installed engines, sorted; nothing is loaded."""
     return tuple(entries_by_name(ENGINES))
+
+
+def describe_engines() -> dict[str, str]:
+    """Return the installed engines, sorted, each with the first line of its docstring, or why it does not load."""
+    words = {}
+    for name, entries in entries_by_name(ENGINES).items():
+        make = load_entry(name, entries)
+        if isinstance(make, NotLoaded):
+            words[name] = f"not loaded: {make.reason}"
+        else:
+            words[name] = (inspect.getdoc(make) or "").partition("\n")[0].rstrip(".")
+    return words
 
 
 def has_engine(names: Sequence[str]) -> bool:
