@@ -88,7 +88,8 @@ def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
     from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 
     if not isinstance(item, Subject):
-        return f"wraps another, {item.name}/NAME{f': {item.summary}' if item.summary else ''}"
+        verb = "wraps another" if item.form.endswith("/NAME") else "loads a file"
+        return f"{verb}, {item.form}{f': {item.summary}' if item.summary else ''}"
     statements = _statements(item.traits, every_trait) or ["nothing"]
     missing = ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides)
     return "; ".join([*statements, *([f"not provided: {missing}"] if missing else [])])

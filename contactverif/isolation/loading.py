@@ -27,10 +27,11 @@ from contactverif.isolation.remote_formulation import RemoteFactory, RemoteSubje
 
 @dataclass(frozen=True, slots=True)
 class Wrapper:
-    """A formulation that works only around another one, `name/NAME`."""
+    """A name that stands for no formulation by itself: it needs another one, or a file."""
 
     name: str
     summary: str  # The first line of the factory's docstring.
+    form: str  # What a user writes, `name/NAME` or `name:file=PATH`.
 
 
 def python_program(file: str) -> tuple[str, ...]:
@@ -84,8 +85,8 @@ def _read_reply(command: tuple[str, ...], name: str, limits: Limits, reply: Repl
     match reply:
         case Unloaded(_, reason):
             return NotLoaded(name, one_line(reason))
-        case Wraps(_, summary):
-            return Wrapper(name, one_line(summary))
+        case Wraps(_, summary, form):
+            return Wrapper(name, one_line(summary), one_line(form))
         case Loaded(_, traits, provides):
             return RemoteSubject(RemoteFactory(command, name, limits, _traits(traits), frozenset(provides)))
     raise PluginError(f"import: a {type(reply).__name__} where a formulation was needed", "channel")

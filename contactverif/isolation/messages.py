@@ -129,10 +129,11 @@ class Unloaded(msgspec.Struct, array_like=True, tag="unloaded"):
 
 
 class Wraps(msgspec.Struct, array_like=True, tag="wraps"):
-    """The name is that of a wrapper, with its first line of documentation."""
+    """The name needs another formulation or a file: its first line of documentation, and what a user writes."""
 
     question: int
     summary: str
+    form: str
 
 
 Request = Load | Make | ShareInterface | SharePairing | Forget | Ask  # An engine gets Load and Solve alone.

@@ -136,7 +136,7 @@ class Desk:
         if isinstance(item, NotLoaded):
             return Unloaded(request.question, item.reason)
         if not isinstance(item, Subject):
-            return Wraps(request.question, str(item.summary))
+            return Wraps(request.question, str(item.summary), str(item.form))
         self._subject = item
         methods = item.provides | ({"n_multipliers"} if item.counts_multipliers else set())
         traits = msgspec.to_builtins(item.traits, enc_hook=_plain)

@@ -1,7 +1,8 @@
 """The registry: it finds formulations and properties through entry points, and loads each when it is needed.
 
 On the command line a formulation is a name with options, `vts-me:n=4`, or a wrapper around one,
-`two-pass/nts-ar:area=reference`.
+`two-pass/nts-ar:area=reference`. Behind a name that wraps nothing a "/" belongs to the value of an option, such as
+`uel:file=build/contact.so`.
 
 Rule: a mistake of the user is a `MisuseError`; a mistake of a plugin is a `NotLoaded`, which becomes a row of the
 report, so that the other plugins run.
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import re
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -45,6 +47,7 @@ _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time 
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _MARKS = ":/"  # They stand before options, and before the formulation that is wrapped.
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
+_FILE = "file"  # A factory that needs this option loads what a user names, and nothing without it.
 _NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
@@ -60,7 +63,7 @@ def formulation_names() -> tuple[str, ...]:
 
 
 def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
-    """Return the names of the formulations that are no wrappers, sorted; all are loaded to tell which is which."""
+    """Return the names of the formulations that need neither another nor a file, sorted; all are loaded to tell."""
     if limits is None:
         installed = entries_by_name(FORMULATIONS)
         return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
@@ -259,59 +262,74 @@ def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
 
 
 def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
-    """Return the wrapper of that name; None if the name is that of a formulation or does not load."""
+    """Return the wrapper or loader of files of that name; None if it stands for a formulation or does not load."""
     make = load_entry(name, entries)
-    if not callable(make) or not _wraps(parameters_of(make)):
+    if not callable(make):
         return None
-    return Wrapper(name, (inspect.getdoc(make) or "").partition("\n")[0].rstrip("."))
+    parameters = parameters_of(make)
+    needs_file = _FILE in parameters and parameters[_FILE].default is inspect.Parameter.empty
+    if not needs_file and not _wraps(parameters):
+        return None
+    summary = (inspect.getdoc(make) or "").partition("\n")[0].rstrip(".")
+    return Wrapper(name, summary, f"{name}:{_FILE}=PATH" if needs_file else f"{name}/NAME")
 
 
 def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
     return "inner" in parameters
 
 
-def _load_factory(text: str) -> Callable[..., Any] | NotLoaded:
-    """Return `make(*, penalty)` for the text, with its options and its inner formulation filled in."""
+def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
+    """Return `make(*, penalty)` for the text behind `depth` wrappers, with options and inner formulation filled in."""
     _check_name(text)
+    make = _find_entry(text)
+    parameters = parameters_of(make) if callable(make) else {}
+    wraps = _wraps(parameters)
     outer, slash, inner_text = text.partition("/")
+    if slash and ":" in outer and not wraps:  # The "/" belongs to the value of an option.
+        outer, slash = text, ""
     name, options = parse_name("formulation", outer, _FORM)
-    installed = entries_by_name(FORMULATIONS)
-    if name not in installed:
-        raise unknown_name_error("formulation", name, installed)
-    make = load_entry(name, installed[name])
     if isinstance(make, NotLoaded):
         return NotLoaded(text, make.reason)
     if not callable(make):
         return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(*, penalty, …)")
-    parameters = parameters_of(make)
     check_options(text, make, parameters, options)
-    wraps = _wraps(parameters)
     if wraps and not slash:
         raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
     if slash and not wraps:
         raise MisuseError("formulation", repr(text), f"a wrapper before the '/'; {name} wraps nothing")
     if not wraps:
         return partial(make, **options)
-    inner = _load_inner(inner_text)
+    inner = _load_inner(inner_text, depth + 1)
     if isinstance(inner, NotLoaded):
         return NotLoaded(text, f"{inner_text}: {inner.reason}")
     return partial(make, **options, inner=inner)
 
 
+def _find_entry(text: str) -> Any:
+    """Return what the first name of a text refers to, or a NotLoaded."""
+    name = re.split(f"[{_MARKS}]", text, maxsplit=1)[0]
+    installed = entries_by_name(FORMULATIONS)
+    if not name:
+        raise MisuseError("formulation", repr(text), _FORM)
+    if name not in installed:
+        raise unknown_name_error("formulation", name, installed)
+    return load_entry(name, installed[name])
+
+
 def _check_name(text: str) -> None:
-    """Refuse a name that is too long, that has too many wrappers, or that is a file."""
+    """Refuse a name that is too long, or that is a file."""
     if len(text) > LONGEST_NAME:
         raise MisuseError("formulation", repr(name_line(text)), _SHORT_NAME)
     if text.partition(":")[0].endswith(".py"):
         needed = "an installed name (`contactverif new NAME` begins one); in Python, contactverif.verify takes a class"
         raise MisuseError("formulation", f"a file, {text!r}", needed)
-    if text.count("/") > _MOST_WRAPPERS:
-        raise MisuseError("formulation", f"{text.count('/')} wrappers in {text!r}", f"at most {_MOST_WRAPPERS}")
 
 
-def _load_inner(text: str) -> Callable[..., Any] | NotLoaded:
+def _load_inner(text: str, depth: int) -> Callable[..., Any] | NotLoaded:
     """Return the factory of the formulation behind the '/', after one trial."""
-    make = _load_factory(text)
+    if depth > _MOST_WRAPPERS:
+        raise MisuseError("formulation", f"{depth} wrappers before {text!r}", f"at most {_MOST_WRAPPERS}")
+    make = _load_factory(text, depth)
     if isinstance(make, NotLoaded):
         return make
     trial = subject_of(text, make)

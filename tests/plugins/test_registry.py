@@ -53,6 +53,11 @@ def twice(*, penalty: float, inner: Any, mode: str = "average") -> Plugin:
     return Plugin(inner=inner(penalty=penalty), mode=mode)
 
 
+def loads(*, penalty: float, file: str, nodes: int = 3) -> Plugin:
+    """Load a file."""
+    return Plugin(penalty=penalty, file=file, nodes=nodes)
+
+
 def raising(*, penalty: float) -> Plugin:
     raise RuntimeError("no licence")
 
@@ -72,6 +77,7 @@ FORMULATIONS: dict[str, Any] = {
     "any": any_options,
     "needing": needing,
     "twice": twice,
+    "loads": loads,
     "raising": raising,
     "empty": empty,
     "number": 7,
@@ -167,6 +173,9 @@ def test_values_are_whole_numbers_numbers_truth_or_words() -> None:
         ("twice", ["found 'twice'", "twice/NAME"]),
         ("twice/", ["found ''"]),
         ("nts/vts-me", ["nts wraps nothing"]),
+        ("vts-me:n=4/nts", ["option n", "found '4/nts'", "a whole number"]),
+        ("loads", ["no file", "file=VALUE"]),
+        ("loads:file=a/b,node=4", ["'node'", "nearest: nodes"]),
         ("twice/vts-m", ["found 'vts-m'", "nearest: vts-me"]),
         ("twice/vts-me:n=0", ["n: found 0"]),
         ("twice/twice/twice/twice/nts", ["found 4 wrappers", "at most 3"]),
@@ -187,6 +196,13 @@ def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
     assert plugin.options["mode"] == "sum"
     assert plugin.options["inner"].options == {"penalty": 3.0, "n": 4, "factor": 1.0, "area": "current", "on": True}
     assert load("twice/twice/nts").options["inner"].options["inner"].options == {"penalty": 3.0}
+
+
+@pytest.mark.usefixtures("entries")
+def test_a_slash_in_a_value_wraps_nothing() -> None:
+    path = "/a/b.c/nts/e/lib.so"
+    assert load(f"loads:file={path},nodes=4").options == {"penalty": 3.0, "file": path, "nodes": 4}
+    assert load(f"twice:mode=sum/twice/loads:file={path}").options["inner"].options["inner"].options["file"] == path
 
 
 @pytest.mark.parametrize(
@@ -237,13 +253,14 @@ def test_all_are_loaded_for_a_list() -> None:
     rows = {item.formulation for item in formulations if isinstance(item, NotLoaded)}
     assert rows == {"raising", "empty", "number", "needing"}
     assert [item for item in formulations if isinstance(item, registry.Wrapper)] == [
-        registry.Wrapper("twice", "Two of it")
+        registry.Wrapper("loads", "Load a file", "loads:file=PATH"),
+        registry.Wrapper("twice", "Two of it", "twice/NAME"),
     ]
 
 
 @pytest.mark.usefixtures("entries")
 def test_a_wrapper_does_not_stand_alone() -> None:
-    assert set(registry.standalone_names()) == set(FORMULATIONS) - {"twice"}
+    assert set(registry.standalone_names()) == set(FORMULATIONS) - {"twice", "loads"}
 
 
 @pytest.mark.parametrize(

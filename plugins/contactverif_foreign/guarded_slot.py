@@ -1,0 +1,150 @@
+"""The memory that a library gets for one call: all arguments at fixed addresses, with guard values around each array.
+
+A sweep over the elements keeps a row of memory for each. It copies the row to the slot, calls, and copies it back. After
+the sweep all guards and inputs of all rows are compared at once, so a wrong write has an argument and an element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contactverif.contract.arrays import Array, IntArray
+from contactverif.contract.errors import ContractError
+
+_GUARD = np.uint64(0x7FF8C0DEC0DEC0DE)  # Not a number, so what reads it shows.
+_LEAST_GUARD = 8  # Words around an array.
+_DTYPES: dict[str, np.dtype[Any]] = {"real": np.dtype(np.float64), "integer": np.dtype(np.int32)}
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An argument of a library's function."""
+
+    name: str
+    shape: tuple[int, ...] = ()  # A scalar has none.
+    kind: Literal["real", "integer"] = "real"
+    is_input: bool = True  # It must be unchanged after the call.
+
+    @property
+    def size(self) -> int:
+        """The number of values."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+
+class GuardedSlot:
+    """The memory of one call.
+
+    Parameters
+    ----------
+    arguments : Sequence[Argument]
+        The arguments. Scalars share their guards, an array has its own.
+    guard : int
+        The least number of words of eight bytes around an array, such as the size of a column of the largest one.
+
+    Attributes
+    ----------
+    addresses : dict[str, int]
+        The address of each argument by name.
+    """
+
+    def __init__(self, arguments: Sequence[Argument], guard: int = _LEAST_GUARD) -> None:
+        self._arguments = {argument.name: argument for argument in arguments}
+        self._starts: dict[str, int] = {}  # In halves of words, where each argument begins.
+        guard, place, is_behind_scalar = 2 * max(guard, _LEAST_GUARD), 0, False
+        for argument in sorted(arguments, key=lambda argument: bool(argument.shape)):
+            if argument.shape or not is_behind_scalar:
+                place += guard
+            is_behind_scalar = not argument.shape
+            self._starts[argument.name] = place
+            place += -(-argument.size * _DTYPES[argument.kind].itemsize // 8) * 2
+        self._empty = np.full((place + guard) // 2, _GUARD)
+        for argument in arguments:
+            self._empty.view(np.int32)[self._halves(argument)] = 0
+        self._memory = self._empty.copy()
+        self.addresses = {name: self._memory.ctypes.data + 4 * start for name, start in self._starts.items()}
+        is_free = np.zeros(2 * len(self._empty), dtype=np.bool_)
+        for argument in arguments:
+            is_free[self._halves(argument)] = not argument.is_input
+        self._fixed: IntArray = np.flatnonzero(~is_free)
+
+    def _halves(self, argument: Argument) -> slice:
+        """Return the halves of words that the values of an argument take."""
+        start = self._starts[argument.name]
+        return slice(start, start + argument.size * _DTYPES[argument.kind].itemsize // 4)
+
+    def rows(self, n_rows: int) -> SlotRows:
+        """Return the memory of so many calls, zero but for the guards."""
+        return SlotRows(self, np.tile(self._empty, (n_rows, 1)), self._arguments)
+
+    def sweep(self, rows: NDArray[np.uint64], function: Callable[..., Any], values: Sequence[Any]) -> list[Any]:
+        """Call the function once for each row, and return what it returned."""
+        memory, answers = self._memory, []
+        for row in rows:
+            memory[:] = row
+            answers.append(function(*values))
+            row[:] = memory
+        return answers
+
+    def broken(self, before: NDArray[np.uint64], after: NDArray[np.uint64]) -> tuple[int, str] | None:
+        """Return the first row with a guard or an input that changed, and what was written there; None if none has."""
+        halves = after.view(np.int32)
+        changed = halves[:, self._fixed] != before.view(np.int32)[:, self._fixed]
+        if not changed.any():
+            return None
+        row, column = np.argwhere(changed)[0]
+        return int(row), self._describe(int(self._fixed[column]))
+
+    def _describe(self, half: int) -> str:
+        """Return what lies at a half of a word: an input, or what is before or behind an array."""
+        names = sorted(self._starts, key=self._starts.__getitem__)
+        spans = {name: self._halves(self._arguments[name]) for name in names}
+        name = min(names, key=lambda name: max(spans[name].start - half, half - spans[name].stop + 1, 0))
+        argument, span = self._arguments[name], spans[name]
+        number = (half - span.start) * 4 // _DTYPES[argument.kind].itemsize + 1
+        if span.start <= half < span.stop:
+            return f"the input {name}{f', number {number} of {argument.size}' if argument.shape else ''}"
+        if half < span.start:
+            return f"the place before {name}"
+        size = f", {' × '.join(map(str, argument.shape))}" if len(argument.shape) > 1 else ""
+        return f"number {number} of {name}, which has {argument.size}{size}"
+
+
+class SlotRows:
+    """The memory of a sweep: for each element a row, of which the arguments are views."""
+
+    def __init__(self, slot: GuardedSlot, memory: NDArray[np.uint64], arguments: dict[str, Argument]) -> None:
+        self._slot, self._memory, self._arguments = slot, memory, arguments
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the values (n_rows, size) of an argument, which may be written."""
+        argument = self._arguments[name]
+        view: Array = self._memory.view(np.int32)[:, self._slot._halves(argument)]
+        return view if argument.kind == "integer" else view.view(np.float64)
+
+    def fill(self, values: dict[str, Any]) -> None:
+        """Write the values of arguments: scalars, arrays (size,) for all rows, or arrays (n_rows, size)."""
+        for name, value in values.items():
+            self[name][...] = value
+
+    def call(
+        self, function: Callable[..., Any], values: Sequence[Any], describe_row: Callable[[int], str]
+    ) -> list[Any]:
+        """Call the function once for each row, and return what it returned.
+
+        Raises
+        ------
+        ContractError
+            If a guard or an input changed; it begins with `describe_row` of the row.
+        """
+        before = self._memory.copy()
+        answers = self._slot.sweep(self._memory, function, values)
+        broken = self._slot.broken(before, self._memory)
+        if broken is not None:
+            row, place = broken
+            raise ContractError(f"{describe_row(row)}: wrote to {place}; needed no write there")
+        return answers

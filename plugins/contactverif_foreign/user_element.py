@@ -1,0 +1,132 @@
+"""A user element of a solver as a formulation: the harness pairs, calls the element for each pair, and assembles.
+
+A user element decides by itself whether it is in contact (`IF (G.GE.0) RETURN`). So what the harness pairs is only half
+of the decisions, and it travels in a `Handle`: the harness pairs anew at each state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import check_count, check_penalty, check_tau
+from contactverif.contract.pairing import Handle, Pairing
+from contactverif.contract.traits import Traits
+from contactverif_foreign.element_pairs import RULES, Elements
+from contactverif_foreign.guarded_slot import Argument, GuardedSlot, SlotRows
+
+Fill = Callable[["Elements", FloatArray, FloatArray, Sequence[float]], dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Convention:
+    """The arguments of the user elements of a solver.
+
+    `fill` gets elements, reference positions and displacements (n, n_nodes, 2), and the option `props`; it returns the
+    values of arguments by name.
+    """
+
+    name: str
+    arguments: Callable[[int, int, int], list[Argument]]  # For a number of nodes, of properties and of state variables.
+    order: tuple[str, ...]  # The names of the arguments in the order of the call.
+    fill: Fill
+    forces: str  # The argument with minus the residual.
+    matrix: str  # The argument with its derivative, column by column.
+    flaw: Callable[[SlotRows], tuple[int, str] | None]  # An element that gave up, and its words.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Routine:
+    """A loaded user element with its memory; it does not depend on the penalty."""
+
+    convention: Convention
+    function: Any
+    state_variables: int
+    slots: dict[tuple[int, int], tuple[GuardedSlot, list[Any]]] = field(default_factory=dict)
+
+    def slot(self, n_nodes: int, n_properties: int) -> tuple[GuardedSlot, list[Any]]:
+        """Return the memory of a call for elements of so many nodes, and the arguments of the call."""
+        import ctypes
+
+        key = n_nodes, n_properties
+        if key not in self.slots:
+            slot = GuardedSlot(self.convention.arguments(n_nodes, n_properties, self.state_variables), 2 * n_nodes)
+            values = [ctypes.c_void_p(slot.addresses[name]) for name in self.convention.order]
+            self.slots[key] = slot, values
+        return self.slots[key]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UserElement:
+    """A formulation whose forces and tangents come from a user element."""
+
+    traits: Traits
+    penalty: float
+    routine: Routine
+    nodes: int | str  # 3, 4 or "n", as in `RULES`.
+    properties: tuple[float, ...]
+    tau: float
+
+    def pair(self, interface: Interface, z: FloatArray, /) -> dict[str, Handle]:
+        """Choose the nodes of each element, and keep them in a handle."""
+        return {"elements": Handle(RULES[self.nodes](interface, z.reshape(-1, 2), self.tau))}
+
+    def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
+        """Compute the nodal forces (n_unknowns,), minus those of the element."""
+        forces, _ = self.residual_and_tangent(interface, pairing, z)
+        return forces
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
+        """Return the derivative of the residual as the element computes it, sparse."""
+        return self.residual_and_tangent(interface, pairing, z)[1]
+
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
+        """Return the residual and its derivative from one call of each element."""
+        forces, rows, columns, entries = np.zeros(z.size), [], [], []
+        displacements = z.reshape(-1, 2) - interface.nodes
+        for elements in pairing.handle:
+            if not len(elements.nodes):
+                continue
+            vectors, matrices = self._sweep(elements, interface.nodes, displacements)
+            unknowns = (2 * elements.nodes[..., None] + [0, 1]).reshape(len(elements.nodes), -1)
+            np.add.at(forces, unknowns, -vectors)
+            rows.append(np.broadcast_to(unknowns[:, None, :], matrices.shape).ravel())  # Columns come first.
+            columns.append(np.broadcast_to(unknowns[:, :, None], matrices.shape).ravel())
+            entries.append(matrices.ravel())
+        if not entries:
+            return forces, sparse.csr_array((z.size, z.size))
+        places = np.concatenate(rows), np.concatenate(columns)
+        return forces, sparse.coo_array((np.concatenate(entries), places), shape=(z.size, z.size)).tocsr()
+
+    def _sweep(self, elements: Elements, reference: FloatArray, displacements: FloatArray) -> tuple[Array, Array]:
+        """Call the element for each pair; return copies of its vectors (n, size) and matrices (n, size, size)."""
+        convention, size = self.routine.convention, 2 * elements.nodes.shape[1]
+        properties = np.empty((len(elements.nodes), 2 + len(self.properties)))
+        properties[:, 0], properties[:, 1], properties[:, 2:] = self.penalty, elements.lengths, self.properties
+        slot, values = self.routine.slot(elements.nodes.shape[1], properties.shape[1])
+        rows = slot.rows(len(elements.nodes))
+        rows.fill(convention.fill(elements, reference[elements.nodes], displacements[elements.nodes], properties))
+
+        def describe_row(row: int) -> str:
+            return f"{convention.name}: element {row + 1} (nodes {', '.join(map(str, elements.nodes[row]))})"
+
+        rows.call(self.routine.function, values, describe_row)
+        if (flaw := convention.flaw(rows)) is not None:
+            raise ContractError(f"{describe_row(flaw[0])}: {flaw[1]}")
+        return rows[convention.forces][:, :size].copy(), rows[convention.matrix].reshape(-1, size, size).copy()
+
+
+def check_element_options(penalty: float, nodes: int | str, svars: int, tau: float) -> None:
+    """Refuse wrong values of the options that all user elements have."""
+    check_penalty(penalty)
+    check_tau(tau)
+    check_count(svars, "svars", 0)
+    if isinstance(nodes, bool) or nodes not in RULES:
+        raise MisuseError("option nodes", repr(nodes), f"one of {', '.join(map(str, RULES))}")
