@@ -13,8 +13,16 @@ import numpy as np
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
 from contactverif.geometry.compiled import compile_kernel
-from contactverif.geometry.projection import PointOnSegment, arm, dot, foot_on_surface, frame, nearest_segment, node
-from contactverif.geometry.projection import search_tree
+from contactverif.geometry.projection import (
+    PointOnSegment,
+    arm,
+    dot,
+    foot_on_surface,
+    frame,
+    nearest_segment,
+    node,
+    search_tree,
+)
 
 _LEAST_OVERLAP = 1e-12  # Part of a slave segment; a shorter overlap is roundoff of two segments that meet at a point.
 
@@ -32,13 +40,14 @@ class Elements:
 def pair_nodes(interface: Interface, x: FloatArray, tau: float) -> list[Elements]:
     """Return an element of three nodes for each slave node whose foot is on the master, at x (n_nodes, 2).
 
-    A slave node gets its nearest closed master segment. Its foot may lie past a free end by τ × the length of the segment.
+    A slave node gets its nearest closed master segment. Its foot may lie past a free end by τ × the segment's length.
     """
     master, n_slave = interface.master, interface.n_slave_nodes
     nearest, is_over = np.empty(n_slave, dtype=np.int64), np.empty(n_slave, dtype=np.bool_)
     _find_segments(nearest, is_over, x, master.segments, master.neighbours, *search_tree(master, x), tau)
     lengths = np.repeat(interface.slave.lengths(interface.nodes) / 2, 2)
-    areas = np.bincount(interface.slave.segments.ravel(), lengths, minlength=n_slave)
+    areas = np.zeros(n_slave)
+    np.add.at(areas, interface.slave.segments.ravel(), lengths)
     number = np.flatnonzero(is_over)
     nodes = np.column_stack([number, master.segments[nearest[number]]])
     return [Elements(number, nodes, areas[number], (1, 2, 0, 0))]
@@ -94,7 +103,8 @@ def _facing_segments(a: Array, b: Array, ends: Array) -> Array:
     share = (middle[:, None] - places[facing, 0]) / (places[facing, 1] - places[facing, 0])  # (middles, segments)
     covers = (share >= 0) & (share <= 1)
     height = np.abs((1 - share) * heights[facing, 0] + share * heights[facing, 1])
-    return facing[np.diagonal(height) <= np.where(covers, height, np.inf).min(axis=1, initial=np.inf)]
+    chosen: Array = facing[np.diagonal(height) <= np.where(covers, height, np.inf).min(axis=1, initial=np.inf)]
+    return chosen
 
 
 def pair_chains(interface: Interface, x: FloatArray, tau: float) -> list[Elements]:

@@ -1,7 +1,7 @@
 """The memory that a library gets for one call: all arguments at fixed addresses, with guard values around each array.
 
-A sweep over the elements keeps a row of memory for each. It copies the row to the slot, calls, and copies it back. After
-the sweep all guards and inputs of all rows are compared at once, so a wrong write has an argument and an element.
+A sweep over the elements keeps a row of memory for each. It copies the row to the slot, calls, and copies it back.
+After the sweep all guards and inputs of all rows are compared at once, so a wrong write has an argument and an element.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.arrays import Array, IntArray
+from contactverif.contract.arrays import Array
 from contactverif.contract.errors import ContractError
 
 _GUARD = np.uint64(0x7FF8C0DEC0DEC0DE)  # Not a number, so what reads it shows.
@@ -67,15 +67,22 @@ class GuardedSlot:
             self._empty.view(np.int32)[self._halves(argument)] = 0
         self._memory = self._empty.copy()
         self.addresses = {name: self._memory.ctypes.data + 4 * start for name, start in self._starts.items()}
-        is_free = np.zeros(2 * len(self._empty), dtype=np.bool_)
+        self._fixed = np.full_like(self._empty, ~np.uint64(0))  # The bits that a call must not change.
         for argument in arguments:
-            is_free[self._halves(argument)] = not argument.is_input
-        self._fixed: IntArray = np.flatnonzero(~is_free)
+            if not argument.is_input:
+                self._fixed.view(np.int32)[self._halves(argument)] = 0
 
     def _halves(self, argument: Argument) -> slice:
         """Return the halves of words that the values of an argument take."""
         start = self._starts[argument.name]
         return slice(start, start + argument.size * _DTYPES[argument.kind].itemsize // 4)
+
+    def preset(self, values: dict[str, Any]) -> None:
+        """Set arguments that are the same in all calls."""
+        for name, value in values.items():
+            argument = self._arguments[name]
+            view: Array = self._empty.view(np.int32)[self._halves(argument)]
+            (view if argument.kind == "integer" else view.view(np.float64))[...] = value
 
     def rows(self, n_rows: int) -> SlotRows:
         """Return the memory of so many calls, zero but for the guards."""
@@ -92,12 +99,12 @@ class GuardedSlot:
 
     def broken(self, before: NDArray[np.uint64], after: NDArray[np.uint64]) -> tuple[int, str] | None:
         """Return the first row with a guard or an input that changed, and what was written there; None if none has."""
-        halves = after.view(np.int32)
-        changed = halves[:, self._fixed] != before.view(np.int32)[:, self._fixed]
+        changed = before ^ after
+        changed &= self._fixed
         if not changed.any():
             return None
-        row, column = np.argwhere(changed)[0]
-        return int(row), self._describe(int(self._fixed[column]))
+        row, half = np.argwhere(changed.view(np.int32))[0]
+        return int(row), self._describe(int(half))
 
     def _describe(self, half: int) -> str:
         """Return what lies at a half of a word: an input, or what is before or behind an array."""

@@ -1,7 +1,7 @@
 """Traits in TOML: a file beside the library, a table of pyproject.toml, or the text that a library returns.
 
-All three have the same form and the same reader. The keys are the names of the traits. Tables such as `[promises]` group
-them as the class `Traits` does, but no two traits have the same name, so a flat list says the same.
+All three have the same form and the same reader. The keys are the names of the traits. Tables such as `[promises]`
+group them as the class `Traits` does, but no two traits have the same name, so a flat list says the same.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _PROJECT = "pyproject.toml"
 def traits_beside(library: Path, chosen: str = "") -> Traits:
     """Return the traits of a library: those of a chosen TOML file, else those beside it, else no promise.
 
-    Beside `LIBRARY.so` the file `LIBRARY.toml` counts. Without it the table `[tool.contactverif.traits.LIBRARY]` counts,
-    of the `pyproject.toml` in the library's folder or in the nearest one above it.
+    Beside `LIBRARY.so` the file `LIBRARY.toml` counts. Without it the table `[tool.contactverif.traits.LIBRARY]`
+    counts, of the `pyproject.toml` in the library's folder or in the nearest one above it.
     """
     if chosen:
         path = Path.cwd() / Path(chosen).expanduser()

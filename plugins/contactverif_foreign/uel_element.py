@@ -7,9 +7,6 @@ formulation has no history.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,19 +14,19 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif_foreign.element_pairs import Elements
 from contactverif_foreign.guarded_slot import Argument, SlotRows
-from contactverif_foreign.shared_library import find_file, find_function, fortran_names, load_library, parse_numbers
-from contactverif_foreign.traits_file import traits_beside
-from contactverif_foreign.user_element import Convention, Routine, UserElement, check_element_options
+from contactverif_foreign.shared_library import fortran_names
+from contactverif_foreign.user_element import Convention, UserElement, load_element
 
-_ORDER = tuple(
-    """RHS AMATRX SVARS ENERGY NDOFEL NRHS NSVARS PROPS NPROPS COORDS MCRD NNODE U DU V A JTYPE TIME DTIME KSTEP KINC
-    JELEM PARAMS NDLOAD JDLTYP ADLMAG PREDEF NPREDF LFLAGS MLVARX DDLMAG MDLOAD PNEWDT JPROPS NJPROP PERIOD""".split()
+_ORDER = (
+    *("RHS", "AMATRX", "SVARS", "ENERGY", "NDOFEL", "NRHS", "NSVARS", "PROPS", "NPROPS", "COORDS", "MCRD", "NNODE"),
+    *("U", "DU", "V", "A", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "JELEM", "PARAMS", "NDLOAD", "JDLTYP", "ADLMAG"),
+    *("PREDEF", "NPREDF", "LFLAGS", "MLVARX", "DDLMAG", "MDLOAD", "PNEWDT", "JPROPS", "NJPROP", "PERIOD"),
 )
 _INTEGERS = (
     *("NDOFEL", "NRHS", "NSVARS", "NPROPS", "MCRD", "NNODE", "JTYPE", "KSTEP", "KINC", "JELEM", "NDLOAD", "NPREDF"),
     *("MLVARX", "MDLOAD", "NJPROP"),
 )
-_SMALL = {"RHS", "AMATRX", "SVARS", "ENERGY", "PNEWDT"}  # What a UEL may write.
+_OUTPUTS = {"RHS", "AMATRX", "SVARS", "ENERGY", "PNEWDT"}
 # Static analysis, large displacements, forces and matrix, a general step.
 _FLAGS = (1, 1, 1, 0, 0)
 
@@ -44,7 +41,7 @@ def _arguments(n_nodes: int, n_properties: int, n_state: int) -> list[Argument]:
         "ENERGY": (8,),
         "PROPS": (n_properties,),
         "COORDS": (2, n_nodes),
-        **{name: (size,) for name in ("U", "V", "A")},
+        **dict.fromkeys(("U", "V", "A"), (size,)),
         "DU": (size, 1),
         "TIME": (2,),
         "PARAMS": (3,),
@@ -57,39 +54,29 @@ def _arguments(n_nodes: int, n_properties: int, n_state: int) -> list[Argument]:
     }
     integers = {*_INTEGERS, "JDLTYP", "LFLAGS", "JPROPS"}
     return [
-        Argument(name, shapes.get(name, ()), "integer" if name in integers else "real", name not in _SMALL)
+        Argument(name, shapes.get(name, ()), "integer" if name in integers else "real", name not in _OUTPUTS)
         for name in _ORDER
     ]
 
 
-def _fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: Any) -> dict[str, Any]:
-    """Return the values of the arguments, for elements at reference positions and displacements (n, n_nodes, 2)."""
-    n_elements, n_nodes = elements.nodes.shape
+def _constants(n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
+    """Return the arguments that are the same for all elements; what is not there is zero."""
+    sizes = {"NDOFEL": 2 * n_nodes, "NNODE": n_nodes, "MLVARX": 2 * n_nodes, "NPROPS": n_properties, "NSVARS": n_state}
+    ones = ("NRHS", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "NPREDF", "MDLOAD", "PNEWDT", "PERIOD")
+    return sizes | dict.fromkeys(ones, 1) | {"MCRD": 2, "LFLAGS": _FLAGS, "NJPROP": 4}
+
+
+def _fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
+    """Return the other arguments, for elements at reference positions and displacements (n, n_nodes, 2)."""
+    n_elements = len(elements.nodes)
     displacements = u.reshape(n_elements, -1)
     return {
-        "NDOFEL": 2 * n_nodes,
-        "NRHS": 1,
         "PROPS": properties,
-        "NPROPS": properties.shape[1],
         "COORDS": reference.reshape(n_elements, -1),
-        "MCRD": 2,
-        "NNODE": n_nodes,
         "U": displacements,
         "DU": displacements,
-        "JTYPE": 1,
-        "TIME": 1.0,
-        "DTIME": 1.0,
-        "KSTEP": 1,
-        "KINC": 1,
         "JELEM": np.arange(1, n_elements + 1)[:, None],
-        "NPREDF": 1,
-        "LFLAGS": _FLAGS,
-        "MLVARX": 2 * n_nodes,
-        "MDLOAD": 1,
-        "PNEWDT": 1.0,
         "JPROPS": elements.sides,
-        "NJPROP": len(elements.sides),
-        "PERIOD": 1.0,
     }
 
 
@@ -101,15 +88,7 @@ def _flaw(rows: SlotRows) -> tuple[int, str] | None:
     return int(smaller[0]), f"set PNEWDT to {rows['PNEWDT'][smaller[0], 0]:g}; needed 1, there are no increments"
 
 
-@lru_cache(maxsize=16)
-def _routine(path: Path, n_state: int) -> Routine:
-    def fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: Sequence[float]) -> dict[str, Any]:
-        return _fill(elements, reference, u, properties) | {"NSVARS": n_state}
-
-    convention = Convention("uel", _arguments, _ORDER, fill, "RHS", "AMATRX", _flaw)
-    function = find_function(load_library(path), path, *fortran_names("uel"))
-    function.restype = None
-    return Routine(convention, function, n_state)
+_UEL = Convention("uel", _arguments, _constants, _ORDER, _fill, "RHS", "AMATRX", _flaw)
 
 
 def uel(
@@ -143,10 +122,14 @@ def uel(
     tau : float
         The part of a master segment by which a foot may lie past its free end and still count.
     """
-    check_element_options(penalty, nodes, svars, tau)
-    path = find_file(file)
-    routine = _routine(path, svars)
-    return UserElement(_traits(path, traits), float(penalty), routine, nodes, parse_numbers("option props", props), tau)
-
-
-_traits = lru_cache(maxsize=16)(traits_beside)
+    return load_element(
+        _UEL,
+        fortran_names("uel"),
+        penalty=penalty,
+        file=file,
+        nodes=nodes,
+        svars=svars,
+        props=props,
+        traits=traits,
+        tau=tau,
+    )

@@ -6,8 +6,11 @@ of the decisions, and it travels in a `Handle`: the harness pairs anew at each s
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,25 +24,27 @@ from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Traits
 from contactverif_foreign.element_pairs import RULES, Elements
 from contactverif_foreign.guarded_slot import Argument, GuardedSlot, SlotRows
-
-Fill = Callable[["Elements", FloatArray, FloatArray, Sequence[float]], dict[str, Any]]
+from contactverif_foreign.shared_library import find_file, find_function, load_library, parse_numbers
+from contactverif_foreign.traits_file import traits_beside
 
 
 @dataclass(frozen=True, slots=True)
 class Convention:
     """The arguments of the user elements of a solver.
 
-    `fill` gets elements, reference positions and displacements (n, n_nodes, 2), and the option `props`; it returns the
-    values of arguments by name.
+    `arguments` and `constants` get the numbers of nodes, properties and state variables. `fill` gets elements,
+    reference positions and displacements (n, n_nodes, 2), and properties (n, n_properties). `constants` and `fill`
+    return the values of arguments by name.
     """
 
     name: str
-    arguments: Callable[[int, int, int], list[Argument]]  # For a number of nodes, of properties and of state variables.
+    arguments: Callable[[int, int, int], list[Argument]]
+    constants: Callable[[int, int, int], dict[str, Any]]
     order: tuple[str, ...]  # The names of the arguments in the order of the call.
-    fill: Fill
+    fill: Callable[[Elements, FloatArray, FloatArray, FloatArray], dict[str, Any]]
     forces: str  # The argument with minus the residual.
     matrix: str  # The argument with its derivative, column by column.
-    flaw: Callable[[SlotRows], tuple[int, str] | None]  # An element that gave up, and its words.
+    flaw: Callable[[SlotRows], tuple[int, str] | None] = lambda rows: None  # An element that gave up, and its words.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,11 +58,11 @@ class Routine:
 
     def slot(self, n_nodes: int, n_properties: int) -> tuple[GuardedSlot, list[Any]]:
         """Return the memory of a call for elements of so many nodes, and the arguments of the call."""
-        import ctypes
-
         key = n_nodes, n_properties
         if key not in self.slots:
-            slot = GuardedSlot(self.convention.arguments(n_nodes, n_properties, self.state_variables), 2 * n_nodes)
+            numbers = n_nodes, n_properties, self.state_variables
+            slot = GuardedSlot(self.convention.arguments(*numbers), 2 * n_nodes)
+            slot.preset(self.convention.constants(*numbers))
             values = [ctypes.c_void_p(slot.addresses[name]) for name in self.convention.order]
             self.slots[key] = slot, values
         return self.slots[key]
@@ -123,10 +128,37 @@ class UserElement:
         return rows[convention.forces][:, :size].copy(), rows[convention.matrix].reshape(-1, size, size).copy()
 
 
-def check_element_options(penalty: float, nodes: int | str, svars: int, tau: float) -> None:
-    """Refuse wrong values of the options that all user elements have."""
+def load_element(
+    convention: Convention,
+    names: Sequence[str],
+    *,
+    penalty: float,
+    file: str,
+    nodes: int | str,
+    svars: int,
+    props: float | str,
+    traits: str,
+    tau: float,
+) -> UserElement:
+    """Return the formulation of a user element that a library has under one of these names, its options checked."""
     check_penalty(penalty)
     check_tau(tau)
     check_count(svars, "svars", 0)
     if isinstance(nodes, bool) or nodes not in RULES:
         raise MisuseError("option nodes", repr(nodes), f"one of {', '.join(map(str, RULES))}")
+    path = find_file(file)
+    routine = _load_routine(convention, path, tuple(names), svars)
+    properties = parse_numbers("option props", props)
+    return UserElement(_read_traits(path, traits), float(penalty), routine, nodes, properties, tau)
+
+
+# A formulation is made anew for the penalty of each case.
+_read_traits = lru_cache(maxsize=16)(traits_beside)
+
+
+@lru_cache(maxsize=16)
+def _load_routine(convention: Convention, path: Path, names: tuple[str, ...], state_variables: int) -> Routine:
+    """Return the subroutine of a library, with its memory."""
+    function = find_function(load_library(path), path, *names)
+    function.restype = None
+    return Routine(convention, function, state_variables)
