@@ -1,0 +1,122 @@
+"""Libraries in C: right ones are what our formulation is, with decisions in integers or in a handle."""
+
+import numpy as np
+import pytest
+
+from contactverif import MisuseError, Pairing, load_formulation, named_case
+from contactverif.contract.errors import ContractError
+from foreign.comparison import CASES, Build, agree, compare, ring_case, subject_of
+
+REFERENCE = "nts-ar:area=reference"
+
+
+@pytest.mark.parametrize("flags", [(), ("-DDECIDES_ITSELF",)])
+@pytest.mark.parametrize("elements", ["segment", "interface"])
+@pytest.mark.parametrize("name", CASES)
+def test_springs_in_c_are_those_of_ours(name: str, elements: str, flags: tuple[str, ...], build: Build) -> None:
+    library = build("springs.c", *flags)
+    compare(f"c:file={library},elements={elements}", REFERENCE, named_case(name))
+
+
+def test_a_closed_master_has_no_free_end_in_c(build: Build) -> None:
+    compare(f"c:file={build('springs.c')}", REFERENCE, ring_case())
+
+
+def test_decisions_are_a_pairing_of_integers(build: Build) -> None:
+    case = named_case("offset-c")
+    pairing = subject_of(f"c:file={build('springs.c')}").for_case(case).pair(case.interface, case.z)
+    assert isinstance(pairing, Pairing)
+    assert len(pairing["decision"]) == 2 * len(case.interface.slave)
+    itself = subject_of(f"c:file={build('springs.c', '-DDECIDES_ITSELF')}").for_case(case)
+    assert itself.pair(case.interface, case.z) is None
+
+
+def test_the_residual_is_smooth_on_frozen_decisions(build: Build) -> None:
+    """The tangent on a pairing is the derivative of the residual on it, also where a node leaves the master."""
+    case = named_case("offset-c")
+    checked = subject_of(f"c:file={build('springs.c')}").for_case(case)
+    pairing = checked.pair(case.interface, case.z)
+    direction = np.random.default_rng(1).normal(size=case.z.size)
+    step = np.finfo(float).eps ** (1 / 3) * np.abs(case.z).max()
+    ends = [checked.residual(case.interface, pairing, case.z + sign * step * direction) for sign in (1, -1)]
+    slope = (ends[0] - ends[1]) / (2 * step)
+    exact = checked.tangent(case.interface, pairing, case.z) @ direction
+    assert np.abs(slope - exact).max() <= np.finfo(float).eps ** 0.5 * np.abs(exact).max()
+
+
+def test_the_order_of_the_tangent_is_that_of_the_option(build: Build) -> None:
+    case, library = named_case("offset-c"), build("springs.c", "-DLEAVES_OUT_A_TERM")
+    by_row, by_column = (
+        subject_of(f"c:file={library},order={order}").for_case(case).tangent(case.interface, None, case.z).toarray()
+        for order in ("row", "column")
+    )
+    assert (by_row == by_column.T).all()
+    assert np.abs(by_row - by_column).max() > 0
+
+
+def test_a_library_without_a_tangent_gets_none(build: Build) -> None:
+    case = named_case("offset-c")
+    subject = subject_of(f"c:file={build('springs.c')},tangent=false")
+    assert "tangent" not in subject.provides
+    forces = [each.for_case(case).residual(case.interface, None, case.z) for each in (subject, subject_of(REFERENCE))]
+    agree(*forces)
+
+
+def test_many_decisions_get_room(build: Build) -> None:
+    """One element with all segments has more decisions than the first call has room for."""
+    from contactverif import Case, Interface
+
+    x = np.arange(21.0)
+    interface = Interface.from_chains(np.column_stack([x, 0 * x - 0.1]), np.column_stack([x[::-1], 0 * x]))
+    case = Case(interface=interface, z=interface.nodes.ravel(), penalty=2.0)
+    text = f"c:file={build('springs.c')},elements=interface"
+    pairing = subject_of(text).for_case(case).pair(interface, case.z)
+    assert pairing is not None
+    assert len(pairing["decision"]) == 40
+    compare(text, REFERENCE, case)
+
+
+def test_what_a_library_says_of_itself_is_read(build: Build) -> None:
+    traits = subject_of(f"c:file={build('springs.c')}").traits
+    assert traits.promises.patch.flat is False
+    assert traits.rules.area == "reference"
+    assert traits.witness("patch.flat.solve") == "b"
+
+
+@pytest.mark.parametrize(
+    ("flag", "message"),
+    [
+        ("-DWRITES_A_FORCE_MORE", "cv_element: slave segment 0: wrote to number 13 of residual, which has 12"),
+        ("-DWRITES_A_DECISION_MORE", "cv_pair: slave segment 0: wrote to number 17 of decisions, which has 16"),
+        ("-DGIVES_UP", "cv_element: slave segment 0: returned 7; needed 0"),
+        ("-DREFUSES_TO_PAIR", "cv_pair: slave segment 0: returned -1; needed ≥ 0"),
+    ],
+)
+def test_what_a_library_does_wrong_is_named(flag: str, message: str, build: Build) -> None:
+    case = named_case("offset-c")
+    checked = subject_of(f"c:file={build('springs.c', flag)}").for_case(case)
+    with pytest.raises(ContractError) as error:
+        checked.residual(case.interface, None, case.z)
+    assert message in str(error.value)
+
+
+def test_a_library_of_another_version_is_refused(build: Build) -> None:
+    with pytest.raises(MisuseError, match=r"of version 9; needed 1, that of contactverif\.h"):
+        load_formulation(f"c:file={build('springs.c', '-DVERSION=9')}")
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        ("elements=node", ["option elements", "'node'", "one of segment, interface"]),
+        ("order=fortran", ["option order", "one of row, column"]),
+        ("tangent=no", ["option tangent", "true or false"]),
+    ],
+)
+def test_a_wrong_option_of_c_is_one_line(options: str, parts: list[str], build: Build) -> None:
+    with pytest.raises(MisuseError) as error:
+        load_formulation(f"c:file={build('springs.c')},{options}")
+    for part in parts:
+        assert part in str(error.value)
+    with pytest.raises(MisuseError, match="without the function cv_version"):
+        load_formulation(f"c:file={build('nts_uel.f90')}")
