@@ -22,12 +22,12 @@ from contactverif.contract.engine_subject import ENGINE
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name
 from contactverif.plugins.engines import ENGINES
-from contactverif.plugins.registry import ENGINE_PROPERTIES, FORMULATIONS, PROPERTIES
+from contactverif.plugins.registry import ENGINE_PROPERTIES, FORMULATIONS, PROPERTIES, files_within, names_within
 
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
 _DIGITS = 16
-CODE = "code of "  # The name of a digest is this and the name of a package.
+CODE = "code of "  # The name of a digest is this and the name of a package or a file.
 
 
 def collect_provenance(*, profile: str, examples: int, seed: int) -> dict[str, str]:
@@ -103,12 +103,12 @@ def _commit() -> str:
 
 
 def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict[str, str]:
-    """Return {package: digest of its code} of the harness and of all plugins that the names refer to.
+    """Return {package or file: digest of its code} of the harness and of all that the names refer to.
 
     A version says too little while an author works on a plugin: a run goes on only with the same code.
     """
     named = {
-        FORMULATIONS: {_plugin_name(part) for text in formulations for part in text.split("/")},
+        FORMULATIONS: {name for text in formulations for name in names_within(text)},
         ENGINES: {_plugin_name(text.removeprefix(ENGINE)) for text in formulations},
         PROPERTIES: set(properties),
         ENGINE_PROPERTIES: set(properties),
@@ -117,7 +117,9 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     for group, names in named.items():
         modules |= {entry.module for entry in metadata.entry_points(group=group) if entry.name in names}
     packages = sorted({module.partition(".")[0] for module in modules})
-    return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}
+    files = sorted({path for text in formulations for path in files_within(text)})
+    libraries = {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
+    return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages} | libraries
 
 
 def _plugin_name(text: str) -> str:

@@ -21,7 +21,7 @@ from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.foreign_text import LONGEST_NAME, describe_error, name_line
@@ -107,10 +107,21 @@ def _with_kernels(limits: Limits, text: str) -> Limits:
     """Return the limits with a box that keeps compiled kernels, those of all formulations of the same modules."""
     if limits.box is None:
         return limits
-    names = {part.partition(":")[0] for part in text.split("/")}
+    names = names_within(text)
     modules = {entry.module for entry in entry_points(group=FORMULATIONS) if entry.name in names}
     store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share the name of a package.
     return replace(limits, box=replace(limits.box, store=store))
+
+
+def names_within(text: str) -> set[str]:
+    """Return the names of formulations and wrappers in a text, and perhaps parts of a path that are no names."""
+    return {part.partition(":")[0] for part in text.split("/")}
+
+
+def files_within(text: str) -> list[Path]:
+    """Return the files that a text names by an option `file`, as far as they exist."""
+    paths = [Path(file).expanduser() for file in re.findall(rf"[:,]{_FILE}=([^,]+)", text)]
+    return [path.resolve() for path in paths if path.is_file()]
 
 
 def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
@@ -281,39 +292,50 @@ def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
 def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     """Return `make(*, penalty)` for the text behind `depth` wrappers, with options and inner formulation filled in."""
     _check_name(text)
-    make = _find_entry(text)
-    parameters = parameters_of(make) if callable(make) else {}
-    wraps = _wraps(parameters)
-    outer, slash, inner_text = text.partition("/")
-    if slash and ":" in outer and not wraps:  # The "/" belongs to the value of an option.
-        outer, slash = text, ""
+    make = _find_factory(text)
+    parameters = {} if isinstance(make, NotLoaded) else parameters_of(make)
+    outer, inner_text = _divide(text, _wraps(parameters))
     name, options = parse_name("formulation", outer, _FORM)
     if isinstance(make, NotLoaded):
-        return NotLoaded(text, make.reason)
-    if not callable(make):
-        return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(*, penalty, …)")
+        return make
     check_options(text, make, parameters, options)
-    if wraps and not slash:
-        raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
-    if slash and not wraps:
-        raise MisuseError("formulation", repr(text), f"a wrapper before the '/'; {name} wraps nothing")
-    if not wraps:
+    if inner_text is None:
+        if _wraps(parameters):
+            raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
         return partial(make, **options)
+    if not _wraps(parameters):
+        raise MisuseError("formulation", repr(text), f"a wrapper before the '/'; {name} wraps nothing")
     inner = _load_inner(inner_text, depth + 1)
     if isinstance(inner, NotLoaded):
         return NotLoaded(text, f"{inner_text}: {inner.reason}")
     return partial(make, **options, inner=inner)
 
 
-def _find_entry(text: str) -> Any:
-    """Return what the first name of a text refers to, or a NotLoaded."""
+def _find_factory(text: str) -> Callable[..., Any] | NotLoaded:
+    """Return the factory to which the first name of a text refers."""
     name = re.split(f"[{_MARKS}]", text, maxsplit=1)[0]
     installed = entries_by_name(FORMULATIONS)
     if not name:
         raise MisuseError("formulation", repr(text), _FORM)
     if name not in installed:
         raise unknown_name_error("formulation", name, installed)
-    return load_entry(name, installed[name])
+    make = load_entry(name, installed[name])
+    if isinstance(make, NotLoaded):
+        return NotLoaded(text, make.reason)
+    if not callable(make):
+        return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(*, penalty, …)")
+    return cast(Callable[..., Any], make)
+
+
+def _divide(text: str, wraps: bool) -> tuple[str, str | None]:
+    """Divide a text into a name with options, and the text of the formulation that is wrapped; None if there is none.
+
+    A "/" behind the options of a name that wraps nothing belongs to a value.
+    """
+    outer, slash, inner = text.partition("/")
+    if not slash or (":" in outer and not wraps):
+        return text, None
+    return outer, inner
 
 
 def _check_name(text: str) -> None:

@@ -110,8 +110,8 @@ class LibraryForces:
         """Return the memory of a sweep over elements, with all that they are shown."""
         n_elements = len(views.nodes)
         rows = slot.rows(n_elements)
-        shown = {"reference": interface.nodes[views.nodes], "x": x[views.nodes], **views.arrays}
-        for name, array in shown.items():
+        content = {"reference": interface.nodes[views.nodes], "x": x[views.nodes], **views.arrays}
+        for name, array in content.items():
             rows[name][...] = array.reshape(1 if array.ndim == 2 else n_elements, -1)
         rows.fill({"props": self.props})
         view_numbers(rows["view"], views.labels, self.penalty)
@@ -244,11 +244,11 @@ def _load_functions(path: Path) -> _Functions:
 
 
 @lru_cache(maxsize=16)
-def _read_traits(path: Path, chosen: str) -> Traits:
-    """Return the traits of a library: a chosen file, what it says itself, or a file beside it."""
+def _read_traits(path: Path, file: str) -> Traits:
+    """Return the traits of a library: those of a file that the user names, what it says itself, or a file beside it."""
     library = load_library(path)
-    if chosen or not hasattr(library, "cv_traits"):
-        return traits_beside(path, chosen)
+    if file or not hasattr(library, "cv_traits"):
+        return traits_beside(path, file)
     function = find_function(library, path, "cv_traits")
     function.restype = ctypes.c_char_p
     text = function()

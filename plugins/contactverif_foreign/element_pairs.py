@@ -103,8 +103,8 @@ def _facing_segments(a: Array, b: Array, ends: Array) -> Array:
     share = (middle[:, None] - places[facing, 0]) / (places[facing, 1] - places[facing, 0])  # (middles, segments)
     covers = (share >= 0) & (share <= 1)
     height = np.abs((1 - share) * heights[facing, 0] + share * heights[facing, 1])
-    chosen: Array = facing[np.diagonal(height) <= np.where(covers, height, np.inf).min(axis=1, initial=np.inf)]
-    return chosen
+    visible: Array = facing[np.diagonal(height) <= np.where(covers, height, np.inf).min(axis=1, initial=np.inf)]
+    return visible
 
 
 def pair_chains(interface: Interface, x: FloatArray, tau: float) -> list[Elements]:
@@ -139,4 +139,4 @@ def walk_chains(surface: Surface) -> list[tuple[IntArray, IntArray, bool]]:
     return chains
 
 
-RULES = {3: pair_nodes, 4: pair_segments, "n": pair_chains}  # By the option `nodes`.
+RULES = {3: pair_nodes, 4: pair_segments, "n": pair_chains}  # The keys are the values of the option `nodes`.

@@ -97,7 +97,7 @@ class GuardedSlot:
             row[:] = memory
         return answers
 
-    def broken(self, before: NDArray[np.uint64], after: NDArray[np.uint64]) -> tuple[int, str] | None:
+    def find_write(self, before: NDArray[np.uint64], after: NDArray[np.uint64]) -> tuple[int, str] | None:
         """Return the first row with a guard or an input that changed, and what was written there; None if none has."""
         changed = before ^ after
         changed &= self._fixed
@@ -150,8 +150,7 @@ class SlotRows:
         """
         before = self._memory.copy()
         answers = self._slot.sweep(self._memory, function, values)
-        broken = self._slot.broken(before, self._memory)
-        if broken is not None:
-            row, place = broken
+        if (write := self._slot.find_write(before, self._memory)) is not None:
+            row, place = write
             raise ContractError(f"{describe_row(row)}: wrote to {place}; needed no write there")
         return answers

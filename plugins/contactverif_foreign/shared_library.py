@@ -17,8 +17,8 @@ def find_file(file: str, needed: str = "a shared library, such as gcc -shared or
     if not path.is_absolute():
         path = Path.cwd() / path
     if not path.is_file():
-        found = "a folder" if path.is_dir() else "no such file"
-        raise MisuseError("option file", f"{found}: {path}", needed)
+        kind = "a folder" if path.is_dir() else "no such file"
+        raise MisuseError("option file", f"{kind}: {path}", needed)
     return path
 
 

@@ -20,14 +20,14 @@ _FORBIDDEN = ("batched", "takes_complex", "takes_longdouble")  # A library takes
 _PROJECT = "pyproject.toml"
 
 
-def traits_beside(library: Path, chosen: str = "") -> Traits:
+def traits_beside(library: Path, file: str = "") -> Traits:
     """Return the traits of a library: those of a chosen TOML file, else those beside it, else no promise.
 
     Beside `LIBRARY.so` the file `LIBRARY.toml` counts. Without it the table `[tool.contactverif.traits.LIBRARY]`
     counts, of the `pyproject.toml` in the library's folder or in the nearest one above it.
     """
-    if chosen:
-        path = Path.cwd() / Path(chosen).expanduser()
+    if file:
+        path = Path.cwd() / Path(file).expanduser()
         return parse_traits(_read(path), str(path))
     beside = library.with_suffix(".toml")
     if beside.is_file():

@@ -60,9 +60,9 @@ def test_a_c_library_is_shown_what_is_near_and_one_segment_more() -> None:
     windows = find_windows(interface, interface.nodes)
     starts = windows["master_start"]
     assert windows["slave_segment"].tolist() == [0, 1, 2, 3]
-    shown = [windows["master_segment"][a:b].tolist() for a, b in pairwise(starts)]
-    assert all(set(part) >= {6 - 2 * number, 7 - 2 * number} for number, part in enumerate(shown))
-    assert all(part == list(range(part[0], part[-1] + 1)) for part in shown)
+    parts = [windows["master_segment"][a:b].tolist() for a, b in pairwise(starts)]
+    assert all(set(part) >= {6 - 2 * number, 7 - 2 * number} for number, part in enumerate(parts))
+    assert all(part == list(range(part[0], part[-1] + 1)) for part in parts)
     for views in segment_views(interface, windows):
         ends = views.nodes[:, views.arrays["master"]]  # (n, width, 2), numbers of the interface
         assert (ends[:, 1:, 0] == ends[:, :-1, 1]).all()

@@ -25,10 +25,10 @@ def test_a_chosen_file_comes_before_one_beside_the_library_and_that_before_the_p
     assert traits_beside(library).rules.area == "current"
     library.with_suffix(".toml").write_text("area = 'reference'\n")
     assert traits_beside(library).rules.area == "reference"
-    chosen = tmp_path / "chosen.toml"
-    chosen.write_text("penalty = 'nodal'\n")
-    assert traits_beside(library, str(chosen)).rules.penalty == "nodal"
-    assert traits_beside(library, str(chosen)).rules.area is None
+    explicit = tmp_path / "chosen.toml"
+    explicit.write_text("penalty = 'nodal'\n")
+    assert traits_beside(library, str(explicit)).rules.penalty == "nodal"
+    assert traits_beside(library, str(explicit)).rules.area is None
 
 
 def test_a_project_without_such_a_table_promises_nothing(tmp_path: Path) -> None:

@@ -30,3 +30,14 @@ def test_the_commit_is_that_of_the_working_copy_of_the_code(
     monkeypatch.setattr(metadata, "distribution", fail)
     commit = provenance.collect_provenance(profile="dev", examples=1, seed=1)["commit"]
     assert commit == (git("rev-parse", "HEAD") if is_working_copy else "unknown")
+
+
+def test_a_run_knows_the_library_that_a_name_loads(tmp_path: Path) -> None:
+    library = tmp_path / "mine.so"
+    library.write_bytes(b"one")
+    name = f"uel:file={library},nodes=3"
+    first = provenance.code_digests([name], [])
+    assert {f"{provenance.CODE}mine.so", f"{provenance.CODE}contactverif_foreign"} <= first.keys()
+    library.write_bytes(b"two")
+    changed = {key for key, digest in provenance.code_digests([name], []).items() if digest != first[key]}
+    assert changed == {f"{provenance.CODE}mine.so"}
