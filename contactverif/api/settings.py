@@ -19,6 +19,7 @@ _NEEDED = {
     "jobs": "a whole number",
     "open": "a list of paths",
     "memory": "true or false",
+    "traits": "a table of libraries and their traits",
 }
 
 
@@ -33,6 +34,8 @@ class Settings:
     jobs: int | None = None
     open: tuple[str, ...] = ()  # What a plugin in a box may use and write.
     memory: bool = True  # Failures are kept for the next run.
+    # {name of a library: its traits}, which the loaders of libraries read and check.
+    traits: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 def read_settings() -> Settings:

@@ -12,6 +12,7 @@ import os
 import re
 import tempfile
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from importlib.resources import files
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -31,14 +32,34 @@ _TEMPLATES = {
     ".gitignore": "gitignore",
     ".github/workflows/tests.yml": "workflow.yml",
 }
+# The files of a project of C ("c") or Fortran ("f90"), which is built by make and needs no package of its own.
+_LIBRARY_TEMPLATES = {
+    "pyproject.toml": "library_pyproject.toml",
+    "{module}.{language}": "formulation.{language}",
+    "{module}.toml": "{language}_traits.toml",
+    "test_{module}.py": "library_test_formulation.py",
+    "README.md": "library_README.md",
+    "Makefile": "Makefile",
+    ".gitignore": "gitignore",
+}
+_HEADER = "contactverif.h"
+_LOADERS = {"c": "c", "f90": "uel"}  # The formulations that load a library, by its language.
 
 
-def make_project(name: str, *, jax: bool) -> list[str]:
-    """Write a project into a new folder of that name; return the names of its files."""
+def library_subject(name: str, language: str) -> str:
+    """Return the name of the formulation in a project of C or Fortran, as it is verified in the project's folder."""
+    return f"{_LOADERS[language]}:file={_module_of(name)}.so"
+
+
+def make_project(name: str, *, jax: bool, language: str = "") -> list[str]:
+    """Write a project into a new folder of that name; return the names of its files.
+
+    The language is "c" or "f90"; none is Python.
+    """
     module = _module_of(name)
     names = [name, f"{name}-energy"] if jax else [name]
     _check_is_free(name, names, module)
-    texts = _render(name, names, module, jax=jax)
+    texts = _render_library(name, module, language) if language else _render(name, names, module, jax=jax)
     with tempfile.TemporaryDirectory(prefix=".contactverif-new-", dir=".") as folder:
         project = Path(folder, name)
         for file, text in texts.items():
@@ -80,22 +101,38 @@ def _distribution(name: str) -> Distribution | None:
 
 def _render(name: str, names: list[str], module: str, *, jax: bool) -> dict[str, str]:
     """Return {file: text} of a project."""
-    templates = Environment(
+    requirement, shared_requirement = _requirements()
+    words = {"name": name, "names": " ".join(names), "module": module, "jax": jax, "language": ""}
+    words |= {"requirement": requirement, "shared_requirement": shared_requirement}
+    texts = {}
+    for file, template in _TEMPLATES.items():
+        source = f"jax_{template}" if jax and template == "formulation.py" else template
+        texts[file.format(module=module)] = _environment().get_template(f"{source}.jinja").render(words)
+    return texts
+
+
+def _render_library(name: str, module: str, language: str) -> dict[str, str]:
+    """Return {file: text} of a project of C or Fortran."""
+    words = {"name": name, "module": module, "language": language, "subject": library_subject(name, language)}
+    texts = {}
+    for file, template in _LIBRARY_TEMPLATES.items():
+        source = f"{template.format(language=language)}.jinja"
+        texts[file.format(module=module, language=language)] = _environment().get_template(source).render(words)
+    if language == "c":
+        texts[_HEADER] = files("contactverif_foreign").joinpath(_HEADER).read_text(encoding="utf-8")
+    return texts
+
+
+def _environment() -> Environment:
+    """Return the templates, which make no pages of HTML."""
+    return Environment(
         loader=PackageLoader("contactverif.cli", "templates"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # The files are no pages of HTML.
+        autoescape=False,
     )
-    requirement, shared_requirement = _requirements()
-    words = {"name": name, "names": " ".join(names), "module": module, "jax": jax}
-    words |= {"requirement": requirement, "shared_requirement": shared_requirement}
-    texts = {}
-    for file, template in _TEMPLATES.items():
-        source = f"jax_{template}" if jax and template == "formulation.py" else template
-        texts[file.format(module=module)] = templates.get_template(f"{source}.jinja").render(words)
-    return texts
 
 
 def _requirements() -> tuple[str, str]:

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+import contactverif.cli
 from contactverif import Interface, Subject, Surface, load_formulation
 from contactverif.contract.case import Case
 from contactverif.isolation.limits import Limits
 
 Build = Callable[..., Path]
+TEMPLATES = Path(contactverif.cli.__file__).parent / "templates"
 CASES = ("a1", "b", "c-prime", "offset-c", "tilted", "sliding", "moved")
 
 

@@ -3,18 +3,35 @@
 import numpy as np
 import pytest
 
-from contactverif import MisuseError, Pairing, load_formulation, named_case
+from contactverif import Case, Interface, MisuseError, Pairing, load_formulation, named_case
 from contactverif.contract.errors import ContractError
 from foreign.comparison import CASES, Build, agree, compare, ring_case, subject_of
 
+Exchanges = tuple[tuple[str, str], ...]
 REFERENCE = "nts-ar:area=reference"
+# Texts of the library that are exchanged: it decides in `cv_element`, or does something wrong.
+ITSELF = (
+    ("int cv_pair(", "static int never_called("),
+    (
+        "    (void)n_decisions;\n",
+        "    int own[2 * view->n_slave_segments];\n    decide(view, own);\n    decisions = own;\n",
+    ),
+)
+A_TERM_LESS = (("(t_i * r_j + r_i * t_j)", "(r_i * t_j)"),)
+A_FORCE_MORE = (("    (void)n_decisions;\n", "    residual[2 * (view->n_slave_nodes + view->n_master_nodes)] = 0;\n"),)
+A_DECISION_MORE = (("        decide(view, decisions);\n", "        decisions[capacity] = 0;\n"),)
+GIVES_UP = (("    (void)n_decisions;\n", "    return 7;\n"),)
+REFUSES = (("    return count;\n", "    return -1;\n"),)
+TRAITS = (("int cv_version", "const char *cv_traits(void) { return \"area = 'current'\"; }\nint cv_version"),)
 
 
-@pytest.mark.parametrize("flags", [(), ("-DDECIDES_ITSELF",)])
+@pytest.mark.parametrize("exchanges", [(), ITSELF], ids=["cv_pair", "itself"])
 @pytest.mark.parametrize("elements", ["segment", "interface"])
 @pytest.mark.parametrize("name", CASES)
-def test_springs_in_c_are_those_of_ours(name: str, elements: str, flags: tuple[str, ...], build: Build) -> None:
-    library = build("springs.c", *flags)
+def test_springs_in_c_are_those_of_ours(
+    name: str, elements: str, exchanges: tuple[tuple[str, str], ...], build: Build
+) -> None:
+    library = build("springs.c", *exchanges)
     compare(f"c:file={library},elements={elements}", REFERENCE, named_case(name))
 
 
@@ -27,7 +44,7 @@ def test_decisions_are_a_pairing_of_integers(build: Build) -> None:
     pairing = subject_of(f"c:file={build('springs.c')}").for_case(case).pair(case.interface, case.z)
     assert isinstance(pairing, Pairing)
     assert len(pairing["decision"]) == 2 * len(case.interface.slave)
-    itself = subject_of(f"c:file={build('springs.c', '-DDECIDES_ITSELF')}").for_case(case)
+    itself = subject_of(f"c:file={build('springs.c', *ITSELF)}").for_case(case)
     assert itself.pair(case.interface, case.z) is None
 
 
@@ -45,7 +62,7 @@ def test_the_residual_is_smooth_on_frozen_decisions(build: Build) -> None:
 
 
 def test_the_order_of_the_tangent_is_that_of_the_option(build: Build) -> None:
-    case, library = named_case("offset-c"), build("springs.c", "-DLEAVES_OUT_A_TERM")
+    case, library = named_case("offset-c"), build("springs.c", *A_TERM_LESS)
     by_row, by_column = (
         subject_of(f"c:file={library},order={order}").for_case(case).tangent(case.interface, None, case.z).toarray()
         for order in ("row", "column")
@@ -64,8 +81,6 @@ def test_a_library_without_a_tangent_gets_none(build: Build) -> None:
 
 def test_many_decisions_get_room(build: Build) -> None:
     """One element with all segments has more decisions than the first call has room for."""
-    from contactverif import Case, Interface
-
     x = np.arange(21.0)
     interface = Interface.from_chains(np.column_stack([x, 0 * x - 0.1]), np.column_stack([x[::-1], 0 * x]))
     case = Case(interface=interface, z=interface.nodes.ravel(), penalty=2.0)
@@ -76,25 +91,26 @@ def test_many_decisions_get_room(build: Build) -> None:
     compare(text, REFERENCE, case)
 
 
-def test_what_a_library_says_of_itself_is_read(build: Build) -> None:
-    traits = subject_of(f"c:file={build('springs.c')}").traits
-    assert traits.promises.patch.flat is False
-    assert traits.rules.area == "reference"
-    assert traits.witness("patch.flat.solve") == "b"
+def test_what_a_library_says_of_itself_counts_more_than_the_file_beside_it(build: Build) -> None:
+    beside = subject_of(f"c:file={build('springs.c')}").traits
+    assert beside.promises.patch.flat is False
+    assert beside.rules.area == "reference"
+    itself = subject_of(f"c:file={build('springs.c', *TRAITS)}").traits
+    assert (itself.rules.area, itself.promises.patch.flat) == ("current", None)
 
 
 @pytest.mark.parametrize(
-    ("flag", "message"),
+    ("exchanges", "message"),
     [
-        ("-DWRITES_A_FORCE_MORE", "cv_element: slave segment 0: wrote to number 13 of residual, which has 12"),
-        ("-DWRITES_A_DECISION_MORE", "cv_pair: slave segment 0: wrote to number 17 of decisions, which has 16"),
-        ("-DGIVES_UP", "cv_element: slave segment 0: returned 7; needed 0"),
-        ("-DREFUSES_TO_PAIR", "cv_pair: slave segment 0: returned -1; needed ≥ 0"),
+        (A_FORCE_MORE, "cv_element: slave segment 0: wrote to number 13 of residual, which has 12"),
+        (A_DECISION_MORE, "cv_pair: slave segment 0: wrote to number 17 of decisions, which has 16"),
+        (GIVES_UP, "cv_element: slave segment 0: returned 7; needed 0"),
+        (REFUSES, "cv_pair: slave segment 0: returned -1; needed ≥ 0"),
     ],
 )
-def test_what_a_library_does_wrong_is_named(flag: str, message: str, build: Build) -> None:
+def test_what_a_library_does_wrong_is_named(exchanges: Exchanges, message: str, build: Build) -> None:
     case = named_case("offset-c")
-    checked = subject_of(f"c:file={build('springs.c', flag)}").for_case(case)
+    checked = subject_of(f"c:file={build('springs.c', *exchanges)}").for_case(case)
     with pytest.raises(ContractError) as error:
         checked.residual(case.interface, None, case.z)
     assert message in str(error.value)
@@ -102,7 +118,7 @@ def test_what_a_library_does_wrong_is_named(flag: str, message: str, build: Buil
 
 def test_a_library_of_another_version_is_refused(build: Build) -> None:
     with pytest.raises(MisuseError, match=r"of version 9; needed 1, that of contactverif\.h"):
-        load_formulation(f"c:file={build('springs.c', '-DVERSION=9')}")
+        load_formulation(f"c:file={build('springs.c', ('return CV_VERSION', 'return 9'))}")
 
 
 @pytest.mark.parametrize(
