@@ -55,6 +55,32 @@ def test_a_project_of_jax_needs_the_extra(make: Make) -> None:
     assert "contactverif[jax]" in read_toml(make("mine", "--jax") / "pyproject.toml")["project"]["dependencies"]
 
 
+@pytest.mark.parametrize(
+    ("option", "source", "subject"), [("--c", "c", "c:file=my_nts.so"), ("--fortran", "f90", "uel:file=my_nts.so")]
+)
+def test_a_project_of_a_library_has_a_makefile(
+    ask: Ask, option: str, source: str, subject: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    answer = ask("new", "my-nts", option)
+    assert answer.out.endswith(f"next: cd my-nts && make && contactverif verify {subject}\n")
+    files = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "my-nts").iterdir()}
+    header = {"contactverif.h"} if source == "c" else set()
+    library = {f"my_nts.{source}", "my_nts.toml", "test_my_nts.py", "Makefile"} | header
+    assert files.keys() == library | {"pyproject.toml", "README.md", ".gitignore"}
+    assert f"\n\t{'cc' if source == 'c' else 'gfortran'} -shared -fPIC -O2" in files["Makefile"]
+    assert tomllib.loads(files["my_nts.toml"])["promises"]["tangent"] == "exact"
+    assert tomllib.loads(files["pyproject.toml"])["tool"]["contactverif"] == {"profile": "ci"}
+    assert f'"{subject}"' in files["test_my_nts.py"]
+    assert "/my_nts.so" in files[".gitignore"]
+    assert not [name for name, text in files.items() if "{{" in text or "{%" in text]
+
+
+def test_a_project_is_of_one_language(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    check_mistake(ask("new", "mine", "--c", "--fortran"), "NAME: found --c and --fortran; needed one of them")
+
+
 def test_tox_and_the_workflow_run_the_tests_and_verify(make: Make) -> None:
     project = make("mine", "--jax")
     workflow = yaml.safe_load((project / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8"))
