@@ -157,31 +157,35 @@ def write_model(layer: Layer) -> list[str]:
     scene, nodes = layer.scene, layer.nodes[: layer.n_front]
     lines = ["Begin ModelPartData", "End ModelPartData", "Begin Properties 0", "End Properties"]
     lines += ["Begin Nodes", *(f"{n} {x!r} {y!r} 0.0" for n, (x, y, _) in enumerate(nodes.tolist(), 1)), "End Nodes"]
-    first, elements = 1, dict[int, list[int]]()
-    kinds = ((3, layer.wedges[:, :3], layer.body_of_wedge), (4, layer.bricks[:, :4], layer.body_of_brick))
-    for corners, cells, bodies in kinds:
-        numbers = range(first, first + len(cells))
-        rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in zip(numbers, cells, strict=True)]
-        lines += [f"Begin Elements SmallDisplacementElement2D{corners}N", *rows, "End Elements"] if rows else []
-        for number, body in zip(numbers, bodies.tolist(), strict=True):
-            elements.setdefault(body, []).append(number)
-        first += len(cells)
+    elements, parts = _elements(layer)
     edges = np.vstack([scene.slave, scene.master])
-    lines += ["Begin Conditions LineCondition2D2N"]
-    lines += [f"{n} 0 {_words(edge + 1)}" for n, edge in enumerate(edges, 1)] + ["End Conditions"]
-    loaded = np.unique(np.flatnonzero(scene.load.any(axis=1))) + 1
+    rows = [f"{n} 0 {_words(edge + 1)}" for n, edge in enumerate(edges, 1)]
+    lines += [*elements, "Begin Conditions LineCondition2D2N", *rows, "End Conditions"]
+    loaded = (np.flatnonzero(scene.load.any(axis=1)) + 1).tolist()
     points = range(len(edges) + 1, len(edges) + len(loaded) + 1)
-    if len(loaded):
-        rows = [f"{n} 0 {node}" for n, node in zip(points, loaded.tolist(), strict=True)]
+    if loaded:
+        rows = [f"{n} 0 {node}" for n, node in zip(points, loaded, strict=True)]
         lines += ["Begin Conditions PointLoadCondition2D1N", *rows, "End Conditions"]
-    everything = range(1, len(nodes) + 1)
-    for body, members in elements.items():
-        of_body = [cells[bodies == body].reshape(-1) for _, cells, bodies in kinds]
-        lines += _part(f"Body{body}", (np.unique(np.concatenate(of_body)) + 1).tolist(), members, ())
+        parts += _part("Loaded", loaded, (), points)
     slave = (np.unique(scene.slave) + 1).tolist()
-    lines += _part("Touching", (np.unique(edges) + 1).tolist(), (), range(1, len(edges) + 1))
-    lines += _part("Slave", slave, (), range(1, len(scene.slave) + 1))
-    return lines + (_part("Loaded", loaded.tolist(), (), points) if len(loaded) and everything else [])
+    parts += _part("Touching", (np.unique(edges) + 1).tolist(), (), range(1, len(edges) + 1))
+    return lines + parts + _part("Slave", slave, (), range(1, len(scene.slave) + 1))
+
+
+def _elements(layer: Layer) -> tuple[list[str], list[str]]:
+    """Return the lines of all elements, and those of a part for each body."""
+    lines, parts, first = list[str](), list[str](), 1
+    kinds = ((3, layer.wedges[:, :3], layer.body_of_wedge), (4, layer.bricks[:, :4], layer.body_of_brick))
+    for body in range(len(layer.scene.axes)):
+        begin, corners = first, list[Any]()
+        for count, cells, bodies in kinds:
+            own = cells[bodies == body]
+            rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in enumerate(own, first)]
+            lines += [f"Begin Elements SmallDisplacementElement2D{count}N", *rows, "End Elements"] if rows else []
+            corners.append(own.reshape(-1))
+            first += len(own)
+        parts += _part(f"Body{body}", (np.unique(np.concatenate(corners)) + 1).tolist(), range(begin, first), ())
+    return lines, parts
 
 
 def _words(numbers: Any) -> str:
