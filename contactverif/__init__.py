@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from contactverif.contract.body import Body
     from contactverif.contract.case import Case
     from contactverif.contract.cases import Cases
+    from contactverif.contract.engine import Engine, EngineAnswer, EngineTraits, SceneArrays
     from contactverif.contract.errors import ContactverifError, ContractError, MisuseError
     from contactverif.contract.formulation import ContactPoints, Formulation, ResidualOnly, evaluate_both
     from contactverif.contract.interface import Interface, Surface
@@ -52,6 +53,7 @@ _HOMES = {
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.cases": ("Cases",),
+    "contract.engine": ("Engine", "EngineAnswer", "EngineTraits", "SceneArrays"),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
     "contract.formulation": ("ContactPoints", "Formulation", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
@@ -86,6 +88,9 @@ __all__ = [
     "ContactverifError",
     "ContractError",
     "End",
+    "Engine",
+    "EngineAnswer",
+    "EngineTraits",
     "Evidence",
     "Finding",
     "Formulation",
@@ -107,6 +112,7 @@ __all__ = [
     "Rules",
     "Run",
     "Scene",
+    "SceneArrays",
     "ShrinkFit",
     "Subject",
     "Surface",

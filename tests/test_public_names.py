@@ -28,6 +28,8 @@ PUBLIC = {
         # Bodies, scenes and their solution.
         *("Body", "Rectangle", "Placing", "block", "rigid_surface", "body_from_mesh"),
         *("Scene", "two_blocks", "shrink_fit", "ShrinkFit", "load_scene", "solve", "Trace", "End"),
+        # Whole contact codes.
+        *("Engine", "EngineTraits", "SceneArrays", "EngineAnswer"),
         # Properties, and runs over them.
         *("Property", "Cases", "Quantity", "Measurement", "Finding", "Outcome", "Verdict", "Row", "Run"),
         *("load_formulation", "load_properties", "evaluate_both", "judge_case", "verify", "Report"),

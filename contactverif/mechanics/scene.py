@@ -21,6 +21,7 @@ from scipy import linalg, sparse
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import BODIES, Case
+from contactverif.contract.engine import SceneArrays
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.mechanics.bulk import (
@@ -242,6 +243,25 @@ class Scene:
         if all(body.name == body_name(arrays[BODIES + "is_slave"], index) for index, body in enumerate(self.bodies)):
             _remember(case, self)
         return case
+
+    def arrays(self, *, upright: bool = False, lowered: bool = False) -> SceneArrays:
+        """Return the scene as plain arrays, which any contact code can read.
+
+        Parameters
+        ----------
+        upright : bool
+            Turn the scene so that the axes of its bodies are the global ones.
+        lowered : bool
+            Move each body that nothing holds along one of its axes by its first guess there, so that it touches.
+
+        Raises
+        ------
+        MisuseError
+            If it is to be upright, and its bodies have different axes.
+        """
+        from contactverif.mechanics.scene_arrays import pose_arrays  # It knows solutions, which know scenes.
+
+        return pose_arrays(self, upright=upright, lowered=lowered).arrays
 
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""

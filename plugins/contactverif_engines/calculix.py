@@ -36,7 +36,7 @@ _FIELD = "1e-8, 1e-8, , , 1e-8, , , 1e-20"
 class CalculiX:
     """CalculiX with one of its kinds of contact.
 
-    Parameters
+    Attributes
     ----------
     kind : Literal['surface', 'nodes', 'mortar', 'linmortar']
         ``"surface"``: face-to-face springs; ``"nodes"``: a spring at each slave node; ``"mortar"`` and ``"linmortar"``:

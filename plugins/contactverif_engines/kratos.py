@@ -33,7 +33,7 @@ _PROCESSES = {
 class Kratos:
     """Kratos with one of its kinds of mortar contact.
 
-    Parameters
+    Attributes
     ----------
     kind : Literal['multiplier', 'penalty']
         The augmented Lagrangian method with dual multipliers, or penalty springs of the stiffness that Kratos chooses.
@@ -179,11 +179,11 @@ def _elements(layer: Layer) -> tuple[list[str], list[str]]:
     for body in range(len(layer.scene.axes)):
         begin, corners = first, list[Any]()
         for count, cells, bodies in kinds:
-            own = cells[bodies == body]
-            rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in enumerate(own, first)]
+            of_body = cells[bodies == body]
+            rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in enumerate(of_body, first)]
             lines += [f"Begin Elements SmallDisplacementElement2D{count}N", *rows, "End Elements"] if rows else []
-            corners.append(own.reshape(-1))
-            first += len(own)
+            corners.append(of_body.reshape(-1))
+            first += len(of_body)
         parts += _part(f"Body{body}", (np.unique(np.concatenate(corners)) + 1).tolist(), range(begin, first), ())
     return lines, parts
 

@@ -22,7 +22,7 @@ _CONVERGED = 1e-13  # The last step over the largest displacement.
 class NGSolve:
     """NGSolve with penalty springs.
 
-    Parameters
+    Attributes
     ----------
     order : int
         The order of integration of the energy on each edge of the slave.

@@ -118,7 +118,7 @@ def test_a_name_on_the_command_line_finds_its_engine() -> None:
     assert isinstance(subject, EngineSubject)
     assert subject.engine_traits.passes_flat_patch is True
     with pytest.raises(MisuseError, match="nearest: control"):
-        load_engine("engine/controll")
+        load_engine("engine/kontrol")
     with pytest.raises(MisuseError, match=r"option of 'engine/calculix:kinds=nodes'.*nearest: kind"):
         load_engine("engine/calculix:kinds=nodes")
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.mechanics.accuracy import Solution
@@ -22,6 +23,7 @@ from contactverif.problems.uniform_stress import stress_error
 from contactverif_properties.shared.uniform_pressure import consistent_forces, gap_error, normal_of
 
 OWN_PRESSURE = "mean pressure over that of hard contact"
+REPORTED_FORCES = "error of the total force that the code reports"
 ITERATIONS = "iterations until the code said that it converged"
 
 
@@ -45,6 +47,8 @@ def measure_engine(
         details[OWN_PRESSURE] = mean / pressure
         pressure = mean if mean > 0 else pressure
     q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
+    if answer is not None and answer.contact_forces is not None:
+        details[REPORTED_FORCES] = _reported_error(answer, case, scene, consistent_forces(case, pressure))
     values = {stress: stress_error(scene, scene.stresses(q), pressure)}
     values |= dict(zip(quantities[1:3], _force_errors(case, scene, solution, pressure), strict=True))
     tolerance = engine_tolerance(scene, solution, traits.accuracy, pressure)
@@ -55,6 +59,17 @@ def measure_engine(
         values[gap] = gap_error(state, penetration, pressure / penalty)
         tolerances[gap] = tolerance * (1 + penalty * float(case.parameters["compliance"].sum()))
     return Measurement(check_all(values, tolerances), details=details)
+
+
+def _reported_error(answer: EngineAnswer, case: Case, scene: Scene, exact: FloatArray) -> float:
+    """Return by which share the total force on the slave that a code reports differs from the exact one."""
+    assert answer.contact_forces is not None
+    first = np.cumsum([0, *(len(body.nodes) for body in scene.bodies)])
+    nodes = [first[index] + scene.bodies[index].contact_nodes for index in scene.bodies_in_reach]
+    n_slave = case.interface.n_slave_nodes
+    totals = [forces[:n_slave].sum(axis=0) for forces in (answer.contact_forces[np.concatenate(nodes)], exact)]
+    sizes = np.linalg.norm(totals, axis=1)  # The code may have turned the scene.
+    return float(abs(sizes[0] / sizes[1] - 1))
 
 
 def _mean_pressure(case: Case, solution: Solution) -> float:
