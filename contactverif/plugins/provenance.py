@@ -117,9 +117,13 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     for group, names in named.items():
         modules |= {entry.module for entry in metadata.entry_points(group=group) if entry.name in names}
     packages = sorted({module.partition(".")[0] for module in modules})
+    return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages} | _library_digests(formulations)
+
+
+def _library_digests(formulations: Sequence[str]) -> dict[str, str]:
+    """Return the digests of the files that the names of formulations load."""
     files = sorted({path for text in formulations for path in files_within(text)})
-    libraries = {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
-    return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages} | libraries
+    return {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
 
 
 def _plugin_name(text: str) -> str:

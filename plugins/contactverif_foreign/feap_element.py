@@ -20,7 +20,7 @@ from contactverif_foreign.user_element import Convention, UserElement, load_elem
 
 _ORDER = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
 _TANGENT_AND_RESIDUAL = 3  # The value of isw.
-_SETS = 6  # Columns of displacements in `ul`: the total, the increment, and what a static step leaves at zero.
+_SETS = 6  # Columns of displacements in `ul`: the total, the increment, and velocities and the like, which are zero.
 _MOST_ELEMENTS = 99
 
 

@@ -50,38 +50,36 @@ class GuardedSlot:
     ----------
     addresses : dict[str, int]
         The address of each argument by name.
+    spans : dict[str, slice]
+        The place of each argument in a row, in halves of words.
     """
 
     def __init__(self, arguments: Sequence[Argument], guard: int = _LEAST_GUARD) -> None:
         self._arguments = {argument.name: argument for argument in arguments}
-        self._starts: dict[str, int] = {}  # In halves of words, where each argument begins.
+        self.spans: dict[str, slice] = {}  # The halves of words that the values of each argument take.
         guard, place, is_behind_scalar = 2 * max(guard, _LEAST_GUARD), 0, False
         for argument in sorted(arguments, key=lambda argument: bool(argument.shape)):
             if argument.shape or not is_behind_scalar:
                 place += guard
             is_behind_scalar = not argument.shape
-            self._starts[argument.name] = place
-            place += -(-argument.size * _DTYPES[argument.kind].itemsize // 8) * 2
+            n_halves = argument.size * _DTYPES[argument.kind].itemsize // 4
+            self.spans[argument.name] = slice(place, place + n_halves)
+            place += n_halves + n_halves % 2
         self._empty = np.full((place + guard) // 2, _GUARD)
         for argument in arguments:
-            self._empty.view(np.int32)[self._halves(argument)] = 0
+            self._empty.view(np.int32)[self.spans[argument.name]] = 0
         self._memory = self._empty.copy()
-        self.addresses = {name: self._memory.ctypes.data + 4 * start for name, start in self._starts.items()}
+        self.addresses = {name: self._memory.ctypes.data + 4 * span.start for name, span in self.spans.items()}
         self._fixed = np.full_like(self._empty, ~np.uint64(0))  # The bits that a call must not change.
         for argument in arguments:
             if not argument.is_input:
-                self._fixed.view(np.int32)[self._halves(argument)] = 0
-
-    def _halves(self, argument: Argument) -> slice:
-        """Return the halves of words that the values of an argument take."""
-        start = self._starts[argument.name]
-        return slice(start, start + argument.size * _DTYPES[argument.kind].itemsize // 4)
+                self._fixed.view(np.int32)[self.spans[argument.name]] = 0
 
     def preset(self, values: dict[str, Any]) -> None:
         """Set arguments that are the same in all calls."""
         for name, value in values.items():
             argument = self._arguments[name]
-            view: Array = self._empty.view(np.int32)[self._halves(argument)]
+            view: Array = self._empty.view(np.int32)[self.spans[argument.name]]
             (view if argument.kind == "integer" else view.view(np.float64))[...] = value
 
     def rows(self, n_rows: int) -> SlotRows:
@@ -108,10 +106,8 @@ class GuardedSlot:
 
     def _describe(self, half: int) -> str:
         """Return what lies at a half of a word: an input, or what is before or behind an array."""
-        names = sorted(self._starts, key=self._starts.__getitem__)
-        spans = {name: self._halves(self._arguments[name]) for name in names}
-        name = min(names, key=lambda name: max(spans[name].start - half, half - spans[name].stop + 1, 0))
-        argument, span = self._arguments[name], spans[name]
+        name, span = min(self.spans.items(), key=lambda item: max(item[1].start - half, half - item[1].stop + 1, 0))
+        argument = self._arguments[name]
         number = (half - span.start) * 4 // _DTYPES[argument.kind].itemsize + 1
         if span.start <= half < span.stop:
             return f"the input {name}{f', number {number} of {argument.size}' if argument.shape else ''}"
@@ -130,7 +126,7 @@ class SlotRows:
     def __getitem__(self, name: str) -> Array:
         """Return the values (n_rows, size) of an argument, which may be written."""
         argument = self._arguments[name]
-        view: Array = self._memory.view(np.int32)[:, self._slot._halves(argument)]
+        view: Array = self._memory.view(np.int32)[:, self._slot.spans[name]]
         return view if argument.kind == "integer" else view.view(np.float64)
 
     def fill(self, values: dict[str, Any]) -> None:

@@ -39,7 +39,7 @@ def test_a_project_without_such_a_table_promises_nothing(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("symmetrik = true", ["'symmetrik'", "nearest: symmetric"]),
+        ("symmetric-tangent = true", ["'symmetric-tangent'", "nearest: symmetric"]),
         ("symmetric = 'yes'", ["symmetric", "'yes'", "True, False, None"]),
         ("batched = true", ["'batched'"]),
         ("witnesses = 'a1'", ["witnesses", "a str"]),

@@ -9,7 +9,7 @@ from contactverif import MisuseError, load_formulation, named_case
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
-from foreign.comparison import CASES, Build, compare, ring_case, subject_of
+from foreign.comparison import CASES, Build, agree, compare, ring_case, subject_of
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -24,6 +24,25 @@ def test_an_element_of_feap_is_what_nts_is(name: str, build: Build) -> None:
 
 def test_a_closed_master_has_no_free_end(build: Build) -> None:
     compare(f"uel:file={build('nts_uel.f90')}", "nts", ring_case())
+
+
+@pytest.mark.parametrize("name", ["a1", "b", "c-prime", "tilted"])
+def test_segments_that_overlap_give_the_forces_of_sts(name: str, build: Build) -> None:
+    """Compare where every gap is closed, so that two points and three integrate the same."""
+    case = named_case(name)
+    mine, ours = (
+        subject_of(text).with_penalty(case.penalty).residual(case.interface, None, case.z)
+        for text in (f"uel:file={build('sts_uel.f90')},nodes=4", "sts")
+    )
+    agree(mine, ours)
+
+
+def test_an_element_of_chains_knows_their_sizes(build: Build) -> None:
+    case = named_case("offset-c")
+    checked = subject_of(f"uel:file={build('wrong_writes.f90')},nodes=n,props=12").for_case(case)
+    forces = checked.residual(case.interface, None, case.z)
+    n_slave, n_nodes = case.interface.n_slave_nodes, case.interface.n_nodes
+    assert forces[:6].tolist() == [n_slave, n_nodes - n_slave, 0, 0, n_nodes, 1]
 
 
 def test_the_traits_beside_a_library_are_its_own(build: Build) -> None:
@@ -80,6 +99,17 @@ def test_a_crash_ends_the_process_of_the_plugin_alone(wrong: int, cause: str, bu
     finally:
         end_all()
     assert error.value.cause == cause
+
+
+def test_an_element_that_never_returns_is_ended(build: Build) -> None:
+    case = named_case("offset-c")
+    try:
+        checked = subject_of(f"uel:file={build('wrong_writes.f90')},props=13", Limits(seconds=2.0)).for_case(case)
+        with pytest.raises(PluginError) as error:
+            checked.residual(case.interface, None, case.z)
+    finally:
+        end_all()
+    assert error.value.cause == "hang"
 
 
 def test_a_relative_path_is_that_of_the_working_folder(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-! A user element that breaks a rule; PROPS(3) says which.
+! A user element that breaks a rule; PROPS(3) says which. With 12 it says what it got, and with 13 it never returns.
 subroutine uel(rhs, amatrx, svars, energy, ndofel, nrhs, nsvars, props, nprops, coords, mcrd, nnode, u, du, v, a, &
     jtype, time, dtime, kstep, kinc, jelem, params, ndload, jdltyp, adlmag, predef, npredf, lflags, mlvarx, ddlmag, &
     mdload, pnewdt, jprops, njprop, period)
@@ -9,6 +9,9 @@ subroutine uel(rhs, amatrx, svars, energy, ndofel, nrhs, nsvars, props, nprops, 
   double precision :: u(ndofel), du(mlvarx, *), v(ndofel), a(ndofel), time(2), dtime, params(*), adlmag(mdload, *)
   double precision :: predef(2, npredf, nnode), ddlmag(mdload, *), pnewdt, period
 
+  if (nint(props(3)) == 12) rhs(1:6, 1) = -[jprops(1:4), nnode, jelem]
+  do while (nint(props(3)) == 13)
+  end do
   if (jelem /= 2) return
   select case (nint(props(3)))
   case (1)
