@@ -90,7 +90,7 @@ class SceneArrays:
     penalty : float
         The distributed stiffness ε̂ of contact, force per length per length of penetration.
     unit : float
-        A length of the size of the bodies, for steps and tolerances that need one.
+        The size of the largest body, a length, for steps and tolerances that need one.
     """
 
     nodes: FloatArray

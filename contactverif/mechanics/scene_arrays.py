@@ -99,7 +99,7 @@ def pose_arrays(scene: Scene, *, upright: bool = False, lowered: bool = False, s
         young=packed["young"],
         poisson=packed["poisson"],
         penalty=scene.penalty,
-        unit=float(np.abs(np.ptp(packed["nodes"], axis=0)).max()),
+        unit=max(float(np.ptp(body.nodes, axis=0).max()) for body in bodies),
     )
     return ScenePose(scene, arrays, turn, moved, scale)
 

@@ -99,8 +99,8 @@ a question, and all that have an exact solution. A cell says how it ended, with 
 tolerance or furthest beyond it, over the tolerance (below 1 passes), how many scenes could be judged of how many, and
 the seconds of a scene. A scene is not judged where the code says that it finds no solution.
 
-- **pass** and **fail**: the verdict over all scenes. A fail is no accusation where the code promises nothing: see
-  [the findings](README.md).
+- **pass** and **fail**: the verdict over all scenes; **BROKEN PROMISE** where the engine states that it passes, or any
+  code should. What is not among [the findings](README.md) was not examined yet: it may be a mistake of the adapter.
 - **not judged**: of more than a tenth of the scenes the code found no solution.
 - **crashed**: it ended, or gave no answer within a minute.
 
