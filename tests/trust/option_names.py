@@ -17,10 +17,11 @@ COUNTS = range(1, 6)  # The numbers of points on a slave segment.
 # Options that change no bit of an answer.
 WITHOUT_EFFECT = ("threads",)
 SHARES = (0, 0.25)  # The values of options that are parts of a segment.
+LOADERS = "contactverif_foreign"  # Its factories load a library, and are nothing without its file.
 FACTORIES = {
     entry.name: entry.load()
     for entry in entry_points(group="contactverif.formulations")
-    if entry.dist is not None and entry.dist.name == "contactverif"
+    if entry.dist is not None and entry.dist.name == "contactverif" and not entry.module.startswith(LOADERS)
 }
 WRAPPED = "inner"  # The argument of a factory that wraps another formulation.
 
