@@ -87,7 +87,7 @@ class EngineSubject(Subject):
             return self.engine.solve(scene)
         except (KeyboardInterrupt, ContractError):
             raise
-        except BaseException as error:
+        except BaseException as error:  # A code may raise anything, and its mistake is a row of the report.
             kinds = ((MemoryError, "memory"), (SystemExit, "exit"))
             cause = next((word for kind, word in kinds if isinstance(error, kind)), "exception")
             raise PluginError(f"solve: {describe_error(error)}{place_of_error(error)}", cause) from error

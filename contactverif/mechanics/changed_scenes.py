@@ -95,16 +95,16 @@ def mirror(scene: Scene) -> Scene:
 
     The first axis of each body becomes the opposite of its image, so that the second one is its image.
     """
-    image, first = np.array([-1.0, 1.0]), np.array([-1.0, 1.0])
+    image = np.array([-1.0, 1.0])  # It takes places, and components along the new axes.
     bodies = tuple(
         replace(
             body,
             nodes=body.nodes * image + 0.0,
             cells=body.cells[:, ::-1],
             contact=body.contact[:, ::-1],
-            imposed=body.imposed * first + 0.0,
-            load=body.load * first + 0.0,
-            start=body.start * first + 0.0,
+            imposed=body.imposed * image + 0.0,
+            load=body.load * image + 0.0,
+            start=body.start * image + 0.0,
             axis=-image * body.axis + 0.0,
         )
         for body in scene.bodies

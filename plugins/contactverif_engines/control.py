@@ -18,6 +18,7 @@ from contactverif_engines.body_stiffness import assemble
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _ITERATIONS = 60
 _CONVERGED = 1e-12  # The last step over the largest displacement.
+_ROUNDED = 1e-9  # A step below this share that does not shrink any more is roundoff of a badly conditioned matrix.
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,11 @@ class Control:
                 return EngineAnswer((frames @ u).reshape(-1, 2), False, iteration, "a singular matrix")
             u[free] += change
             before, step = step, float(np.abs(change).max(initial=0.0))
-            if step <= _CONVERGED * float(np.abs(u).max()) or (step < 1e-9 * np.abs(u).max() and step >= before / 2):
+            if step <= _CONVERGED * float(np.abs(u).max()) or (
+                step < _ROUNDED * np.abs(u).max() and step >= before / 2
+            ):
                 break
-        converged = step <= 1e-9 * float(np.abs(u).max())
+        converged = step <= _ROUNDED * float(np.abs(u).max())
         displacements = (frames @ u).reshape(-1, 2)
         forces, _ = _contact(scene, scene.nodes + displacements)
         return EngineAnswer(displacements, converged, iteration, "" if converged else "no end", -forces.reshape(-1, 2))
