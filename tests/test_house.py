@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -285,6 +286,18 @@ def test_no_two_rooms_import_each_other() -> None:
         ready = [name for name in ROOMS if name not in order and below[name] <= set(order)]
         assert ready, f"these rooms import each other: {sorted(set(ROOMS) - set(order))}"
         order += ready
+
+
+def test_no_two_files_import_each_other() -> None:
+    """Wherever in a file an import stands: a circle that an import inside a function hides is a circle."""
+    below = {}
+    for module, path in SOURCES.items():
+        imports = imports_of(trees()[module], module, is_package=path.stem == "__init__")
+        below[module] = {name if name in SOURCES else name.rpartition(".")[0] for _, name in imports} & set(SOURCES)
+    try:
+        TopologicalSorter(below).prepare()
+    except CycleError as error:
+        pytest.fail(" imports ".join(reversed(error.args[1])))
 
 
 def test_every_folder_is_a_room_and_every_room_a_folder() -> None:

@@ -34,6 +34,7 @@ from contactverif.mechanics.bulk import (
     loose_modes,
 )
 from contactverif.mechanics.packed_bodies import body_name, pack_bodies, unpack_bodies
+from contactverif.mechanics.scene_arrays import Pose, pose_bodies
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,24 +245,29 @@ class Scene:
             _remember(case, self)
         return case
 
-    def arrays(self, *, upright: bool = False, lowered: bool = False) -> SceneArrays:
-        """Return the scene as plain arrays, which any contact code can read.
+    def pose(self, *, upright: bool = False, lowered: bool = False, scale: float = 1.0) -> Pose:
+        """Return the scene as a code is given it.
 
         Parameters
         ----------
         upright : bool
-            Turn the scene so that the axes of its bodies are the global ones.
+            Turn the scene so that the axes of its bodies are the global ones. Coordinates that were equal before the
+            scene was inclined are equal again.
         lowered : bool
             Move each body that nothing holds along one of its axes by its first guess there, so that it touches.
+        scale : float
+            The factor of all loads and imposed displacements. Only a scene without a first gap may be scaled.
 
         Raises
         ------
         MisuseError
             If it is to be upright, and its bodies have different axes.
         """
-        from contactverif.mechanics.scene_arrays import pose_arrays  # It knows solutions, which know scenes.
+        return pose_bodies(self.bodies, self.slave, self.penalty, upright=upright, lowered=lowered, scale=scale)
 
-        return pose_arrays(self, upright=upright, lowered=lowered).arrays
+    def arrays(self, *, upright: bool = False, lowered: bool = False) -> SceneArrays:
+        """Return the scene as plain arrays, which any contact code can read, see `pose`."""
+        return self.pose(upright=upright, lowered=lowered).arrays
 
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""

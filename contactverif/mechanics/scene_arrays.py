@@ -1,4 +1,4 @@
-"""A scene as plain arrays, for codes that know nothing of the harness, and the solution that their answer is.
+"""Bodies as plain arrays, for codes that know nothing of the harness, and their answers back on these bodies.
 
 Rule for the next editor: whatever a code is spared, such as inclined axes, is undone here, so that its answer is
 measured on the scene itself.
@@ -6,75 +6,40 @@ measured on the scene itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.engine import EngineAnswer, SceneArrays
-from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import one_line
-from contactverif.mechanics.accuracy import Solution
 from contactverif.mechanics.packed_bodies import pack_bodies
-from contactverif.mechanics.scene import Scene
 
 _SAME = 64 * UNIT_ROUNDOFF  # Coordinates that differ by less, over the largest one, were equal before they were turned.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ScenePose:
-    """A scene as it is posed to a code: its arrays, and how an answer goes back to the scene."""
+class Pose:
+    """Bodies as they are posed to a code: their arrays, and how an answer goes back to them."""
 
-    scene: Scene
     arrays: SceneArrays
-    turn: FloatArray  # (2, 2): from the axes of the arrays to those of the scene.
+    turn: FloatArray  # (2, 2): from the axes of the arrays to those of the bodies.
     lowered: FloatArray  # (n_nodes, 2): by how much nodes were moved beforehand, in the axes of the arrays.
     scale: float  # The factor of all loads and imposed displacements.
 
-    def solution(self, answer: EngineAnswer) -> Solution:
-        """Return the solution of the scene that an answer is.
-
-        Its forces are those that the condensed bodies need for the displacements of the interface's nodes, so that the
-        cells of the code do not matter.
-        """
-        moves = (self.lowered + answer.displacements) / self.scale @ self.turn.T
-        no_solution = "" if answer.converged else f"did not converge: {one_line(answer.message) or 'no words about it'}"
-        return Solution.from_displacements(self.scene, moves[self.interface_nodes], no_solution)
-
-    @property
-    def interface_nodes(self) -> IntArray:
-        """The numbers of the interface's nodes, in its order, among the nodes of the arrays."""
-        first = np.cumsum([0, *(len(body.nodes) for body in self.scene.bodies)])
-        return np.concatenate(
-            [first[index] + self.scene.bodies[index].contact_nodes for index in self.scene.bodies_in_reach]
-        )
+    def displacements(self, answer: EngineAnswer) -> FloatArray:
+        """Return the displacements (n_nodes, 2) of the bodies as they were, in global axes."""
+        return (self.lowered + answer.displacements) / self.scale @ self.turn.T
 
 
-def pose_arrays(scene: Scene, *, upright: bool = False, lowered: bool = False, scale: float = 1.0) -> ScenePose:
-    """Return a scene as a code is given it.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    upright : bool
-        Turn the scene so that the axes of its bodies are the global ones. Coordinates that were equal before the scene
-        was inclined are equal again.
-    lowered : bool
-        Move each body that nothing holds along one of its axes by its first guess there, so that it touches.
-    scale : float
-        The factor of all loads and imposed displacements. Only a scene without a first gap may be scaled.
-
-    Raises
-    ------
-    MisuseError
-        If it is to be upright, and its bodies have different axes.
-    """
-    bodies = scene.bodies
+def pose_bodies(
+    bodies: tuple[Body, ...], slave: Sequence[int], penalty: float, *, upright: bool, lowered: bool, scale: float
+) -> Pose:
+    """Return bodies as a code is given them; `Scene.pose` says how."""
     turn = _common_frame(bodies) if upright else np.eye(2)
-    packed = pack_bodies(bodies, scene.slave)
+    packed = pack_bodies(bodies, slave)
     count = packed["count"].astype(np.int64)
     body_of_node = np.repeat(np.arange(len(bodies)), count)
     cells = packed["cells"].astype(np.int64)
@@ -98,10 +63,10 @@ def pose_arrays(scene: Scene, *, upright: bool = False, lowered: bool = False, s
         axes=np.tile([1.0, 0.0], (len(bodies), 1)) if upright else packed["axis"],
         young=packed["young"],
         poisson=packed["poisson"],
-        penalty=scene.penalty,
+        penalty=penalty,
         unit=max(float(np.ptp(body.nodes, axis=0).max()) for body in bodies),
     )
-    return ScenePose(scene, arrays, turn, moved, scale)
+    return Pose(arrays, turn, moved, scale)
 
 
 def _common_frame(bodies: tuple[Body, ...]) -> FloatArray:
@@ -129,25 +94,3 @@ def _turn_back(nodes: FloatArray, turn: FloatArray) -> FloatArray:
 def _loose_start(body: Body) -> FloatArray:
     """Return the first guess (2,) of a body along those of its axes along which nothing holds it, 0 along others."""
     return np.where(body.fixed.any(axis=0), 0.0, body.start)
-
-
-def solve_by_engine(
-    scene: Scene, subject: EngineSubject, *, lowered: bool = True, linear: bool = False
-) -> tuple[Solution, EngineAnswer | None]:
-    """Return the solution of a scene by an engine, with its answer; None if the scene cannot be posed to it.
-
-    The scene is turned where the engine takes no inclined axes. Bodies that nothing holds are `lowered`, as in
-    `pose_arrays`. Where its solution is linear in the loads, they are multiplied by the engine's `load_scale`.
-    """
-    traits = subject.engine_traits
-    try:
-        pose = pose_arrays(
-            scene,
-            upright=not traits.inclined_supports,
-            lowered=lowered,
-            scale=traits.load_scale if linear else 1.0,
-        )
-    except MisuseError as error:
-        return Solution.from_displacements(scene, np.zeros_like(scene.interface.nodes), str(error)), None
-    answer = subject.solve(pose.arrays)
-    return pose.solution(answer), answer

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import one_line
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import Solution
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.scene_arrays import solve_by_engine
+from contactverif.mechanics.scene_arrays import Pose
 from contactverif.mechanics.trace import Trace
 
 # Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
@@ -71,3 +76,33 @@ def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -
     forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
     points = formulation.contact_points(interface, pairing, z) if "contact_points" in formulation.provides else None
     return Solution(scene, state, forces, points, nodal, trace)
+
+
+def solve_by_engine(
+    scene: Scene, subject: EngineSubject, *, lowered: bool = True, linear: bool = False
+) -> tuple[Solution, EngineAnswer | None]:
+    """Return the solution of a scene by an engine, with its answer; None if the scene cannot be posed to it.
+
+    The scene is turned where the engine takes no inclined axes. Bodies that nothing holds are `lowered`, as in
+    `Scene.pose`. Where its solution is linear in the loads, they are multiplied by the engine's `load_scale`.
+    """
+    traits = subject.engine_traits
+    scale = traits.load_scale if linear else 1.0
+    try:
+        pose = scene.pose(upright=not traits.inclined_supports, lowered=lowered, scale=scale)
+    except MisuseError as error:
+        return Solution.from_displacements(scene, np.zeros_like(scene.interface.nodes), str(error)), None
+    answer = subject.solve(pose.arrays)
+    return engine_solution(scene, pose, answer), answer
+
+
+def engine_solution(scene: Scene, pose: Pose, answer: EngineAnswer) -> Solution:
+    """Return the solution of a scene that an answer is.
+
+    Its forces are those that the condensed bodies need for the displacements of the interface's nodes, so that the
+    cells of the code do not matter.
+    """
+    first = np.cumsum([0, *(len(body.nodes) for body in scene.bodies)])
+    nodes = np.concatenate([first[index] + scene.bodies[index].contact_nodes for index in scene.bodies_in_reach])
+    no_solution = "" if answer.converged else f"did not converge: {one_line(answer.message) or 'no words about it'}"
+    return Solution.from_displacements(scene, pose.displacements(answer)[nodes], no_solution)

@@ -19,8 +19,8 @@ from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import Solution
 from contactverif.mechanics.changed_scenes import add_body, change_units, exchange_roles, mirror, renumber, turn
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.scene_arrays import solve_by_engine
 from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
+from contactverif.mechanics.solving import solve_by_engine
 from contactverif.strategies.solids import closed_cases
 from contactverif_properties.shared.engine_patch import engine_tolerance
 

@@ -8,7 +8,6 @@ from subjects import load_property
 
 from contactverif import Verdict, judge_case, load_scene
 from contactverif.contract.engine_subject import EngineSubject
-from contactverif.mechanics.scene_arrays import pose_arrays
 from contactverif.problems.catalogue import load_scene_case
 from contactverif_engines.calculix import FIELD, CalculiX, read_displacements, write_deck
 from contactverif_engines.layer import Layer, make_layer
@@ -17,7 +16,7 @@ needs_program = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is n
 
 
 def layer_of(name: str) -> Layer:
-    arrays = pose_arrays(load_scene(name), lowered=True).arrays
+    arrays = load_scene(name).arrays(lowered=True)
     return make_layer(arrays, arrays.unit)
 
 

@@ -126,9 +126,7 @@ def test_a_name_on_the_command_line_finds_its_engine() -> None:
 def test_the_process_of_an_engine_imports_numpy_and_the_standard_library_alone() -> None:
     subject = remote(fault="tells its modules")
     scene = load_scene("a1")
-    from contactverif.mechanics.scene_arrays import pose_arrays
-
-    answer = subject.solve(pose_arrays(scene).arrays)
+    answer = subject.solve(scene.arrays())
     assert set(answer.message.split()) == {"contactverif", "numpy", "plain_engine"}
     assert answer.converged is False
 

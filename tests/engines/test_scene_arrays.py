@@ -14,12 +14,12 @@ from contactverif import MisuseError, Scene, load_scene
 from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.isolation.plain_msgpack import decode, encode
 from contactverif.mechanics.changed_scenes import turn
-from contactverif.mechanics.scene_arrays import pose_arrays
+from contactverif.mechanics.solving import engine_solution
 from contactverif.meshes.arrays_file import write_arrays
 
 
 def test_arrays_make_the_scene_again() -> None:
-    arrays = pose_arrays(load_scene("c:degrees=17")).arrays
+    arrays = load_scene("c:degrees=17").arrays()
     again = SceneArrays.from_arrays(arrays.to_arrays())
     for name, array in arrays.to_arrays().items():
         np.testing.assert_array_equal(again.to_arrays()[name], array)
@@ -29,7 +29,7 @@ def test_arrays_make_the_scene_again() -> None:
 
 def test_an_upright_scene_has_a_flat_interface_again() -> None:
     scene = load_scene("c:degrees=17")
-    arrays = pose_arrays(scene, upright=True).arrays
+    arrays = scene.arrays(upright=True)
     heights = arrays.nodes[np.unique(np.vstack([arrays.slave, arrays.master]))][:, 1]
     assert len(np.unique(heights)) == 1
     assert arrays.upright
@@ -42,28 +42,32 @@ def test_bodies_with_different_axes_cannot_be_upright_together() -> None:
     first, second = scene.bodies
     inclined = turn(scene, (0.6, 0.8)).bodies[1]
     with pytest.raises(MisuseError, match="bodies with different axes"):
-        pose_arrays(Scene((first, inclined), penalty=1.0), upright=True)
+        Scene((first, inclined), penalty=1.0).arrays(upright=True)
     assert second is scene.bodies[1]
 
 
 def test_a_body_that_nothing_holds_is_lowered_and_the_answer_counts_from_where_it_was() -> None:
     scene = load_scene("c")
-    pose = pose_arrays(scene, lowered=True)
+    pose = scene.pose(lowered=True)
     moved = pose.arrays.nodes - np.vstack([body.nodes for body in scene.bodies])
     lower = np.where(pose.arrays.body_of_node == 0, scene.bodies[0].start[1], 0.0)
     np.testing.assert_allclose(moved, np.column_stack([0 * lower, lower]), atol=1e-15)
     zero = EngineAnswer(np.zeros_like(pose.arrays.nodes), True)
-    np.testing.assert_array_equal(pose.solution(zero).displacements, moved[pose.interface_nodes])
+    starts = [0.0, scene.bodies[0].start[1]], [0.0, 0.0]
+    counts = [len(body.contact_nodes) for body in scene.bodies]
+    expected = np.repeat(starts, counts, axis=0)
+    np.testing.assert_allclose(engine_solution(scene, pose, zero).displacements, expected, atol=1e-15)
 
 
 @pytest.mark.parametrize("upright", [True, False])
 @pytest.mark.parametrize("scale", [1.0, 2.0**-10])
 def test_the_solution_is_that_of_the_scene_however_it_is_posed(upright: bool, scale: float) -> None:
     scene = load_scene("c:degrees=17")
-    pose = pose_arrays(scene, upright=upright, lowered=True, scale=scale)
-    forces = pose.solution(Plain().solve(pose.arrays)).forces
-    as_it_is = pose_arrays(scene)
-    np.testing.assert_allclose(forces, as_it_is.solution(Plain().solve(as_it_is.arrays)).forces, atol=1e-8 * 400)
+    pose = scene.pose(upright=upright, lowered=True, scale=scale)
+    solution = engine_solution(scene, pose, Plain().solve(pose.arrays))
+    as_it_is = scene.pose()
+    expected = engine_solution(scene, as_it_is, Plain().solve(as_it_is.arrays))
+    np.testing.assert_allclose(solution.forces, expected.forces, atol=1e-8 * 400)
 
 
 _items = st.recursive(

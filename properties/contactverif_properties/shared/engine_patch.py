@@ -17,7 +17,7 @@ from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.mechanics.accuracy import Solution
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.scene_arrays import solve_by_engine
+from contactverif.mechanics.solving import solve_by_engine
 from contactverif.problems.blocks import pressure_of
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_properties.shared.uniform_pressure import consistent_forces, gap_error, normal_of
