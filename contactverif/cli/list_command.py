@@ -88,7 +88,8 @@ def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
     from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 
     if not isinstance(item, Subject):
-        verb = "wraps another" if item.form.endswith("/NAME") else "loads a file"
+        verbs = {"/NAME": "wraps another", "=PATH": "loads a file", "=KIND": "has kinds"}
+        verb = next(words for ending, words in verbs.items() if item.form.endswith(ending))
         return f"{verb}, {item.form}{f': {item.summary}' if item.summary else ''}"
     statements = _statements(item.traits, every_trait) or ["nothing"]
     missing = ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides)

@@ -20,6 +20,8 @@ from contactverif.contract.interface import Interface, Surface
 
 BODIES = "bodies_"  # The prefix of the parameters that hold the bodies of a scene.
 _PREFIX = "parameter_"
+# The parameters of a state whose surfaces are apart, as a barrier needs it: two lengths.
+LEAST_GAP, ACTIVATION = "least_gap", "activation"
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +118,21 @@ class Case:
 
     @cached_property
     def shortest_segment(self) -> float:
-        """The length of the shortest current segment of both sides; ℓ in the tolerances."""
+        """The length of the shortest current segment of both sides."""
         interface, positions = self.interface, self.positions
         return float(min(interface.slave.lengths(positions).min(), interface.master.lengths(positions).min()))
+
+    @cached_property
+    def resolution(self) -> float:
+        """The length over which forces change; ℓ in the tolerances.
+
+        It is the shortest segment, and for a barrier the gap, or what is left of it to the activation distance, where
+        that is shorter.
+        """
+        if ACTIVATION not in self.parameters:
+            return self.shortest_segment
+        gap, activation = self.parameter(LEAST_GAP), self.parameter(ACTIVATION)
+        return min(self.shortest_segment, gap, activation - gap)
 
     @property
     def slave_length(self) -> float:

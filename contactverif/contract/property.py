@@ -29,6 +29,7 @@ LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says
 NONE_UNDECIDED = 3 / 2300
 PLANE = 2  # The number of coordinates of all interfaces.
 WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
+WITH_BARRIER = WITHOUT_BARRIER | {"barrier"}
 
 
 class Verdict(IntEnum):
@@ -204,7 +205,12 @@ class Property(PropertyInfo):
         if PLANE not in traits.abilities.dimensions:
             return "the interfaces are plane, and the formulation takes none of them"
         if traits.rules.enforcement in self.asks:
-            return self.applicable(traits)
+            unknown = traits.rules.enforcement == "barrier" and traits.rules.activation is None
+            return (
+                "the barrier does not state the trait `activation`, so no gap is known"
+                if unknown
+                else self.applicable(traits)
+            )
         if traits.rules.enforcement == "barrier" and "penalty" in self.asks:
             return "the states penetrate, where a barrier is not defined"
         return f"the enforcement is by a {traits.rules.enforcement}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from math import inf
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from contactverif.contract.errors import ContractError
@@ -134,6 +135,14 @@ class Rules:
         as ``"cells"``, but pressures and contact follow from gaps of the slave nodes by ``"closest point"``.
     force_along : Literal['master normal', 'slave normal'] | None
         The direction in which a contact point pushes: along the normal of its master segment, or of its slave segment.
+    activation : float | None
+        The largest distance at which a barrier pushes, over the length of `activation_unit`. A barrier that does not
+        state it is asked nothing.
+    activation_unit : Literal['segment', 'length']
+        The unit of `activation`: the shortest segment of both surfaces in the reference configuration, or a length.
+    penalty_power : float | None
+        The power of a length in the stiffness of a barrier: in a unit of length that is s times as small, it gets
+        s^penalty_power times its number. It is −1 for a pressure per length, and 0 for a force per length.
     """
 
     enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
@@ -141,9 +150,17 @@ class Rules:
     area: Literal["reference", "current"] | None = None
     gap: Literal["closest point", "slave normal", "cells", "cells and nodes"] | None = None
     force_along: Literal["master normal", "slave normal"] | None = None
+    activation: float | None = None
+    activation_unit: Literal["segment", "length"] = "segment"
+    penalty_power: float | None = None
 
     def __post_init__(self) -> None:
         _check_values(self, "rules")
+        for name, least in (("activation", 0.0), ("penalty_power", -inf)):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, int | float) and least < value < inf):
+                needed = "None or a number" + (" above 0" if name == "activation" else "")
+                raise ContractError(f"Traits.rules.{name}: found {value!r}; needed {needed}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,12 +177,18 @@ class Abilities:
         ``residual`` takes complex positions, so that the harness may use a complex step.
     takes_longdouble : bool
         ``residual`` takes positions in ``numpy.longdouble`` and computes in that precision.
+    motions : Literal['finite', 'small']
+        ``"small"``: normals are those of the reference configuration, so that the state is not turned.
+    chains : Literal['any', 'open']
+        ``"open"``: no chain of segments is closed. Of random states, those with a closed one are undecided.
     """
 
     dimensions: tuple[int, ...] = (2,)
     batched: bool = False
     takes_complex: bool = False
     takes_longdouble: bool = False
+    motions: Literal["finite", "small"] = "finite"
+    chains: Literal["any", "open"] = "any"
 
     def __post_init__(self) -> None:
         _check_values(self, "abilities")
@@ -320,7 +343,7 @@ def _listed_values(kind: type) -> dict[str, tuple[object, ...]]:
     for name, annotation in get_type_hints(kind).items():
         parts = (annotation,) if annotation is bool or get_origin(annotation) is Literal else get_args(annotation)
         values = [value for part in parts for value in _VALUES_OF_TYPES.get(part) or _words(part)]
-        if values:
+        if values and float not in parts:
             listed[name] = tuple(values)
     return listed
 

@@ -54,7 +54,7 @@ def symbol_numbers(case: Case) -> dict[str, float]:
         "u": UNIT_ROUNDOFF,
         "X": case.largest_coordinate,
         "S": float(np.abs(case.positions).max()),
-        "ℓ": case.shortest_segment,
+        "ℓ": case.resolution,
         "L": case.slave_length,
         "D": case.diameter,
         "N": float(case.n_segments),

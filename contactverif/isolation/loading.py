@@ -27,11 +27,11 @@ from contactverif.isolation.remote_formulation import RemoteFactory, RemoteSubje
 
 @dataclass(frozen=True, slots=True)
 class Wrapper:
-    """A name that stands for no formulation by itself: it needs another one, or a file."""
+    """A name that stands for no formulation by itself: it needs another one, a file, or a kind."""
 
     name: str
     summary: str  # The first line of the factory's docstring.
-    form: str  # What a user writes, `name/NAME` or `name:file=PATH`.
+    form: str  # What a user writes, `name/NAME`, `name:file=PATH` or `name:kind=KIND`.
 
 
 def python_program(file: str) -> tuple[str, ...]:

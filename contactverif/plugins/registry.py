@@ -47,7 +47,9 @@ _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time 
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _MARKS = ":/"  # They stand before options, and before the formulation that is wrapped.
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
-_FILE = "file"  # A factory that needs this option loads what a user names, and nothing without it.
+# {an option: its form} of loaders: without the option such a name stands for no formulation.
+_FILE = "file"
+_NEEDED = {_FILE: f"{_FILE}=PATH", "kind": "kind=KIND"}
 _NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
 _FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
 
@@ -63,7 +65,7 @@ def formulation_names() -> tuple[str, ...]:
 
 
 def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
-    """Return the names of the formulations that need neither another nor a file, sorted; all are loaded to tell."""
+    """Return the names of the formulations that need no other one, file or kind, sorted; all are loaded to tell."""
     if limits is None:
         installed = entries_by_name(FORMULATIONS)
         return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
@@ -273,16 +275,20 @@ def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
 
 
 def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
-    """Return the wrapper or loader of files of that name; None if it stands for a formulation or does not load."""
+    """Return the wrapper or loader of that name; None if it stands for a formulation or does not load."""
     make = load_entry(name, entries)
     if not callable(make):
         return None
     parameters = parameters_of(make)
-    needs_file = _FILE in parameters and parameters[_FILE].default is inspect.Parameter.empty
-    if not needs_file and not _wraps(parameters):
+    needed = next((f"{name}:{form}" for option, form in _NEEDED.items() if _is_needed(parameters, option)), "")
+    if not needed and not _wraps(parameters):
         return None
     summary = (inspect.getdoc(make) or "").partition("\n")[0].rstrip(".")
-    return Wrapper(name, summary, f"{name}:{_FILE}=PATH" if needs_file else f"{name}/NAME")
+    return Wrapper(name, summary, needed or f"{name}/NAME")
+
+
+def _is_needed(parameters: Mapping[str, inspect.Parameter], option: str) -> bool:
+    return option in parameters and parameters[option].default is inspect.Parameter.empty
 
 
 def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:

@@ -24,6 +24,7 @@ from contactverif.contract.first_questions import ask_first
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject
+from contactverif.problems.lifted_states import fit_to_traits
 from contactverif.problems.named_states import named_case
 from contactverif.sampling.blas_threads import one_thread
 
@@ -54,10 +55,13 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         Any error of the harness or the property itself, with the case as a note.
     """
     start = perf_counter()
+    case, refused = fit_to_traits(case, subject.traits)
 
     def outcome(verdict: Verdict, reason: str, *, breach: bool = False) -> Outcome:
         return Outcome(case, verdict, reason, seconds=perf_counter() - start, breach=breach)
 
+    if refused:
+        return outcome(Verdict.UNDECIDED, refused)
     try:
         with one_thread(), np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
             measurement = question.measure(case, subject)
@@ -164,11 +168,11 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
     is called. What else goes wrong here, the properties will say: then there are no answers.
     """
-    if isinstance(subject, EngineSubject) or subject.traits.rules.enforcement == "barrier":
-        return FirstCall()  # One has no forces to ask for, the other is not defined in penetration.
+    if isinstance(subject, EngineSubject):
+        return FirstCall()  # It has no forces to ask for.
     try:
         with one_thread(), np.errstate(all="ignore"):
-            first = ask_first(subject, named_case(STATES[0]), parts)
+            first = ask_first(subject, fit_to_traits(named_case(STATES[0]), subject.traits)[0], parts)
             opposite, seconds = _pulls_in_time(subject)
             if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
                 seconds = min(seconds, _pulls_in_time(subject)[1])
@@ -201,7 +205,7 @@ def _pulls(subject: Subject, state: str) -> bool:
     fails, and none of the numbers says why. Where anything else can explain the answer, this returns False.
     """
     try:
-        return _push(subject, named_case(state)) < 0
+        return _push(subject, fit_to_traits(named_case(state), subject.traits)[0]) < 0
     except ContractError:
         return False
 

@@ -11,7 +11,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
@@ -32,7 +32,7 @@ WORK = Quantity(
 )
 
 
-_define = partial(Property.define, family="balance", cases=Cases.random(any_cases))
+_define = partial(Property.define, family="balance", cases=Cases.random(any_cases), asks=WITH_BARRIER)
 
 
 @_define(id="balance.force", quantities=(FORCE_IMBALANCE,), promise=lambda traits: traits.promises.conserves_force)
@@ -99,6 +99,7 @@ def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState,
     quantities=(ASYMMETRY, WORK),
     cases=Cases.random(smooth_cases),
     promise=lambda traits: traits.promises.symmetric,
+    asks=WITH_BARRIER,
 )
 def symmetric(case: Case, subject: Subject) -> Measurement:
     """The tangent is symmetric, and the forces do no work in a closed loop inside one pairing.
@@ -117,8 +118,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     over r. A formulation that says that its tangent is approximate is asked for the matrix alone.
 
     Without a pairing, a loop in which work is left and that may cross a kink is followed by one with r = 2^-15 ℓ, then
-    by one with 2^-20 ℓ. Kinks are looked for at √2 r along the two directions that span a circle, which none within the
-    circle escapes.
+    by one with 2^-20 ℓ; those of a barrier are too, since its forces bend where they begin. Kinks are looked for at √2
+    r along the two directions that span a circle, which none within the circle escapes.
 
     **Undecided.** A loop in which work is left is undecided where the formulation has no pairing, and a kink is nearer
     than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
@@ -131,13 +132,17 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
         values[ASYMMETRY] = roundoff.ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
         tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance)
     if subject.traits.promises.tangent != "approximate":
-        for share in RADII if state.pairing is None else RADII[:1]:
-            radius = share * case.shortest_segment
+        # A barrier begins with a jump in the curvature of its forces, which a loop may cross on a frozen pairing, too.
+        steady = state.pairing is not None and subject.traits.rules.enforcement != "barrier"
+        for share in RADII[:1] if steady else RADII:
+            radius = share * case.resolution
             values[WORK] = largest_work(state, radius)
             tolerances[WORK] = 64 * UNIT_ROUNDOFF * distance / radius
             undecided = ""
-            if values[WORK] <= tolerances[WORK] or state.pairing is not None:
+            if values[WORK] <= tolerances[WORK]:
                 break
+            if state.pairing is not None:
+                continue
             directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
             # Two directions of a plane that reach √2 as far enclose the circle.
             kinks = (find_kink(state, np.sqrt(2) * radius, direction) for direction in directions)

@@ -12,8 +12,9 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, freeze_state
@@ -30,14 +31,30 @@ TURNED_FORCES = Quantity("error of the forces after a rotation", roundoff.SEGMEN
 TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
 
 
-_define = partial(Property.define, family="invariants", promise=lambda traits: True)
+def refuse_unknown_unit(traits: Traits) -> str:
+    """Return why the number of the penalty in another unit of length is unknown, or an empty string."""
+    if traits.rules.enforcement != "barrier":
+        return refuse_unstated_penalty(traits)
+    if traits.rules.activation_unit == "length":
+        return "the activation distance of the barrier is a length, which another unit would change"
+    return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"
+
+
+def penalty_power(traits: Traits) -> float:
+    """Return the power of a length in the penalty."""
+    if traits.rules.enforcement == "barrier":
+        return traits.rules.penalty_power or 0.0
+    return -1.0 if traits.rules.penalty == "distributed" else 0.0
+
+
+_define = partial(Property.define, family="invariants", promise=lambda traits: True, asks=WITH_BARRIER)
 
 
 @_define(
     id="scaling",
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=Cases.random(any_cases),
-    applicable=refuse_unstated_penalty,
+    applicable=refuse_unknown_unit,
 )
 def scaling(case: Case, subject: Subject) -> Measurement:
     """Another unit of length changes nothing, so no absolute tolerance is hidden.
@@ -65,7 +82,7 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     z_there = np.concatenate([z[:n] * factor, z[n:] * (1.0 if distributed else factor)])
     case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
-    there = FrozenState.at(subject.with_penalty(penalty / (factor if distributed else 1.0)), case_there)
+    there = FrozenState.at(subject.with_penalty(penalty * factor ** penalty_power(subject.traits)), case_there)
     (forces,), tangents = ask_forces_and_tangents(state)
     (forces_there,), tangents_there = ask_forces_and_tangents(there)
     forces, forces_there = forces[:n], forces_there[:n]
@@ -90,6 +107,9 @@ def turn_state(case: Case) -> tuple[Case, FloatArray]:
     id="objectivity",
     quantities=(TURNED_FORCES, TURNED_TANGENT),
     cases=Cases.random(smooth_cases),
+    applicable=lambda traits: (
+        "normals are those of the reference configuration" if traits.abilities.motions == "small" else ""
+    ),
     usual_undecided=0.003,
 )
 def objectivity(case: Case, subject: Subject) -> Measurement:

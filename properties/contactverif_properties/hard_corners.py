@@ -21,7 +21,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import WITHOUT_BARRIER, Property
+from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.flat_states import touching_states
@@ -206,8 +206,6 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
     cases=Cases.from_list(touching_states),
     promise=lambda traits: True,
-    asks=WITHOUT_BARRIER | {"barrier"},
-    applicable=lambda traits: "a barrier is infinite in touch" if traits.rules.enforcement == "barrier" else "",
 )
 def hard_touch(case: Case, subject: Subject) -> Measurement:
     """Surfaces that touch, or miss each other by 1e-16, give neither a force nor a wrong stiffness.

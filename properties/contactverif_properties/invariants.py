@@ -13,7 +13,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases
@@ -64,7 +64,7 @@ def reflect(points: FloatArray) -> FloatArray:
     return points * [-1.0, 1.0] + 0.0
 
 
-_define = partial(Property.define, family="invariants", promise=lambda traits: True)
+_define = partial(Property.define, family="invariants", promise=lambda traits: True, asks=WITH_BARRIER)
 
 
 @_define(id="mirror", quantities=IN_MIRROR, cases=Cases.random(smooth_cases))
@@ -171,7 +171,13 @@ def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
     return {FAR: smooth_cases(), BEHIND: behind}
 
 
-@_define(id="remote", quantities=BESIDE_OTHERS, cases=Cases.by_kind(remote_cases), kinds=(FAR, BEHIND))
+@_define(
+    id="remote",
+    quantities=BESIDE_OTHERS,
+    cases=Cases.by_kind(remote_cases),
+    kinds=(FAR, BEHIND),
+    asks=WITHOUT_BARRIER,  # The bodies that are added penetrate each other.
+)
 def remote(case: Case, subject: Subject) -> Measurement:
     """A body that touches nothing, far away or behind the master, changes nothing.
 

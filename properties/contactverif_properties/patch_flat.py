@@ -16,7 +16,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.errors import ContractError
 from contactverif.contract.measurement import Measurement, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -51,6 +51,7 @@ _define = partial(Property.define, family="patch")
     cases=Cases.random(flat_cases),
     promise=lambda traits: traits.promises.patch.flat,
     exact=uniform_pressure.forces_of_penetration,
+    asks=WITH_BARRIER,
 )
 def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     """A uniform penetration of a flat interface gives the exact nodal forces on both sides.
@@ -66,7 +67,8 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     is a difference of coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation,
     because the state is turned and moved, and stored as it is rounded; `stability.local` asks on states that are exact.
     With multipliers only the distribution of the forces is judged, and not their size: of uniform multipliers if they
-    are pressures, and of those that come nearest to the exact forces if they are nodal forces.
+    are pressures, and of those that come nearest to the exact forces if they are nodal forces. Of a barrier, whose
+    slave is lifted to a uniform gap, the distribution is judged, too.
 
     **Undecided.** Never: every slave point faces the master's interior, and at a kink of a flat interface both partners
     give the same gap.
@@ -155,7 +157,7 @@ def _measure_once(case: Case, subject: Subject) -> Measurement:
     transmission = uniform_pressure.measure_transmission(FORCE, case, subject)
     numbers = [*transmission.numbers]
     state = uniform_pressure.uniform_state(case, subject)
-    if state.has_points:
+    if state.has_points and subject.traits.rules.enforcement != "barrier":  # Its gaps are open, its pressures its own.
         tolerance = gap_tolerance(case, case.parameter("penetration"))
         gap, pressure = point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
         numbers.append(GAP.check(gap, tolerance))
@@ -203,6 +205,7 @@ _define_class = partial(
     quantities=(FORCE, GAP, PRESSURE),
     exact=uniform_pressure.forces_of_penetration,
     usual_undecided=WITHOUT_TOLERANCE,
+    asks=WITH_BARRIER,
 )
 
 

@@ -155,13 +155,13 @@ def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
     errors /= np.linalg.norm(exact, axis=1).max()
     values = {
-        STRESS: _stress_error(problem, scene, q),
+        STRESS: kink_stress_error(problem, scene, q),
         SLAVE: float(errors[:n_slave].max()),
         MASTER: float(errors[n_slave:].max()),
     }
     if _knows_its_pressure(contact, traits):
         values[PRESSURE] = _pressure_error(contact.points, pressure)
-    floor = _floor(problem, start, gap)
+    floor = kink_floor(problem, start, gap)
     tolerances = dict.fromkeys(values, floor + problem.contraction) | {STRESS: floor}
     if multiplier or not refuse_unknown_total(traits):
         values[APPROACH] = _approach_error(scene, q, uniform[: scene.n_free], gap)
@@ -207,8 +207,8 @@ def _add_three_normals(
         solution = solve_for_accuracy(scene, subject)
         if solution.trace is None or not solution.balanced:
             break
-        errors.append(_stress_error(stiff, scene, solution.trace.solution))
-        floors.append(_floor(stiff, solution.state, stiff.pressure / penalty))
+        errors.append(kink_stress_error(stiff, scene, solution.trace.solution))
+        floors.append(kink_floor(stiff, solution.state, stiff.pressure / penalty))
     if len(errors) < 2:
         reason = f"Newton's method with three normals: {solution.end}"
         return measurement if fails else Measurement(undecided=reason, details=measurement.details)
@@ -220,7 +220,7 @@ def _add_three_normals(
     return replace(measurement, numbers=numbers, details=details)
 
 
-def _floor(problem: KinkedPatch, state: Case, gap: float) -> float:
+def kink_floor(problem: KinkedPatch, state: Case, gap: float) -> float:
     """Return T = (g/ℓ) tan(φ/2) (4 + tan(φ/2) tan(φ)/2) + u (8X/g + 4N)."""
     half = problem.sharpest  # With t = tan(φ/2), tan(φ) = 2t/(1 − t²).
     moved = gap / state.shortest_segment * half * (4 + half**2 / (1 - half**2))
@@ -243,7 +243,7 @@ def _approach_tolerance(problem: KinkedPatch, state: Case, forces: float) -> flo
     return float(((1 + bent) * forces + problem.contraction) / sine)
 
 
-def _stress_error(problem: KinkedPatch, scene: Scene, q: FloatArray) -> float:
+def kink_stress_error(problem: KinkedPatch, scene: Scene, q: FloatArray) -> float:
     """Return the largest entry of σ + p I at the Gauss points over p."""
     exact = np.array([-problem.pressure, -problem.pressure, 0.0])
     return max(float(np.abs(stresses - exact).max()) for stresses in scene.stresses(q)) / problem.pressure

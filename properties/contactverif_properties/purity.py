@@ -11,8 +11,9 @@ from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
 from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
+from contactverif.problems.lifted_states import fit_to_traits
 from contactverif.problems.named_states import named_case
 from contactverif_properties.shared import interleaved_calls
 from contactverif_properties.shared.any_state import any_cases, prepare_state
@@ -69,6 +70,7 @@ FIRST_TANGENT = Quantity(
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),
     promise=lambda traits: True,
+    asks=WITH_BARRIER,
 )
 def purity(case: Case, subject: Subject) -> Measurement:
     """An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.
@@ -105,7 +107,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
     formulation, state = prepare_state(case, subject)
     penalty = state.penalty if state.n_multipliers else subject.penalty(case)
     interface, z = state.interface, state.z
-    distant = z + np.random.default_rng(state.seed).uniform(-1, 1, z.size) * state.shortest_segment / 4
+    distant = z + np.random.default_rng(state.seed).uniform(-1, 1, z.size) * state.resolution / 4
     near = z + NEAR * (distant - z)
     other, z_other = interleaved_calls.renumber(state, formulation)
     before = _fingerprint(interface), _fingerprint(other)
@@ -175,6 +177,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
     quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
     cases=Cases.from_list(lambda: (named_case("offset-c"),)),
     promise=lambda traits: True,
+    asks=WITH_BARRIER,
 )
 def purity_long(case: Case, subject: Subject) -> Measurement:
     """The first answers of an instance and of a process are those that a long life repeats.
@@ -196,10 +199,12 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never.
     """
-    first = subject.first_answers or ask_first(subject, named_case("a1"), subject.provides)
+    first = subject.first_answers
+    if first is None:
+        first = ask_first(subject, fit_to_traits(named_case("a1"), subject.traits)[0], subject.provides)
     formulation, state = prepare_state(case, subject)
     random = np.random.default_rng(state.seed)
-    moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.shortest_segment
+    moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.resolution
     question = interleaved_calls.Question(state.interface, formulation.pair(state.interface, state.z), state.z)
     changed, pairs_otherwise = interleaved_calls.count_changes_in_life(formulation, question, state.z + NEAR * moves)
     numbers = [IN_LIFE.check(changed, 0.0), *_compare_first(first, subject, random)]
@@ -211,7 +216,7 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
 def _compare_first(first: FirstAnswers, subject: Subject, random: np.random.Generator) -> list[CheckedNumber]:
     """Return the differences of the first answers of a process from those that it gives now."""
     case, formulation = first.case, subject.for_case(first.case)
-    near = case.z + NEAR * random.uniform(-1, 1, case.z.size) * case.shortest_segment
+    near = case.z + NEAR * random.uniform(-1, 1, case.z.size) * case.resolution
     pairing = formulation.pair(case.interface, case.z)
 
     def ask(verb: str) -> Array:
@@ -252,7 +257,7 @@ def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> 
     stiffness = max(case.penalty * case.slave_length, slope)  # The slope counts where the law is stiffer than ε̂.
     largest = np.abs(forces).max(axis=-1)
     # Each state has its own size: where one of the two just touches, its forces say nothing about those of the other.
-    moved = case.largest_coordinate * (stiffness + largest / case.shortest_segment) + case.n_segments * largest
+    moved = case.largest_coordinate * (stiffness + largest / case.resolution) + case.n_segments * largest
     differences = np.maximum(np.abs(batch[0] - forces), np.abs(batch[1] - forces[::-1])[::-1]).max(axis=-1)
     return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
 
@@ -265,7 +270,7 @@ def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_
     way = float(np.abs(near - case.z).max())
     slope = float(np.abs(tangents[1] - tangents[0]).max()) / way if way > 0 else 0.0
     largest = np.abs(tangents).max(axis=(1, 2))
-    moved = case.largest_coordinate * np.maximum(slope, largest / case.shortest_segment) + case.n_segments * largest
+    moved = case.largest_coordinate * np.maximum(slope, largest / case.resolution) + case.n_segments * largest
     differences = np.abs(in_one_call - tangents).max(axis=(1, 2))
     return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
 

@@ -6,17 +6,18 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import BoolArray, FloatArray
-from contactverif.contract.case import Case
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
@@ -38,6 +39,14 @@ REASON = "An open contact is left out, not rounded away."
 OPEN = Quantity("force across an open gap", "0", REASON)
 DISTANT = Quantity("force far from the contact zone", "0", REASON)
 PULL_OF_POINT = Quantity("pull of a contact point", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
+N_HALVINGS = 20
+LEAST_GROWTH = 1.01
+GROWTH = Quantity(
+    "growth of a barrier's force at half the gap",
+    "1.01",
+    "The force of a barrier has no bound. A law with a bound hardly grows where the gap is small.",
+    sense="at least",
+)
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 HALF = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
 PULL_OF_NODE = Quantity("pull of a node", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
@@ -88,7 +97,9 @@ def _slave_places(case: Case) -> FloatArray:
 _define = partial(Property.define, family="invariants", cases=Cases.by_kind(pushing_cases), kinds=(FLAT, ANY_SHAPE))
 
 
-@_define(id="unilateral", quantities=(OPEN, DISTANT, PULL_OF_POINT), promise=lambda traits: True)
+@_define(
+    id="unilateral", quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH), promise=lambda traits: True, asks=WITH_BARRIER
+)
 def unilateral(case: Case, subject: Subject) -> Measurement:
     """Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.
 
@@ -114,10 +125,17 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
     tolerance of a row is u(8X/min(g, ℓ) + 4N). Where springs act twice, an inactive row must have the sign of λ alone.
     A row with another size, or of the other form, breaks the contract.
 
+    A barrier pushes across a gap, up to its activation distance. Beyond that, at 1.01 times and twice the distance,
+    its forces must be exactly 0. The fourth number is the least factor by which the force on the flat slave grows
+    where the gap is halved, down to 2^-20 of what it was or to where rounding the positions decides the gap. A law that
+    has a bound grows by 1 + 2^-20 there, the slowest that has none in use, a logarithm, by 1.03.
+
     **Undecided.** A case in which nothing begins is undecided if moving the nodes by 64 u X makes contact begin one way
     and not another: a node that faces a free end exactly is over the master or not, as roundoff decides. Where contact
     begins whichever way the nodes move, the case fails.
     """
+    if subject.traits.rules.enforcement == "barrier" and "penetration" in case.parameters:
+        return measure_barrier(case, subject)
     if "penetration" in case.parameters:
         measurement = measure_flat_contact(case, subject)
         if measurement.broken or measurement.undecided or subject.traits.rules.enforcement != "multiplier":
@@ -160,6 +178,26 @@ def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     elif _push_of_slave(pushes, case) < 0:
         broken = OPPOSITE_SIGN
     return Measurement(check_all(values | pull, tolerances | tolerance), undecided, broken, idle=bool(undecided))
+
+
+def measure_barrier(case: Case, subject: Subject) -> Measurement:
+    """Open the uniform gap of a flat interface beyond the activation distance, and halve it again and again."""
+    formulation, gap, activation = subject.for_case(case), case.parameter("penetration"), case.parameter(ACTIVATION)
+
+    def forces_at(height: float) -> FloatArray:
+        return FrozenState.at(formulation, lift_slave(case, height - gap)).forces
+
+    least = max(2.0**-N_HALVINGS * gap, 2.0**20 * UNIT_ROUNDOFF * case.largest_coordinate)
+    gaps = gap * 2.0 ** -np.arange(N_HALVINGS + 1)
+    pushes = [_push_of_slave(forces_at(each), case) for each in gaps[gaps >= least]]
+    size = max(abs(pushes[0]), np.finfo(float).tiny)
+    values = {OPEN: max(float(np.abs(forces_at(share * activation)).max()) for share in (1.01, 2.0)) / size}
+    if len(pushes) > 1:
+        values[GROWTH] = min(closer / farther if farther > 0 else 0.0 for farther, closer in pairwise(pushes))
+    broken = "nothing begins within the activation distance" if not pushes[0] else ""
+    if pushes[0] < 0:
+        broken = OPPOSITE_SIGN
+    return Measurement(check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH}), broken=broken)
 
 
 def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:

@@ -15,7 +15,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.interface import Surface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.pairing import Pairing
-from contactverif.contract.property import Property, Verdict, judge
+from contactverif.contract.property import WITH_BARRIER, Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.any_state import freeze_state, random_directions
@@ -60,6 +60,7 @@ COMPLEX = Quantity(
     cases=Cases.random(smooth_cases),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
+    asks=WITH_BARRIER,
 )
 def tangent_directional(case: Case, subject: Subject) -> Measurement:
     """The tangent is the derivative of the residual on a frozen pairing.
@@ -92,7 +93,7 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
     fails, unless all of these pairings give the same forces to roundoff, in all states that differences are taken of.
     """
     state = freeze_state(case, subject)
-    case, shortest = state.case, state.case.shortest_segment
+    case, shortest = state.case, state.case.resolution
     directions = first_directions(case, N_DIRECTIONS)
     undecided, broken = _check_pairing(state, directions)
 
@@ -175,7 +176,7 @@ def compare(state: FrozenState, directions: FloatArray, length: float) -> Compar
     best = errors.max(axis=2).argmin(axis=0)
     closest = np.take_along_axis(slopes, best[None, :, None], axis=0)[0]
     third = np.abs(slopes[0] - slopes[1]).max(axis=0) / (central[0] ** 2 - central[1] ** 2)  # Third derivative / 6.
-    turns = third * case.shortest_segment**2
+    turns = third * case.resolution**2
     sizes = _row_sizes(state, np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
     error, finding = _worst_row(case, errors.min(axis=0), sizes, derivative, closest)
     forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
@@ -220,7 +221,7 @@ def _worst_row(
     Rounding the positions moves the ends of what a point, a cell or an area reaches by uS. A node that is reached by no
     more than that has a derivative of uS/ℓ of the largest one, and whether it is 0 or as large is no error.
     """
-    dust = UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment * np.abs(difference).max()
+    dust = UNIT_ROUNDOFF * case.largest_coordinate / case.resolution * np.abs(difference).max()
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.where(errors > dust, errors / sizes, 0.0)
     number, row = divmod(int(relative.argmax()), relative.shape[1])
@@ -265,7 +266,7 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
     is one whose changes do not count, as those of points that are not active.
     """
     case, direction = state.case, directions[0]
-    step = _central_steps(case, case.shortest_segment)[-1]
+    step = _central_steps(case, case.resolution)[-1]
 
     def pair(shifts: Iterable[float]) -> list[Pairing | None]:
         return [state.formulation.pair(case.interface, case.z + shift * step * direction) for shift in shifts]
@@ -286,8 +287,8 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
 def _change_forces(pairings: Sequence[Pairing | None], state: FrozenState, directions: FloatArray) -> bool:
     """Return whether any pairing changes the residual by more than roundoff, where differences are taken of it."""
     case = state.case
-    central = _central_steps(case, case.shortest_segment)
-    steps = np.concatenate([central, -central, np.array(TAYLOR_STEPS) * case.shortest_segment])
+    central = _central_steps(case, case.resolution)
+    steps = np.concatenate([central, -central, np.array(TAYLOR_STEPS) * case.resolution])
     moves = (steps[:, None, None] * directions).reshape(-1, case.z.size)
     places = np.concatenate([case.z[None], case.z + moves])
     forces = state.residual_at(places)

@@ -15,7 +15,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Finding, Measurement
-from contactverif.contract.property import Property
+from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.problems.long_states import long_states
 from contactverif.strategies import smooth_cases
@@ -40,6 +40,7 @@ _define = partial(
     quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
+    asks=WITH_BARRIER,
 )
 
 
@@ -215,7 +216,7 @@ class _Sides:
         dtype = np.float64 if judge.by_complex_step else judge.dtype
         directions = single_moves(columns, judge.groups.size).directions()
         ahead, behind = differences_on_both_sides(judge.state, directions, dtype)
-        return cls(ahead, behind, judge.tangent[:, columns].T, step(case, dtype) / case.shortest_segment)
+        return cls(ahead, behind, judge.tangent[:, columns].T, step(case, dtype) / case.resolution)
 
     def in_row(self, judge: BlockJudge, row: int) -> _Sides:
         """Return the rows of a node or multiplier alone."""

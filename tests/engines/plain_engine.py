@@ -120,10 +120,12 @@ def contact(scene, positions, fault, calls):
             xi = (s - s1) / (s2 - s1)
             points = positions[first] + s[:, None] * along
             feet = positions[head] + xi[:, None] * (positions[tail] - positions[head])
-            gap = (points - feet) @ normal
+            gap = (points - feet) @ normal - 1e-6 * (fault == "thick surfaces")
             weights = penalty * length * (high - low) * WEIGHTS * (gap < 0)
             if fault == "short cells are left out" and length * (high - low) < 0.3:
                 weights *= 0.999
+            if fault == "a tiny edge spoils the first one" and number == 0 and shortest(scene) < 1e-3:
+                weights *= 0.9
             if fault == "the first edge is soft" and number == 0:
                 weights *= 0.9
             if fault == "the second node gets more":
@@ -134,6 +136,12 @@ def contact(scene, positions, fault, calls):
             block = np.einsum("ap,p,bp,i,j->aibj", shapes, weights, shapes, normal, normal).reshape(8, 8)
             stiffness[np.ix_(unknowns, unknowns)] += block
     return forces, stiffness
+
+
+def shortest(scene):
+    """Return the length of the shortest contact edge."""
+    edges = np.vstack([scene.slave, scene.master])
+    return np.hypot(*(scene.nodes[edges[:, 1]] - scene.nodes[edges[:, 0]]).T).min()
 
 
 def changes(scene, fault, calls):

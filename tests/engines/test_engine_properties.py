@@ -1,4 +1,4 @@
-"""Each question about two scenes catches an engine with the fault that it is about, and accuses no right one."""
+"""Each question for engines alone catches an engine with the fault that it is about, and accuses no right one."""
 
 import pytest
 from plain_engine import Plain
@@ -16,6 +16,10 @@ MUTANTS = {
     "engine.swap": "",  # Springs along the slave's normals are no two-sided method.
     "engine.objectivity": "upright normals",
     "engine.remote": "as stiff as the mean body",
+    "engine.c": "the second node gets more",
+    "engine.short-segment": "a tiny edge spoils the first one",
+    "engine.zero-load": "thick surfaces",
+    "engine.kinked": "upright normals",
 }
 EXAMPLES = 12
 
@@ -28,8 +32,9 @@ def question_of(name: str) -> Property:
 
 def verdicts(name: str, engine: Plain) -> list[Verdict]:
     question, subject = question_of(name), EngineSubject("engine/plain", engine)
-    key = Sampling(examples=EXAMPLES, seed=1).key(question)
-    cases = draw_cases(question.cases(None), seed=key, examples=EXAMPLES).cases
+    cases = question.cases(None)
+    if not isinstance(cases, tuple):
+        cases = draw_cases(cases, seed=Sampling(examples=EXAMPLES, seed=1).key(question), examples=EXAMPLES).cases
     return [judge_case(question, case, subject).verdict for case in cases]
 
 
@@ -44,7 +49,7 @@ def test_the_mutant_is_caught(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name, fault in MUTANTS.items() if fault])
 def test_a_right_engine_passes(name: str) -> None:
-    assert verdicts(name, Plain()) == [Verdict.PASS] * EXAMPLES
+    assert set(verdicts(name, Plain())) == {Verdict.PASS}
 
 
 def test_nobody_is_turned_who_takes_no_inclined_supports() -> None:

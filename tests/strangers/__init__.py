@@ -10,6 +10,7 @@ from typing import Any
 from strangers.discontinuous_mortar import DiscontinuousMortar
 from strangers.gauss_closest import GaussClosest
 from strangers.half_passes import HalfPasses
+from strangers.log_barrier import LogBarrier
 from strangers.middle_line import MiddleLine
 from strangers.nodal_least_squares import NodalLeastSquares
 from strangers.node_to_segment import NodesWithAreas, NodesWithMultipliers, NodesWithPotential
@@ -38,4 +39,5 @@ STRANGERS: dict[str, Callable[..., Any]] = {
     "nodes with areas of the reference": NodesWithPotential,
     "nodes with multipliers": NodesWithMultipliers,
     "springs on the middle line": MiddleLine,
+    "a logarithmic barrier on both sides": LogBarrier,
 }

@@ -37,7 +37,7 @@ def prepare_state(case: Case, subject: Subject) -> tuple[CheckedFormulation, Cas
     formulation = subject.for_case(case)
     if not formulation.n_multipliers(case.interface):
         return formulation, case
-    low, high = (share * case.shortest_segment for share in (SMALLEST, LARGEST))
+    low, high = (share * case.resolution for share in (SMALLEST, LARGEST))
     formulation = subject.with_penalty(1.0)
     random = np.random.default_rng([case.seed, 1])  # Other numbers than those that the property draws for itself.
     multipliers = random.uniform(low, high, formulation.n_multipliers(case.interface))

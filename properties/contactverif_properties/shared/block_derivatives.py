@@ -161,17 +161,17 @@ def _colours(contacts: sparse.csr_array) -> list[list[int]]:
 def roundoff(case: Case, dtype: type) -> float:
     """Return u S/ℓ in a precision; u is 2⁻⁵³ for doubles."""
     unit = UNIT_ROUNDOFF if dtype is np.float64 else float(np.finfo(dtype).eps) / 2
-    return unit * case.largest_coordinate / case.shortest_segment
+    return unit * case.largest_coordinate / case.resolution
 
 
 def step(case: Case, dtype: type) -> float:
     """Return the step h = ℓ (u S/ℓ)^(1/3), a length, at which truncation and roundoff are equal."""
-    return case.shortest_segment * float(np.cbrt(roundoff(case, dtype)))
+    return case.resolution * float(np.cbrt(roundoff(case, dtype)))
 
 
 def differences_by_complex_step(state: FrozenState, directions: FloatArray) -> FloatArray:
     """Return Im R(x + ihd)/h (n_directions, size) along directions d (n_directions, size) at a state x."""
-    h = state.case.shortest_segment * COMPLEX_STEP
+    h = state.case.resolution * COMPLEX_STEP
     forces = state.residual_at(state.case.z + 1j * h * directions)
     return np.asarray(forces.imag / h, dtype=np.float64)
 

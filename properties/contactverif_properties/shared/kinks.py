@@ -113,7 +113,7 @@ def _measure_curvature(state: FrozenState, directions: FloatArray, columns: IntA
     is lost in the error of differences. A longer way shows it, as long as the answer is smooth.
     """
     z, share = state.case.z, _rounding_share(state.case)
-    frozen, way = _pair_at(state, z), state.case.shortest_segment * share ** (1 / 6)
+    frozen, way = _pair_at(state, z), state.case.resolution * share ** (1 / 6)
     curvature = 0.0
     for direction in directions:
         back, forth = (_differentiate(frozen, z + sign * way * direction, columns) for sign in (-1, 1))
@@ -133,7 +133,7 @@ def _forces(state: FrozenState, z: FloatArray) -> FloatArray:
 
 def _differentiate(state: FrozenState, z: FloatArray, columns: IntArray | None = None) -> FloatArray:
     """Return the derivative of the forces at z, or columns of it, on the pairing of a state, by central differences."""
-    step = state.case.shortest_segment * _rounding_share(state.case) ** (1 / 3)
+    step = state.case.resolution * _rounding_share(state.case) ** (1 / 3)
     moves = step * np.eye(z.size)
     moves = moves if columns is None else moves[columns]
     forces = state.residual_at(np.concatenate([z + moves, z - moves]))
@@ -143,7 +143,7 @@ def _differentiate(state: FrozenState, z: FloatArray, columns: IntArray | None =
 
 def _rounding_share(case: Case) -> float:
     """Return uX/ℓ, the rounding of a coordinate over the shortest segment."""
-    return UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
+    return UNIT_ROUNDOFF * case.largest_coordinate / case.resolution
 
 
 def explain_by_rounded_decision(state: FrozenState) -> str:
@@ -185,6 +185,6 @@ def find_kink(state: FrozenState, reach: float, direction: FloatArray | None = N
     slope = np.abs(ahead - behind).max() / 2
     # A smooth function bends by slope × reach/ℓ and by what roundoff does; a kink bends by as much as the slope itself.
     rounding = 32 * UNIT_ROUNDOFF * case.largest_coordinate / reach
-    if bend > slope * max(np.sqrt(reach / case.shortest_segment), rounding):
+    if bend > slope * max(np.sqrt(reach / case.resolution), rounding):
         return f"a kink: one-sided differences over {reach:.2g} disagree by {bend / max(slope, bend):.2g}"
     return ""

@@ -1,7 +1,8 @@
 """The tolerances that several properties share: what roundoff alone may do to a force, each formula with its reason.
 
 Symbols: u = 2⁻⁵³; X is the largest coordinate; Z is X, or the diameter D of a formulation that promises
-`translation_stable` (`rounding_distance`); g is the penetration; ℓ is the shortest segment; L is the slave's
+`translation_stable` (`rounding_distance`); g is the penetration; ℓ is the shortest segment, or for
+a barrier its gap (`Case.resolution`); L is the slave's
 length; N is the number of segments of both sides. Where the penetration varies, g is the uniform one that would give
 the same forces, Σ|R| / (ε̂ L). `docs/concepts/tolerances.md` has the whole list.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
-from contactverif.contract.case import Case
+from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.measurement import Quantity
 from contactverif.contract.traits import Traits
 
@@ -44,8 +45,11 @@ def sum_larger_forces(case: Case, forces: Array) -> float:
 def mean_penetration(case: Case, forces: Array) -> float:
     """Return the uniform penetration, a length, that would need the same Σ|R| over the slave: Σ|R| / (ε̂ L).
 
-    Where half passes push the master alone, Σ|R| is that of the master.
+    Where half passes push the master alone, Σ|R| is that of the master. A barrier has no such penetration; its forces
+    change over the gap, or over what is left of it to the activation distance.
     """
+    if ACTIVATION in case.parameters:
+        return case.resolution
     whole = sum_slave_forces(case, forces) or sum_larger_forces(case, forces)
     return whole / (case.penalty * case.slave_length)
 
@@ -75,7 +79,7 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
     any tolerance serves.
     """
     penetration = mean_penetration(case, forces)
-    reach = min(penetration, case.shortest_segment) if penetration > 0 else case.shortest_segment
+    reach = min(penetration, case.resolution) if penetration > 0 else case.resolution
     return UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
 
 

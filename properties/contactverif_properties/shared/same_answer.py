@@ -115,7 +115,7 @@ def compare(
 
     The sizes are the larger of both states. The detail `BITS` counts entries that are not equal to the last bit.
     """
-    penalty, multiplier = subject.penalty(case), SHARE * case.shortest_segment
+    penalty, multiplier = subject.penalty(case), SHARE * case.resolution
     (first, forces, tangent), (second, forces_there, tangent_there) = (
         _ask(state, subject, penalty, multiplier) for state in (case, other)
     )

@@ -81,9 +81,12 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
     With multipliers only the distribution of the forces can be right or wrong, and not their size. Uniform multipliers
     count if they are pressures, scaled to the exact total. If they are nodal forces, those count that come nearest to
     the exact forces. The second number is the largest multiplier over the mean one, by which roundoff grows; it is 1
-    without nodal multipliers.
+    without nodal multipliers. Of a barrier, whose law is its own, the forces are scaled to the exact total, too.
     """
     state = uniform_state(case, subject)
+    n = case.interface.n_slave_nodes
+    if subject.traits.rules.enforcement == "barrier":
+        return _scale_to_total(-state.forces, exact, n), 1.0
     if not state.case.n_multipliers:
         return -state.forces, 1.0
     transfer = -unit_forces(state)
@@ -92,11 +95,14 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
         mean = float(np.abs(multipliers).mean())
         largest = float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
         return (transfer @ multipliers).reshape(-1, 2), largest
-    nodal: FloatArray = (transfer @ state.case.multipliers).reshape(-1, 2)
-    n = case.interface.n_slave_nodes
-    total, exact_total = nodal[:n].sum(axis=0), exact[:n].sum(axis=0)
+    return _scale_to_total((transfer @ state.case.multipliers).reshape(-1, 2), exact, n), 1.0
+
+
+def _scale_to_total(forces: FloatArray, exact: FloatArray, n_slave: int) -> FloatArray:
+    """Return forces (n_nodes, 2) times the factor with which those on the slave press as the exact ones do."""
+    total, exact_total = forces[:n_slave].sum(axis=0), exact[:n_slave].sum(axis=0)
     projection = float(total @ exact_total)
-    return nodal * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0), 1.0
+    return forces * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0)
 
 
 def measure_transmission(quantity: Quantity, case: Case, subject: Subject) -> Measurement:

@@ -1,0 +1,184 @@
+"""Barriers are asked on states whose surfaces are apart: a right one is not accused, and each mistake is found."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from strangers.log_barrier import LogBarrier
+from subjects import judge_as, load_property
+
+from contactverif import Case, Interface, Rules, Subject, Traits, Verdict, judge_case, named_case
+from contactverif.contract.case import ACTIVATION, LEAST_GAP
+from contactverif.contract.property import Property
+from contactverif.plugins.registry import property_ids
+from contactverif.problems.lifted_states import CLOSED_CHAIN, LARGEST, LEAST, fit_to_traits, least_distance
+from contactverif.sampling.draw import draw_cases
+from contactverif.strategies import flat_cases, smooth_cases
+from contactverif.strategies.rings import closed_cases
+
+BARRIER = Traits(rules=Rules(enforcement="barrier", activation=0.5))
+FOR_BARRIERS = {
+    *("balance.force", "balance.moment", "mirror", "renumbering", "swap", "objectivity", "scaling", "purity"),
+    *("purity.long", "symmetric", "tangent.directional", "tangent.sparsity", "tangent.long", "unilateral"),
+    *("patch.flat.transmission", "patch.flat.normal", "patch.flat.single"),
+}
+
+
+def ask(question: Property, make: Any, examples: int = 12) -> list[Verdict]:
+    cases = draw_cases(question.cases(None), seed=f"barriers/{question.id}", examples=examples).cases
+    return [judge_case(question, case, Subject("barrier", make)).verdict for case in cases]
+
+
+def test_who_states_no_activation_distance_is_asked_nothing() -> None:
+    questions = [load_property(name) for name in property_ids()]
+    assert {question.id for question in questions if not question.refusal(BARRIER)} == FOR_BARRIERS - {"scaling"}
+    silent = Traits(rules=Rules(enforcement="barrier"))
+    assert all("barrier" in question.refusal(silent) for question in questions)
+    assert "penalty_power" in load_property("scaling").refusal(BARRIER)
+    assert "a length" in load_property("scaling").refusal(BARRIER.revise(activation_unit="length"))
+
+
+@pytest.mark.parametrize("source", [smooth_cases, flat_cases, closed_cases])
+def test_a_state_is_lifted_within_the_activation_distance_and_stays_so(source: Any) -> None:
+    cases, lifted = draw_cases(source(), seed="lifted", examples=60).cases, 0
+    for case in cases:
+        state, refused = fit_to_traits(case, BARRIER)
+        if refused:
+            continue
+        lifted += 1
+        gap, activation = state.parameter(LEAST_GAP), state.parameter(ACTIVATION)
+        assert LEAST * activation <= gap <= LARGEST * activation
+        assert least_distance(state.interface, state.positions) == pytest.approx(gap, rel=1e-6)
+        assert state.resolution <= gap
+        assert fit_to_traits(state, BARRIER) == (state, "")
+        assert fit_to_traits(Case.from_arrays(state.to_arrays()), BARRIER)[0].z.tobytes() == state.z.tobytes()
+    assert lifted >= 0.9 * len(cases)
+
+
+def test_an_activation_distance_may_be_a_length() -> None:
+    state, _ = fit_to_traits(named_case("c"), BARRIER.revise(activation=0.01, activation_unit="length"))
+    assert state.parameter(ACTIVATION) == 0.01
+    with pytest.raises(Exception, match="a number above 0"):
+        BARRIER.revise(activation=0.0)
+
+
+def test_closed_chains_are_not_for_those_who_take_open_ones() -> None:
+    traits = Traits().revise(chains="open")
+    (ring,) = draw_cases(closed_cases(), seed="1", examples=1).cases
+    assert fit_to_traits(ring, traits) == (ring, CLOSED_CHAIN)
+    assert fit_to_traits(named_case("c"), traits)[1] == ""
+    assert load_property("objectivity").refusal(traits.revise(motions="small"))
+
+
+class WrongBlock(LogBarrier):
+    """The block of one node with another one is too large by a millionth."""
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        tangent = super().tangent(interface, pairing, z)
+        pairs = pairing["pairs"]
+        if len(pairs):
+            _, node, other, _ = pairs[0]
+            tangent[2 * node : 2 * node + 2, 2 * other : 2 * other + 2] *= 1 + 1e-6
+        return tangent
+
+
+class StraightTangent(LogBarrier):
+    """The tangent leaves out that the direction of a force turns."""
+
+    def _terms(self, interface: Any, pairing: Any, z: Any) -> Any:
+        *others, hessian = super()._terms(interface, pairing, z)
+        return *others, 0 * hessian
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return super().tangent(interface, pairing, z)
+
+
+class MasterTakesLess(LogBarrier):
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = super().residual(interface, pairing, z)
+        forces[2 * interface.n_slave_nodes :] *= 0.99
+        return forces
+
+
+class SlaveAlone(LogBarrier):
+    """Only nodes of the slave are looked at."""
+
+    def pair(self, interface: Any, z: Any) -> Any:
+        pairs = super().pair(interface, z)["pairs"]
+        return {"pairs": pairs[pairs[:, 1] < interface.n_slave_nodes]}
+
+
+class Bounded(LogBarrier):
+    """The force ends at that of a hundredth of the activation distance."""
+
+    def _derivatives(self, distance: Any, interface: Any) -> Any:
+        return super()._derivatives(np.maximum(distance, 0.01 * self._range(interface)), interface)
+
+
+class TooFar(LogBarrier):
+    """It begins at 1.05 times the distance that it states."""
+
+    def _range(self, interface: Any) -> float:
+        return 1.05 * super()._range(interface)
+
+
+class FixedLength(LogBarrier):
+    """The activation distance has a hidden length in it."""
+
+    def _range(self, interface: Any) -> float:
+        return min(super()._range(interface), 1e-3)
+
+
+class FollowsTheAxis(LogBarrier):
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return super().residual(interface, pairing, z) * np.tile([1.0, 1.001], interface.n_nodes)
+
+
+class Remembers(LogBarrier):
+    calls = 0
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        self.calls += 1
+        return super().residual(interface, pairing, z) * (1 + 1e-9 * self.calls)
+
+
+class Pulls(LogBarrier):
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return -super().residual(interface, pairing, z)
+
+
+@pytest.mark.parametrize(
+    ("make", "property_id"),
+    [
+        (WrongBlock, "tangent.sparsity"),
+        (StraightTangent, "tangent.directional"),
+        (MasterTakesLess, "balance.force"),
+        (SlaveAlone, "swap"),
+        (Bounded, "unilateral"),
+        (TooFar, "unilateral"),
+        (Pulls, "unilateral"),
+        (FixedLength, "scaling"),
+        (FollowsTheAxis, "objectivity"),
+        (FollowsTheAxis, "symmetric"),
+        (Remembers, "purity"),
+    ],
+)
+def test_a_wrong_barrier_is_found_and_the_right_one_is_not_accused(make: Any, property_id: str) -> None:
+    question = load_property(property_id)
+    assert Verdict.FAIL in ask(question, make)
+    assert set(ask(question, LogBarrier)) <= {Verdict.PASS, Verdict.UNDECIDED}
+
+
+class SameWeights(LogBarrier):
+    def _weights(self, interface: Any) -> Any:
+        return np.ones(interface.n_nodes)
+
+
+def test_a_barrier_presses_evenly_where_meshes_match_and_weights_are_lengths() -> None:
+    x = np.array([0.0, 1.0, 3.0, 7.0])
+    interface = Interface.from_chains(np.column_stack([x, 0 * x]), np.column_stack([x, 0 * x])[::-1])
+    parameters = {"penetration": np.array(0.125), "along": np.append(x, x[::-1]), "direction": np.array([1.0, 0.0])}
+    positions = interface.nodes - [0.0, 0.125] * (np.arange(8) < 4)[:, None]
+    case = Case(interface, positions.reshape(-1), 1.0, parameters)
+    for make, verdict in ((LogBarrier, Verdict.PASS), (SameWeights, Verdict.FAIL)):
+        judge_as(verdict, load_property("patch.flat.transmission"), case, Subject("barrier", make))
