@@ -36,8 +36,39 @@ class Couplings(NamedTuple):
     first_row: IntArray  # (n_couplings,), where in `nodes` the rows of each coupling begin
 
 
+class _Pattern(NamedTuple):
+    """A pattern, and what it was made of."""
+
+    n_nodes: int
+    n_multipliers: int
+    couplings: Couplings
+    indptr: AnyIntArray
+    indices: AnyIntArray
+
+
+_latest: list[_Pattern] = []  # The latest pattern. Newton's method asks for it again until a pairing changes.
+
+
 def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> Any:
     """Return a matrix (n_unknowns, n_unknowns) of zeros in the union of all couplings, columns ascending in rows."""
+    size, latest = 2 * n_nodes + n_multipliers, _latest[0] if _latest else None
+    if latest is None or latest[:2] != (n_nodes, n_multipliers) or not _are_equal(latest.couplings, couplings):
+        latest = _Pattern(n_nodes, n_multipliers, couplings, *_make_pattern(n_nodes, n_multipliers, couplings))
+        _latest[:] = [latest]
+    indptr, indices = latest.indptr.copy(), latest.indices.copy()  # Whoever gets a matrix may change it.
+    matrix = compressed_matrix("csr", size, np.zeros(len(indices)), indices, indptr)
+    matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
+    return matrix
+
+
+def _are_equal(couplings: Couplings, others: Couplings) -> bool:
+    (nodes, starts, rows), (other_nodes, other_starts, other_rows) = couplings, others
+    same_nodes = np.array_equal(nodes, other_nodes)
+    return same_nodes and np.array_equal(starts, other_starts) and np.array_equal(rows, other_rows)
+
+
+def _make_pattern(n_nodes: int, n_multipliers: int, couplings: Couplings) -> tuple[AnyIntArray, AnyIntArray]:
+    """Return where each row of unknowns begins, and the columns of all rows."""
     size, n_numbers = 2 * n_nodes + n_multipliers, n_nodes + n_multipliers
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
     members, ends = np.empty(len(couplings.nodes), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
@@ -47,9 +78,7 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> Any:
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
     _write_pattern(indptr, indices, n_nodes, begins, ends, columns)
-    matrix = compressed_matrix("csr", size, np.zeros(n_entries), indices, indptr)
-    matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
-    return matrix
+    return indptr, indices
 
 
 @compile_kernel

@@ -24,6 +24,7 @@ from contactverif.mechanics.force_differences import Differences
 from contactverif.mechanics.scene import Scene
 
 ROUNDOFF_FACTOR = 8.0  # A residual is zero if it is at most this many units of roundoff of its largest terms.
+MANY_UNKNOWNS = 200  # From so many on, products of sparse matrices take less time than those of full ones.
 # Forces at a node depend on its neighbours, on the segments that these face, and on the neighbours of those: the
 # longest slave segment and the longest master segment together, times this.
 REACH = 1.5
@@ -153,8 +154,12 @@ class System:
     def contact_stiffness(self, u: FloatArray, pairing: Pairing | None, tangent: Any) -> Any:
         """Return the derivative (n, n) of the contact forces on the unknowns, of a `tangent`; None asks for that."""
         tangent = self.tangent(u, pairing) if tangent is None else tangent
-        tangent = dense(tangent) if isinstance(self.transformation, np.ndarray) else sparse.csr_array(tangent)
-        return self.transformation.T @ tangent @ self.transformation
+        if not isinstance(self.transformation, np.ndarray):
+            return self.transformation.T @ sparse.csr_array(tangent) @ self.transformation
+        if len(self.transformation) < MANY_UNKNOWNS:
+            return self.transformation.T @ dense(tangent) @ self.transformation
+        transformation = sparse.csr_array(self.transformation)  # It has an entry or two in a row.
+        return (transformation.T @ sparse.csr_array(tangent) @ transformation).toarray()
 
     def floor(self, u: FloatArray, contact: Any, forces: FloatArray) -> FloatArray:
         """Return the part of the residual (n,) that roundoff of positions and forces alone may cause.

@@ -38,14 +38,16 @@ from scipy import sparse
 
 from contactverif import Interface, Subject, evaluate_both, load_formulation
 from contactverif.contract.state_vector import split_state
+from contactverif.geometry import block_rows
 from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif.geometry.local_matrix import NO_NODE, share_couplings
 from contactverif.geometry.projection import search_tree
 from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.box3_tangent import add_forces_and_tangent
 
-OURS = ("vts-ppt", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
+OURS = ("vts-ppt", "vts-ppt, same pairing", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
 PEER = "ipctk"
+KEPT = ", same pairing"  # Behind the name of a formulation whose latest pattern is kept, as in Newton's method.
 PARTS = ("search", "residual and tangent", "CSR")
 TURNS = 9
 LIFT = 0.5  # This lift gives the pressed slave a gap of 0.2 to 0.35 segments.
@@ -81,11 +83,14 @@ def wavy(n_slave: int, lift: float = 0.0) -> Interface:
 
 def our_racer(name: str, n_slave: int) -> Racer:
     """Return a formulation of ours as its plugin answers, without the checks of the harness."""
-    interface, subject = wavy(n_slave), load_formulation(name)
+    keeps, interface = name.endswith(KEPT), wavy(n_slave)
+    subject = load_formulation(name.removesuffix(KEPT))
     assert isinstance(subject, Subject), subject
     plugin, z = subject.with_penalty(10.0).plugin, interface.nodes.ravel()
 
     def call() -> tuple[Any, tuple[float, ...]]:
+        if not keeps:
+            block_rows._latest.clear()
         times = [process_time()]
         pairing = plugin.pair(interface, z)
         times.append(process_time())
@@ -245,6 +250,7 @@ def time_steps(n_slave: int, turns: int) -> dict[str, float]:
         surfaces, areas, options = plugin._arguments(interface, pairing, z)
         couplings = list_couplings(surfaces, areas, plugin.n, plugin.n, NO_NODE)
         clock.append(process_time())
+        block_rows._latest.clear()
         tangent = zero_matrix(n_nodes, 0, Couplings(couplings[0], couplings[1], couplings[1][:-1]))
         clock.append(process_time())
         rows, csr = np.zeros(z.size), (tangent.indptr, tangent.indices, tangent.data)

@@ -74,9 +74,26 @@ def test_numbers_of_entries_are_long_only_where_they_have_to_be(monkeypatch: pyt
     short = zero_matrix(N_NODES, N_MULTIPLIERS, couplings)
     assert short.indices.dtype == short.indptr.dtype == np.int32
     monkeypatch.setattr(block_rows, "_MOST", short.nnz - 1)
+    monkeypatch.setattr(block_rows, "_latest", [])
     long = zero_matrix(N_NODES, N_MULTIPLIERS, couplings)
+    assert long.indices.dtype == long.indptr.dtype == np.int64
     assert np.array_equal(short.indices, long.indices)
     assert np.array_equal(short.indptr, long.indptr)
     for matrix in (short, long):
         add_all(matrix, np.zeros(matrix.shape), couplings, seed=1)
     assert np.array_equal(short.data, long.data)
+
+
+def test_a_pattern_that_is_asked_for_again_is_the_same_and_nobody_spoils_it() -> None:
+    first, other = draw_couplings(3), draw_couplings(4)
+    before = zero_matrix(N_NODES, N_MULTIPLIERS, first)
+    expected = before.indices.copy()
+    before.indices[:] = -1
+    before.data += 1.0
+    again = zero_matrix(N_NODES, N_MULTIPLIERS, Couplings(*(array.copy() for array in first)))
+    np.testing.assert_array_equal(again.indices, expected)
+    assert not again.data.any()
+    between = zero_matrix(N_NODES, N_MULTIPLIERS, other)
+    assert not np.array_equal(between.indptr, again.indptr)
+    assert zero_matrix(N_NODES + 1, N_MULTIPLIERS, other).shape[0] == between.shape[0] + 2
+    np.testing.assert_array_equal(zero_matrix(N_NODES, N_MULTIPLIERS, first).indices, expected)
