@@ -175,6 +175,9 @@ def node_hit_states() -> tuple[Case, ...]:
 _EIGHT = (1.0, 0.75, 1.25, 1.0, 0.5, 1.5, 1.25, 0.75), (0.75, 1.25, 1.5, 0.875, 1.25, 0.875, 0.5, 1.0)
 
 
+MANY_EIGHTS = 38
+
+
 @cache
 def equal_length_states() -> tuple[Case, ...]:
     """Return flat states whose slave and master are equally long, with as many segments of the mean length 1.
@@ -183,13 +186,18 @@ def equal_length_states() -> tuple[Case, ...]:
     one less at an end, is then no more than 1/n of all springs, whatever the unit of the penalty.
     """
     slave, master = _EIGHT
-    sixteen = (*slave, *slave), (master[0] - 0.125, *master[1:], master[0] + 0.125, *master[1:])
+    sixteen, many = (
+        (slave * count, (master[0] - 0.125, *master[1:], *master * (count - 2), master[0] + 0.125, *master[1:]))
+        for count in (2, MANY_EIGHTS)
+    )
     return tuple(
         flat_state(name, _ends(lengths), flat_master(_ends(opposite)), depth, turn=turn, penalty=penalty)
         for name, (lengths, opposite), depth, turn, penalty in (
             ("8 segments", _EIGHT, 2.0**-4, UPRIGHT, 16.0),
             ("8 segments, upright, soft and shallow", _EIGHT, 2.0**-12, (0, 1, 1), 2.0**-4),
             ("16 segments, stiff", sixteen, 2.0**-4, UPRIGHT, 2.0**20),
+            # More than fit into a number of one byte.
+            (f"{8 * MANY_EIGHTS} segments", many, 2.0**-4, UPRIGHT, 16.0),
         )
     )
 

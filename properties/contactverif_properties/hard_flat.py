@@ -168,10 +168,19 @@ LEAST = Quantity(
 )
 
 
+LARGEST_PUSH = 5.0
+PUSH = Quantity(
+    "largest force on a node, over ε̂ |g| of a mean segment",
+    f"{LARGEST_PUSH:g} k",
+    "k is 1 or 2 passes. Two segments of at most 1.5 mean segments meet at a node; dual shape functions take up to 5/3 "
+    "of them.",
+)
+
+
 @Property.define(
     id="scale",
     family="patch",
-    quantities=(MOST, LEAST),
+    quantities=(MOST, LEAST, PUSH),
     cases=Cases.from_list(equal_length_states),
     promise=lambda traits: True,
     asks=frozenset({"penalty"}),
@@ -186,9 +195,11 @@ def scale(case: Case, subject: Subject) -> Measurement:
     the penetration. Most questions about sizes are asked of those who state `penalty` and `area`. This one is asked of
     everybody, whatever is promised, so that no formulation is three times too stiff in silence.
 
-    **How it is judged.** The number is the force that pushes the slave over ε̂ |g| L. It must lie within 1/n of 1, or
-    within 2/n of 2 where the traits leave room for springs on both surfaces; n is the number of slave segments, 8 or
-    16. Nodal springs of ε̂ L/n at n + 1 nodes give 1 + 1/n. A node that faces the end of the master exactly may be lost
+    **How it is judged.** The number is the force that pushes the slave over ε̂ |g| L, and likewise that on the master;
+    the worse of both counts. It must lie within 1/n of 1, or within 2/n of 2 where the traits leave room for springs on
+    both surfaces; n is the number of slave segments, 8, 16 or 304. So a stiffness that is wrong by 0.4 % shows, a
+    master that gets more than the slave. The largest force on a node is that of a few mean segments, so that a number
+    of a segment that overflows shows. Nodal springs of ε̂ L/n at n + 1 nodes give 1 + 1/n. A node that faces the end of the master exactly may be lost
     to roundoff, which takes no more than 1/n either. Segments have the mean length 1, so that it does not matter
     whether the unit of the penalty is stated. A factor of 2 on one pass looks like two passes, so the row says that the
     springs are 2 ε̂ L, unless the traits say `unbiased`.
@@ -203,21 +214,24 @@ def scale(case: Case, subject: Subject) -> Measurement:
     away[: case.interface.n_slave_nodes] = depth / 2 * uniform_pressure.normal_of(case)
     parameters = {**case.parameters, "penetration": np.array(depth / 2)}
     half = replace(case, z=(case.positions + away).reshape(-1), parameters=parameters)
-    springs, shallow = _springs(case, subject), _springs(half, subject)
+    (springs, opposite, largest), (shallow, *_) = _springs(case, subject), _springs(half, subject)
     tolerance = gap_tolerance(half, depth / 2, rounding_distance(case, traits))
     details = {"springs over ε̂ L": springs}
     if abs(shallow - springs) > 2 * tolerance * abs(springs):
         return Measurement(details=details)
     passes = 2 if springs > np.sqrt(2) and may_act_twice(traits) else 1
     numbers = [
-        MOST.check(springs, passes * (1 + 1 / n) + tolerance),
-        LEAST.check(springs, passes * (1 - 1 / n) - tolerance),
+        MOST.check(max(springs, opposite), passes * (1 + 1 / n) + tolerance),
+        LEAST.check(min(springs, opposite), passes * (1 - 1 / n) - tolerance),
+        PUSH.check(largest, LARGEST_PUSH * passes),
     ]
     finding = (
         None if passes == 1 or traits.promises.unbiased else Finding(_say(springs, "two passes, or twice too stiff"))
     )
     if any(number.ratio > 1 for number in numbers):
         right = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if may_act_twice(traits) else "")
+        if abs(opposite - springs) > abs(springs) / n:
+            right = f"the master gets {opposite:#.3g} ε̂ L; {right}"
         finding = Finding(_say(springs, right))
     return Measurement(numbers, details=details, finding=finding)
 
@@ -227,8 +241,13 @@ def _say(springs: float, remark: str) -> str:
     return f"your springs are {springs:#.3g} ε̂ L: {remark}"
 
 
-def _springs(case: Case, subject: Subject) -> float:
-    """Return the force that pushes the slave out of the master over ε̂ |g| L."""
-    forces = -uniform_pressure.uniform_state(case, subject).forces[: case.interface.n_slave_nodes]
-    push = float((forces @ uniform_pressure.normal_of(case)).sum())
-    return push / (case.penalty * case.parameter("penetration") * case.slave_length)
+def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
+    """Return the forces that push the slave out of the master, and the master out of the slave, over ε̂ |g| L.
+
+    The third number is the largest force on a node over that of a slave segment of mean length.
+    """
+    pushes = -uniform_pressure.uniform_state(case, subject).forces @ uniform_pressure.normal_of(case)
+    size = case.penalty * case.parameter("penetration") * case.slave_length
+    slave, master = np.split(pushes / size, [case.interface.n_slave_nodes])
+    largest = float(np.abs(pushes).max()) / size * len(case.interface.slave)
+    return float(slave.sum()), -float(master.sum()), largest

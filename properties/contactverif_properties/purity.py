@@ -194,14 +194,14 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
     entries of repeated answers that differ; the tolerance is 0. A pairing that differs fails in words. The other two
     compare the first residual and the first tangent of the process with those that it gives now, each as `purity`
     compares a batch with a loop. A run notes the first answers where it calls a formulation for the first time, on case
-    A1, in a process of its own or in that of the harness. They are only compared to roundoff, since a process may
+    C′, in a process of its own or in that of the harness. They are only compared to roundoff, since a process may
     compile in its first calls and add in another order later.
 
     **Undecided.** Never.
     """
     first = subject.first_answers
     if first is None:
-        first = ask_first(subject, fit_to_traits(named_case("a1"), subject.traits)[0], subject.provides)
+        first = ask_first(subject, fit_to_traits(named_case("c-prime"), subject.traits)[0], subject.provides)
     formulation, state = prepare_state(case, subject)
     random = np.random.default_rng(state.seed)
     moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.resolution

@@ -45,6 +45,33 @@ def test_another_factor_fails_in_silence_too(factor: float) -> None:
         assert f"your springs are {factor:#.3g} ε̂ L: one pass has 1 ε̂ L, two passes have 2 ε̂ L" in outcome.reason
 
 
+def test_a_long_interface_shows_what_a_short_one_hides() -> None:
+    """Half a percent too stiff, and the number of a segment in one byte."""
+
+    class OneByte(PointSprings):
+        def pair(self, interface: Any, z: Any) -> Any:
+            pairing = dict(super().pair(interface, z))
+            (name,) = (key for key, numbers in pairing.items() if numbers.dtype == np.int64 and numbers.max() > 200)
+            return {**pairing, name: pairing[name].astype(np.uint8).astype(np.int64)}
+
+    long = CASES["304 segments"]
+    judge_as(Verdict.FAIL, SCALE, long, scale_springs(1.005, SILENT))
+    judge_as(Verdict.PASS, SCALE, CASES["16 segments, stiff"], scale_springs(1.005, SILENT))
+    judge_as(Verdict.FAIL, SCALE, long, Subject("one byte", lambda *, penalty: OneByte(penalty)))
+
+
+def test_a_master_that_gets_more_than_the_slave_fails_whatever_is_promised() -> None:
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.array(right(interface, pairing, z))
+        forces[2 * interface.n_slave_nodes :] *= 1.5
+        return forces
+
+    subject = Subject("more", lambda *, penalty: change_verbs(contactverif_nts.nts(penalty=penalty), residual=residual))
+    for case in CASES.values():
+        outcome = judge_as(Verdict.FAIL, SCALE, case, subject)
+        assert "the master gets 1.6" in outcome.reason or "the master gets 1.5" in outcome.reason
+
+
 def test_springs_that_state_their_area_act_once() -> None:
     traits = Traits(rules=Rules(penalty="distributed", area="current"))
     outcome = judge_as(Verdict.FAIL, SCALE, CASES["8 segments"], scale_springs(2.0, traits))
