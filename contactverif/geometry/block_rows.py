@@ -55,7 +55,7 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> Any:
     if latest is None or latest[:2] != (n_nodes, n_multipliers) or not _are_equal(latest.couplings, couplings):
         latest = _Pattern(n_nodes, n_multipliers, couplings, *_make_pattern(n_nodes, n_multipliers, couplings))
         _latest[:] = [latest]
-    indptr, indices = latest.indptr.copy(), latest.indices.copy()  # Whoever gets a matrix may change it.
+    indptr, indices = latest.indptr.copy(), latest.indices.copy()  # A caller may change its matrix.
     matrix = compressed_matrix("csr", size, np.zeros(len(indices)), indices, indptr)
     matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
     return matrix
