@@ -47,7 +47,7 @@ from contactverif_nts.box3_tangent import add_forces_and_tangent
 
 OURS = ("vts-ppt", "vts-ppt, same pairing", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
 PEER = "ipctk"
-KEPT = ", same pairing"  # Behind the name of a formulation whose latest pattern is kept, as in Newton's method.
+SAME_PAIRING = ", same pairing"  # Behind the name of a formulation whose latest pattern is kept, as in Newton's method.
 PARTS = ("search", "residual and tangent", "CSR")
 TURNS = 9
 LIFT = 0.5  # This lift gives the pressed slave a gap of 0.2 to 0.35 segments.
@@ -83,8 +83,8 @@ def wavy(n_slave: int, lift: float = 0.0) -> Interface:
 
 def our_racer(name: str, n_slave: int) -> Racer:
     """Return a formulation of ours as its plugin answers, without the checks of the harness."""
-    keeps, interface = name.endswith(KEPT), wavy(n_slave)
-    subject = load_formulation(name.removesuffix(KEPT))
+    keeps, interface = name.endswith(SAME_PAIRING), wavy(n_slave)
+    subject = load_formulation(name.removesuffix(SAME_PAIRING))
     assert isinstance(subject, Subject), subject
     plugin, z = subject.with_penalty(10.0).plugin, interface.nodes.ravel()
 
