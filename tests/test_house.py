@@ -93,7 +93,9 @@ ROOMS = {
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     # An engine writes files and starts programs; its code is imported inside `solve`.
-    "contactverif_engines": Room(("contract",), ("numpy", "scipy", "skfem", "ngsolve", "netgen", "KratosMultiphysics")),
+    "contactverif_engines": Room(
+        ("contract",), ("numpy", "scipy", "skfem", "ngsolve", "netgen", "KratosMultiphysics", "getfem", "openseespy")
+    ),
     # A library is a file, and a call of it needs ctypes.
     "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk")),
     "properties.shared": Room(

@@ -23,6 +23,8 @@ from contactverif_engines.layer import Layer, make_layer
 _RESIDUAL = 1e-10  # The share of the first residual that may be left; the default is 1e-4.
 _ROUNDOFF = 1e-13  # The share of loads or reactions that may be left. The default is 1e-9 in whatever unit.
 _ITERATIONS = 60
+_NORMALS = {"fixed": "no_derivatives_computation", "updated": "no_derivatives_computation_with_normal_update"}
+_SEARCHES = {"boxes": "in_radius_with_obb", "radius": "in_radius"}
 _PROCESSES = {
     "multiplier": ("alm_contact_process", "ALMContactProcess", "ALMContactFrictionless"),
     "penalty": ("penalty_contact_process", "PenaltyContactProcess", "PenaltyContactFrictionless"),
@@ -37,12 +39,21 @@ class Kratos:
     ----------
     kind : Literal['multiplier', 'penalty']
         The augmented Lagrangian method with dual multipliers, or penalty springs of the stiffness that Kratos chooses.
+    search : Literal['boxes', 'radius']
+        Pairs of edges whose boxes meet, as Kratos chooses by itself, or all within the radius.
     search_factor : float
         The radius in which pairs are searched, over the size of a condition; 3.5 is the default of Kratos.
+    normals : Literal['fixed', 'updated']
+        Normals of the start of a step, as Kratos chooses by itself, or those of each iterate.
+    augmentation : float
+        The penalty of the augmented Lagrangian method over E/h; 1 is the default of Kratos.
     """
 
     kind: Literal["multiplier", "penalty"] = "multiplier"
+    search: Literal["boxes", "radius"] = "boxes"
     search_factor: float = 3.5
+    normals: Literal["fixed", "updated"] = "fixed"
+    augmentation: float = 1.0
 
     @property
     def traits(self) -> EngineTraits:
@@ -95,8 +106,12 @@ class Kratos:
             "contact_model_part": {"0": ["Touching"]},
             "assume_master_slave": {"0": ["Slave"]},
             "contact_type": "Frictionless",
-            "search_parameters": {"search_factor": self.search_factor},
+            "normal_variation": _NORMALS[self.normals],
+            "search_parameters": {"type_search": _SEARCHES[self.search], "search_factor": self.search_factor},
+            "advance_ALM_parameters": {"stiffness_factor": self.augmentation},
         }
+        if self.kind == "multiplier":  # The unit of the multipliers stays that of the default.
+            contact["advance_ALM_parameters"]["penalty_scale_factor"] = 1 / self.augmentation
         return {
             "problem_data": {
                 "problem_name": "scene", "start_time": 0.0, "end_time": 1.0, "parallel_type": "OpenMP", "echo_level": 0

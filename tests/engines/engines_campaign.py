@@ -1,12 +1,14 @@
 """Ask every engine every question that displacements answer, and write the tables of `reports/findings`.
 
 `tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question, and the page `engines.md`.
-Engines that come as Python packages get environments of their own. A report that is complete is read and not made
+Engines that come as Python packages get environments of their own; `GETFEM_PYTHON` names the interpreter of GetFEM. A
+report that is complete is read and not made
 again, and one that was stopped goes on, so that the same command goes on with the whole.
 """
 
 import csv
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -25,11 +27,15 @@ KRATOS = ("KratosMultiphysics", *(f"Kratos{part}Application" for part in PARTS))
 
 @dataclass(frozen=True)
 class Choice:
-    """An engine with options, and the packages that its interpreter needs; none if it lives in this one."""
+    """An engine with options, and the packages that its interpreter needs; none if it lives in this one.
+
+    Where no index has the packages, a variable of the environment names the interpreter.
+    """
 
     name: str
     options: str = ""
     packages: tuple[str, ...] = ()
+    variable: str = ""
 
     @property
     def label(self) -> str:
@@ -41,6 +47,8 @@ class Choice:
         options = [self.options] if self.options else []
         if self.packages:
             options.append(f"python={_interpreter(environments / self.name, self.packages)}")
+        if self.variable:
+            options.append(f"python={os.environ[self.variable]}")
         return f"{self.name}:{','.join(options)}" if options else self.name
 
 
@@ -50,11 +58,15 @@ CHOICES = (
     Choice("calculix", "kind=nodes"),
     Choice("calculix", "kind=mortar"),
     Choice("calculix", "kind=linmortar"),
+    Choice("getfem", variable="GETFEM_PYTHON"),
+    Choice("getfem", "kind=multiplier", variable="GETFEM_PYTHON"),
     Choice("kratos", "", KRATOS),
     Choice("kratos", "search_factor=10000", KRATOS),
+    Choice("kratos", "search=radius,search_factor=10000,normals=updated,augmentation=1e-6", KRATOS),
     Choice("kratos", "kind=penalty", KRATOS),
     Choice("ngsolve", "", ("ngsolve",)),
     Choice("ngsolve", "order=15", ("ngsolve",)),
+    Choice("opensees", "", ("openseespy",)),
 )
 
 
@@ -136,6 +148,9 @@ def main(folder: Path, examples: int) -> None:
     for choice in CHOICES:
         if choice.name == "calculix" and shutil.which("ccx") is None:
             print("calculix: the program ccx is not installed")
+            continue
+        if choice.variable and choice.variable not in os.environ:
+            print(f"{choice.name}: {choice.variable} is not set")
             continue
         lines += ask(choice, folder, examples)
         with (FOLDER / "engines.csv").open("w", newline="", encoding="utf-8") as file:

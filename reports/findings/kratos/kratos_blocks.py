@@ -25,13 +25,16 @@ def part(name, nodes, **others):
     )
 
 
-def press(upper, lower, settings, kind="ALM"):
-    """Return the pressure of each upper element, and the mean gap, of blocks with columns between these places x."""
+def press(upper, lower, settings, kind="ALM", unit=1.0, overlap=0.0, pushed=0.1):
+    """Return the pressure of each upper element, and the mean gap, of blocks with columns between these places x.
+
+    All lengths are multiplied by the unit. Blocks that overlap do so at the start, before the upper one is pushed.
+    """
     os.chdir(tempfile.mkdtemp())
     Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
     n, m = len(upper), len(lower)
-    rows = [(upper, 0), (upper, 1), (lower, -1), (lower, 0)]
-    nodes = [f"{x} {y} 0" for xs, y in rows for x in xs]
+    rows = [(upper, -overlap), (upper, 1 - overlap), (lower, -1), (lower, 0)]
+    nodes = [f"{unit * x!r} {unit * y!r} 0" for xs, y in rows for x in xs]
     quads = [f"0 {a} {a + 1} {a + 1 + n} {a + n}" for a in range(1, n)]
     quads += [f"0 {a} {a + 1} {a + 1 + m} {a + m}" for a in range(2 * n + 1, 2 * n + m)]
     slave = [f"0 {a} {a + 1}" for a in range(1, n)]
@@ -77,19 +80,20 @@ def press(upper, lower, settings, kind="ALM"):
     job = StructuralMechanicsAnalysis(model, Kratos.Parameters(json.dumps(whole)))
     job.Initialize()
     for node in model["B"].Nodes:
-        if node.X0 in (upper[0], upper[-1]):  # Rollers at the sides
+        if node.X0 in (unit * upper[0], unit * upper[-1]):  # Rollers at the sides
             node.Fix(Kratos.DISPLACEMENT_X)
-        if node.Y0 in (1, -1):
+        if node.Y0 in (unit * (1 - overlap), -unit):
             node.Fix(Kratos.DISPLACEMENT_Y)
-            node.SetSolutionStepValue(Kratos.DISPLACEMENT_Y, -0.1 if node.Y0 == 1 else 0.0)
+            node.SetSolutionStepValue(Kratos.DISPLACEMENT_Y, -pushed * unit if node.Y0 > 0 else 0.0)
     solver = job._GetSolver()
     solver.AdvanceInTime(0.0)
     job.InitializeSolutionStep()
     solver.Predict()
     converged = solver.SolveSolutionStep()
     y = [
-        node.GetSolutionStepValue(Kratos.DISPLACEMENT_Y) for node in sorted(model["B"].Nodes, key=lambda node: node.Id)
+        node.GetSolutionStepValue(Kratos.DISPLACEMENT_Y) / unit
+        for node in sorted(model["B"].Nodes, key=lambda node: node.Id)
     ]
     pressures = [(y[a] + y[a + 1] - y[n + a] - y[n + a + 1]) / 2 for a in range(n - 1)]
-    gap = sum(y[:n]) / n - sum(y[top : top + m]) / m
+    gap = sum(y[:n]) / n - sum(y[top : top + m]) / m - overlap
     return bool(converged), pressures, gap

@@ -1,0 +1,149 @@
+"""OpenSees: springs between nodes and edges, of the slave's nodes and of the master's.
+
+Source: the element zeroLengthContactNTS2D of OpenSees, its manual and `SRC/element/zeroLength`. Each node of either
+surface has a spring to each edge of the other one that it lies behind, whatever the length of its own edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contactverif.contract.engine import EngineAnswer, EngineTraits, IntArray, SceneArrays
+from contactverif_engines.layer import Layer, make_layer
+
+_STEPS = 60
+_MANY = 60  # With the handler "Transformation" an element of 67 nodes damages memory (`reports/findings`).
+_CONVERGED = 1e-12  # The norm of the last step over the size of displacements.
+_ROUNDED = 1e-14  # Steps below this share of the largest coordinate are roundoff of the gaps.
+
+
+@dataclass(frozen=True)
+class OpenSees:
+    """OpenSees with node-to-segment springs.
+
+    Attributes
+    ----------
+    stiffness : float
+        The stiffness of all springs of a length of the surface over ε̂, in the mean: nodes of both sides have springs.
+    """
+
+    stiffness: float = 1.0
+
+    @property
+    def traits(self) -> EngineTraits:
+        """The statements: springs of nodes are ε̂ in the mean alone, and no uniform pressure is promised."""
+        return EngineTraits("penalty", accuracy=1e-9, load_scale=2.0**-10)
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Make a model, solve it in a static step, and read the displacements of its nodes."""
+        import openseespy.opensees as ops
+
+        layer = make_layer(scene)
+        ops.wipe()
+        ops.model("basic", "-ndm", 2, "-ndf", 2)
+        _add_bodies(ops, layer)
+        _add_supports_and_loads(ops, layer)
+        self._add_contact(ops, layer)
+        steps: list[int] = []
+        tolerance = _CONVERGED * _size_of_displacements(scene) + _ROUNDED * float(np.abs(scene.nodes).max())
+        converged = _run(ops, tolerance, steps.append, _choose_handler(layer))
+        count = range(1, len(scene.nodes) + 1)
+        moves = np.array([[ops.nodeDisp(node, part) for part in (1, 2)] for node in count], np.float64)
+        ops.wipe()
+        return EngineAnswer(moves, converged, steps[0], "" if converged else "analyze failed in one step")
+
+    def _add_contact(self, ops: Any, layer: Layer) -> None:
+        """Add an element for each pair of a slave's and a master's chain of edges."""
+        scene = layer.scene
+        number = len(layer.wedges) + len(layer.bricks)
+        for slave in find_chains(scene.slave):
+            for master in find_chains(scene.master):
+                number += 1
+                first, second = (_mean_length(scene, chain) for chain in (slave, master))
+                stiffness = self.stiffness * float(scene.penalty) * first * second / (first + second)
+                counts = ("-sNdNum", len(slave), "-mNdNum", len(master))
+                nodes = (node + 1 for node in (*slave, *master))
+                ops.element("zeroLengthContactNTS2D", number, *counts, "-Nodes", *nodes, stiffness, 0.0, 0.0)
+
+
+def _mean_length(scene: SceneArrays, chain: list[int]) -> float:
+    """Return the mean length of the edges of a chain."""
+    return float(np.linalg.norm(np.diff(scene.nodes[chain], axis=0), axis=1).mean())
+
+
+def find_chains(edges: IntArray) -> list[list[int]]:
+    """Return the nodes along each chain of edges, in their direction; a closed chain begins and ends in one node."""
+    after = dict(edges.tolist())
+    firsts = [node for node in after if node not in after.values()]
+    chains = []
+    while after:
+        chain = [firsts.pop(0) if firsts else next(iter(after))]
+        while chain[-1] in after:
+            chain.append(after.pop(chain[-1]))
+        chains.append(chain)
+    return chains
+
+
+def _add_bodies(ops: Any, layer: Layer) -> None:
+    """Add all nodes, materials and elements of the front of a layer."""
+    for number, (x, y, _) in enumerate(layer.nodes[: layer.n_front].tolist(), start=1):
+        ops.node(number, x, y)
+    scene, number = layer.scene, 0
+    for body, rigid in enumerate(scene.rigid.tolist()):
+        young, poisson = (1.0, 0.0) if rigid else (float(scene.young[body]), float(scene.poisson[body]))
+        ops.nDMaterial("ElasticIsotropic", body + 1, young, poisson)
+    kinds = (
+        ("tri31", layer.wedges[:, :3], layer.body_of_wedge),
+        ("quad", layer.bricks[:, :4], layer.body_of_brick),
+    )
+    for kind, cells, bodies in kinds:
+        for cell, body in zip((cells + 1).tolist(), bodies.tolist(), strict=True):
+            number += 1
+            ops.element(kind, number, *cell, 1.0, "PlaneStrain", body + 1)
+
+
+def _add_supports_and_loads(ops: Any, layer: Layer) -> None:
+    """Add what is held, moved and loaded."""
+    ops.timeSeries("Linear", 1)
+    ops.pattern("Plain", 1, 1)
+    fixed, imposed = layer.fixed[: layer.n_front], layer.imposed[: layer.n_front]
+    supports = fixed & (imposed == 0)
+    for node in np.flatnonzero(supports.any(axis=1)).tolist():
+        ops.fix(node + 1, *supports[node].astype(int).tolist())
+    for node, part in np.argwhere(fixed & (imposed != 0)).tolist():
+        ops.sp(node + 1, part + 1, float(imposed[node, part]))
+    load = 2 * layer.load[: layer.n_front]  # The front of a layer bears half of it.
+    for node in np.flatnonzero(load.any(axis=1)).tolist():
+        ops.load(node + 1, *load[node].tolist())
+
+
+def _size_of_displacements(scene: SceneArrays) -> float:
+    """Return the size of displacements: those imposed, those that loads cause, or the first guess."""
+    loaded = float(np.abs(scene.load).sum()) / float(scene.young[~scene.rigid].max())
+    return max(float(np.abs(scene.imposed).max()), float(np.abs(scene.start).max()), loaded)
+
+
+def _choose_handler(layer: Layer) -> str:
+    """Return the handler of supports: "Plain" knows no imposed displacement but 0, and "Transformation" few nodes."""
+    if not (layer.fixed & (layer.imposed != 0)).any():
+        return "Plain"
+    many = len(np.unique(layer.scene.slave)) + len(np.unique(layer.scene.master)) > _MANY
+    return "Lagrange" if many else "Transformation"
+
+
+def _run(ops: Any, tolerance: float, count_steps: Callable[[int], None], handler: str) -> bool:
+    """Solve a static step, pass on the number of its iterations, and return whether it converged."""
+    ops.constraints(handler)
+    ops.numberer("RCM")
+    ops.system("UmfPack")
+    ops.test("NormDispIncr", tolerance, _STEPS, 0)
+    ops.algorithm("Newton")
+    ops.integrator("LoadControl", 1.0)
+    ops.analysis("Static")
+    converged = ops.analyze(1) == 0
+    count_steps(int(ops.testIter()))
+    return bool(converged)

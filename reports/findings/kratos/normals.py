@@ -1,0 +1,11 @@
+"""Kratos 10.4.4: with its default, normals of the start of a step, a mirror image has another solution."""
+
+from kratos_blocks import press
+
+SETTINGS = {"search_parameters": {"search_factor": 1e4}}
+
+for pushed in (0.1, 0.2, 0.3):
+    converged, pressures, _ = press([0, 1, 2], [-1, 0, 1.2, 2, 4], SETTINGS, pushed=pushed)
+    _, mirrored, _ = press([0, 1, 2], [-2, 0, 0.8, 2, 3], SETTINGS, pushed=pushed)
+    change = max(abs(a - b) for a, b in zip(pressures, mirrored[::-1], strict=True)) / max(pressures)
+    print(f"pushed by {pushed}: converged {converged}, pressures of the mirror image differ by {change:.1e}")
