@@ -225,6 +225,7 @@ def engine_remote(case: Case, subject: Subject) -> Measurement:
     scene = scene_of(case)
     low, high = scene.interface.nodes.min(axis=0), scene.interface.nodes.max(axis=0)
     size = float(np.abs(high - low).max())
-    place = Placing(shift=(float(low[0]) + DISTANCE * size, float(high[1])))
+    along_x, along_y = scene.bodies[0].frame[:, 0].tolist()  # Some codes take no inclined supports.
+    place = Placing((along_x, along_y), (float(low[0]) + DISTANCE * size, float(high[1])))
     far = block(Rectangle([0, size / 3, size], [0, size]), contact="bottom", approach=0.0, placing=place, name="far")
     return compare_scenes(case, subject, add_body(scene, far))
