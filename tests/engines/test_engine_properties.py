@@ -1,5 +1,6 @@
 """Each question for engines alone catches an engine with the fault that it is about, and accuses no right one."""
 
+import numpy as np
 import pytest
 from plain_engine import Plain
 
@@ -7,6 +8,7 @@ from contactverif import Property, Verdict, judge_case
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.plugins.registry import load_properties, property_ids
 from contactverif.sampling.draw import Sampling, draw_cases
+from contactverif_properties.patch_curved import count_bare
 
 MUTANTS = {
     "engine.purity": "softer at every call",
@@ -54,3 +56,14 @@ def test_a_right_engine_passes(name: str) -> None:
 
 def test_nobody_is_turned_who_takes_no_inclined_supports() -> None:
     assert set(verdicts("engine.objectivity", Plain(inclined=False))) == {Verdict.UNDECIDED}
+
+
+def test_nodes_of_a_ring_that_a_search_loses_are_counted_whatever_the_mean_is() -> None:
+    interface = question_of("patch.curved").cases(None)[0].interface
+    forces = np.zeros((interface.n_nodes, 2))
+    for end in (0, 1):
+        np.add.at(forces[:, 0], interface.slave.segments[:, end], interface.slave.lengths(interface.nodes))
+    assert count_bare(interface, forces) == 0
+    forces[8:14:2] = 0.0
+    assert count_bare(interface, forces * 24 / 21) == 3
+    assert count_bare(interface, 0 * forces) == 0  # Without a force there is nothing to share.
