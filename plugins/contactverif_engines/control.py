@@ -19,6 +19,7 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _ITERATIONS = 60
 _CONVERGED = 1e-12  # The last step over the largest displacement.
 _ROUNDED = 1e-9  # A step below this share that does not shrink any more is roundoff of a badly conditioned matrix.
+_POSITION_ROUNDINGS = 2.0**-48  # A gap is a difference of coordinates, each rounded by 2⁻⁵³ of the largest.
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Control:
         stiffness, frames = assemble(scene), sparse.block_diag(list(scene.frames()), format="csr")
         free = np.flatnonzero(~scene.fixed.reshape(-1))
         u = np.where(scene.fixed, scene.imposed, np.einsum("nij,ni->nj", scene.frames(), scene.start)).reshape(-1)
-        step = np.inf
+        step, rounding = np.inf, _POSITION_ROUNDINGS * float(np.abs(scene.nodes).max())
         for iteration in range(1, _ITERATIONS + 1):
             positions = scene.nodes + (frames @ u).reshape(-1, 2)
             forces, springs = _contact(scene, positions)
@@ -53,11 +54,11 @@ class Control:
                 return EngineAnswer((frames @ u).reshape(-1, 2), False, iteration, "a singular matrix")
             u[free] += change
             before, step = step, float(np.abs(change).max(initial=0.0))
-            if step <= _CONVERGED * float(np.abs(u).max()) or (
-                step < _ROUNDED * np.abs(u).max() and step >= before / 2
-            ):
+            largest = float(np.abs(u).max())
+            small = max(_ROUNDED * largest, rounding)  # Without a load there are no displacements to count over.
+            if step <= _CONVERGED * largest or (step <= small and step >= before / 2):
                 break
-        converged = step <= _ROUNDED * float(np.abs(u).max())
+        converged = step <= small
         displacements = (frames @ u).reshape(-1, 2)
         forces, _ = _contact(scene, scene.nodes + displacements)
         return EngineAnswer(displacements, converged, iteration, "" if converged else "no end", -forces.reshape(-1, 2))
