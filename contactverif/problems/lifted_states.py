@@ -114,17 +114,35 @@ def least_distance(interface: Interface, positions: FloatArray) -> float:
     return min(_node_distance(nodes[0], master), _node_distance(nodes[1], slave), key=abs)
 
 
+def activation_margin(case: Case) -> float:
+    """Return how far, as a length, the nearest of all distances between a node and a segment is from the activation.
+
+    There the forces of a barrier begin, with a jump in the rate at which their slope changes.
+    """
+    interface, positions, activation = case.interface, case.positions, case.parameter(ACTIVATION)
+    slave, master = (positions[side.segments] for side in (interface.slave, interface.master))
+    nodes = positions[interface.slave.nodes], positions[interface.master.nodes]
+    pairs = ((nodes[0], master), (nodes[1], slave))
+    return min(float(np.abs(_distances(*pair)[0] - activation).min()) for pair in pairs)
+
+
 def _node_distance(points: FloatArray, segments: FloatArray) -> float:
     """Return the least distance of points (n, 2) from segments (m, 2, 2), negative where that point is behind."""
+    run = segments[:, 1] - segments[:, 0]
+    distances, way = _distances(points, segments)
+    point, segment = np.unravel_index(int(distances.argmin()), distances.shape)
+    front = way[point, segment, 0] * run[segment, 1] - way[point, segment, 1] * run[segment, 0]
+    return float(distances[point, segment]) * (1.0 if front >= 0 else -1.0)
+
+
+def _distances(points: FloatArray, segments: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the distances (n, m) of points from segments, and the ways (n, m, 2) from the nearest places there."""
     first, run = segments[:, 0], segments[:, 1] - segments[:, 0]
     way = points[:, None] - first
     size = (run**2).sum(axis=1)
     along = np.divide((way * run).sum(axis=2), size, out=np.zeros(way.shape[:2]), where=size > 0)
     way = way - np.clip(along, 0.0, 1.0)[..., None] * run
-    distances = np.linalg.norm(way, axis=2)
-    point, segment = np.unravel_index(int(distances.argmin()), distances.shape)
-    front = way[point, segment, 0] * run[segment, 1] - way[point, segment, 1] * run[segment, 0]
-    return float(distances[point, segment]) * (1.0 if front >= 0 else -1.0)
+    return np.linalg.norm(way, axis=2), way
 
 
 def _cross(slave: FloatArray, master: FloatArray) -> bool:

@@ -16,6 +16,7 @@ PAGES = {
     "reports/bench/README.md": "reference/speed-against-error.md",
     "reports/findings/README.md": "reference/findings.md",
     "reports/findings/engines.md": "reference/engines.md",
+    "reports/findings/libraries.md": "reference/libraries.md",
     "CONTRIBUTING.md": "project/contributing.md",
     "DECISIONS.md": "project/decisions.md",
     "CHANGELOG.md": "project/changelog.md",

@@ -18,7 +18,7 @@ from contactverif.strategies import smooth_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import any_cases, freeze_state, random_directions
 from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.kinks import excuse_barrier, find_kink, measure_jump
 
 FORCE_IMBALANCE = roundoff.stated_gap_quantity("force imbalance")
 MOMENT_IMBALANCE = roundoff.stated_gap_quantity("moment imbalance")
@@ -141,9 +141,13 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
             undecided = ""
             if values[WORK] <= tolerances[WORK]:
                 break
-            if state.pairing is not None:
+            if steady:
                 continue
             directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
+            if subject.traits.rules.enforcement == "barrier":
+                slope = measure_jump(state, radius, directions) / radius
+                undecided = excuse_barrier(state, radius, radius, values[WORK] * slope)
+                continue
             # Two directions of a plane that reach √2 as far enclose the circle.
             kinks = (find_kink(state, np.sqrt(2) * radius, direction) for direction in directions)
             undecided = next(filter(None, kinks), "")

@@ -22,7 +22,7 @@ from contactverif_properties.shared.any_state import freeze_state, random_direct
 from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import differences_by_complex_step, groups_of
 from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.kinks import find_kink
+from contactverif_properties.shared.kinks import excuse_barrier, find_kink
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
 
 # Combinations of directions that are shorter than this share s of the longest are left out. A central difference is
@@ -122,6 +122,11 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
     first, bending = measure_over(shortest)
     if judge(tangent_directional, first)[0] is not Verdict.FAIL:
         return replace(first, finding=None)
+    if first.finding is not None:
+        longest, step, _ = _central_steps(case, shortest)
+        error = abs(first.finding.found[0] - first.finding.right[0])
+        if excuse := excuse_barrier(state, longest, step, error):
+            return replace(first, undecided=excuse)
     if bending >= shortest / 2:
         return first
     second, _ = measure_over(max(bending, SHORTEST_BENDING * shortest))

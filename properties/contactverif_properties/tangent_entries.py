@@ -21,6 +21,7 @@ from contactverif.problems.long_states import long_states
 from contactverif.strategies import smooth_cases
 from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import STEPS, differences_on_both_sides, single_moves, step
+from contactverif_properties.shared.kinks import excuse_barrier
 from contactverif_properties.shared.tangent_blocks import (
     BLOCK,
     COMPLEX_BLOCK,
@@ -108,8 +109,11 @@ def measure_blocks(case: Case, subject: Subject) -> Measurement:
     error = float(comparison.error[row, column]) / size if value else 0.0  # A block that is excused has none.
     quantity = COMPLEX_BLOCK if judge.by_complex_step else BLOCK
     undecided = "" if value > 1 or lacking else excuses.reason
+    if value > 1:
+        length = step(case, np.float64)
+        undecided = excuse_barrier(judge.state, max(STEPS) * length, length, float(comparison.error[row, column]))
     tolerance = error / value if value else EXACT
-    numbers = [] if undecided else [quantity.check(error, tolerance), LACKING.check(float(lacking), 0.0)]
+    numbers = [] if undecided and value <= 1 else [quantity.check(error, tolerance), LACKING.check(float(lacking), 0.0)]
     return Measurement(
         numbers,
         undecided=undecided,

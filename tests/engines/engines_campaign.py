@@ -1,9 +1,10 @@
-"""Ask every engine every question that displacements answer, and write the tables of `reports/findings`.
+"""Ask every engine and every library all questions that it can answer, and write the tables of `reports/findings`.
 
-`tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question, and the page `engines.md`.
-Engines that come as Python packages get environments of their own; `GETFEM_PYTHON` names the interpreter of GetFEM. A
-report that is complete is read and not made
-again, and one that was stopped goes on, so that the same command goes on with the whole.
+`tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question, and the page `engines.md`;
+`tox -e libraries` writes `libraries.csv` and `libraries.md`. Engines that come as Python packages get environments of
+their own; `GETFEM_PYTHON` names the interpreter of GetFEM. A library is a package of the environment that runs this. A
+report that is complete is read and not made again, and one that was stopped goes on, so that the same command goes on
+with the whole.
 """
 
 import csv
@@ -14,6 +15,7 @@ import subprocess
 import sys
 import venv
 from dataclasses import dataclass
+from importlib.util import find_spec
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -36,6 +38,7 @@ class Choice:
     options: str = ""
     packages: tuple[str, ...] = ()
     variable: str = ""
+    library: str = ""  # The package of a formulation; empty for an engine.
 
     @property
     def label(self) -> str:
@@ -70,6 +73,9 @@ CHOICES = (
 )
 
 
+LIBRARIES = tuple(Choice("ipctk", f"kind={kind}", library="ipctk") for kind in ("ipc", "improved", "ogc"))
+
+
 def _interpreter(folder: Path, packages: tuple[str, ...]) -> Path:
     """Return the interpreter of an environment with numpy and some packages, which is made if it is not there."""
     python = folder / "bin" / "python"
@@ -84,7 +90,8 @@ def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
     report = folder / f"{choice.label.replace(':', '-').replace('=', '-').replace(',', '-')}.json"
     if not report.exists():
         journal = report.with_name(report.name + ".journal")
-        new = ["--engine", choice.write_name(folder / "environments"), "--seed", "1", "--examples", str(examples)]
+        name = choice.write_name(folder / "environments")
+        new = [*([name] if choice.library else ["--engine", name]), "--seed", "1", "--examples", str(examples)]
         arguments = ["--resume", str(report)] if journal.exists() else [*new, "--out", str(report), "--no-memory"]
         command = [sys.executable, "-m", "contactverif", "verify", *arguments, "--keep-going", "-q", "--jobs", "2"]
         subprocess.run(command, check=False, cwd=folder)
@@ -102,6 +109,18 @@ def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
     counts = (str(row[key]) for key in ("judged", "failed", "planned"))
     return choice.label, row["property"], row["result"], *counts, closest["name"], *numbers, seconds, row["reason"]
 
+
+LIBRARIES_PAGE = """# Libraries of contact, question by question
+
+Each library was asked every property that makes sense for it, as a formulation: up to {examples} random states of seed
+1, and all lists. A cell is read as on the page of [contact codes](engines.md): the verdict, the number that is nearest
+to its tolerance or furthest beyond it, over the tolerance, how many cases could be judged of how many, and the seconds
+of a case. What fails without a promise is no mistake: a barrier at nodes does not pass the patch test.
+
+`tox -e libraries` wrote this page, and `libraries.csv` beside it, which has the reasons.
+
+{tables}
+"""
 
 PAGE = """# Contact codes, question by question
 
@@ -122,8 +141,8 @@ the seconds of a scene. A scene is not judged where the code says that it finds 
 """
 
 
-def write_page(lines: list[tuple[str, ...]], examples: int) -> None:
-    """Write the page: a table for each engine."""
+def write_page(lines: list[tuple[str, ...]], examples: int, name: str = "engines", page: str = PAGE) -> None:
+    """Write the page: a table for each engine or library."""
     tables = []
     for engine in dict.fromkeys(line[0] for line in lines):
         rows = ["| question | verdict | over tolerance | judged | seconds |", "|---|---|---|---|---|"]
@@ -137,15 +156,18 @@ def write_page(lines: list[tuple[str, ...]], examples: int) -> None:
                 f"{row['seconds a case']} |"
             )
         tables.append("\n".join([f"## {engine}", "", *rows, ""]))
-    (FOLDER / "engines.md").write_text(PAGE.format(examples=examples, tables="\n".join(tables)), encoding="utf-8")
+    (FOLDER / f"{name}.md").write_text(page.format(examples=examples, tables="\n".join(tables)), encoding="utf-8")
 
 
-def main(folder: Path, examples: int) -> None:
-    """Ask all engines whose program is there."""
+def main(folder: Path, examples: int, name: str = "engines") -> None:
+    """Ask all engines whose program is there, or all libraries that are installed."""
     for place in (folder, FOLDER):
         place.mkdir(parents=True, exist_ok=True)
-    lines = []
-    for choice in CHOICES:
+    lines, (choices, page) = [], (LIBRARIES, LIBRARIES_PAGE) if name == "libraries" else (CHOICES, PAGE)
+    for choice in choices:
+        if choice.library and find_spec(choice.library) is None:
+            print(f"{choice.label}: {choice.library} is not installed")
+            continue
         if choice.name == "calculix" and shutil.which("ccx") is None:
             print("calculix: the program ccx is not installed")
             continue
@@ -153,10 +175,10 @@ def main(folder: Path, examples: int) -> None:
             print(f"{choice.name}: {choice.variable} is not set")
             continue
         lines += ask(choice, folder, examples)
-        with (FOLDER / "engines.csv").open("w", newline="", encoding="utf-8") as file:
+        with (FOLDER / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
-        write_page(lines, examples)
+        write_page(lines, examples, name, page)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1000)
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1000, *sys.argv[3:4])

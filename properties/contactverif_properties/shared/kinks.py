@@ -18,8 +18,9 @@ from dataclasses import replace
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
-from contactverif.contract.case import Case
+from contactverif.contract.case import ACTIVATION, Case
 from contactverif.oracle import kink_margin
+from contactverif.problems.lifted_states import activation_margin
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
@@ -153,6 +154,27 @@ def explain_by_rounded_decision(state: FrozenState) -> str:
     where errors are counted in roundings, that would excuse a hundred of them.
     """
     return find_kink(state, COORDINATE_ROUNDING * state.case.diameter)
+
+
+def excuse_barrier(state: FrozenState, longest: float, step: float, error: float) -> str:
+    """Return why differences of a barrier mean nothing, or an empty string.
+
+    Its forces may begin within the longest step, where their slope has a kink. Or they are noise, as where a library
+    multiplies whole coordinates: forces change by more than a derivative's `error` makes of a step, a length, where
+    nodes move by roundoff.
+    """
+    case = state.case
+    if ACTIVATION not in case.parameters:
+        return ""
+    if activation_margin(case) <= np.sqrt(2) * longest:
+        return f"a kink: a node is within {longest:.2g} of the activation distance"
+    rounding = UNIT_ROUNDOFF * case.largest_coordinate
+    directions = random_directions(case.seed, N_AROUND, case.z.size)
+    forces = np.array([_forces(state, case.z + rounding * direction) for direction in directions])
+    noise = float(np.ptp(forces, axis=0).max())
+    if 4 * noise >= error * step:
+        return f"roundoff: forces change by {noise:.2g} where nodes move by {rounding:.2g}"
+    return ""
 
 
 def find_kink(state: FrozenState, reach: float, direction: FloatArray | None = None) -> str:
