@@ -132,28 +132,35 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
         values[ASYMMETRY] = roundoff.ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
         tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance)
     if subject.traits.promises.tangent != "approximate":
-        # A barrier begins with a jump in the curvature of its forces, which a loop may cross on a frozen pairing, too.
-        steady = state.pairing is not None and subject.traits.rules.enforcement != "barrier"
-        for share in RADII[:1] if steady else RADII:
-            radius = share * case.resolution
-            values[WORK] = largest_work(state, radius)
-            tolerances[WORK] = 64 * UNIT_ROUNDOFF * distance / radius
-            undecided = ""
-            if values[WORK] <= tolerances[WORK]:
-                break
-            if steady:
-                continue
-            directions = random_directions(case.seed, 2 * N_LOOPS, case.z.size)
-            if subject.traits.rules.enforcement == "barrier":
-                slope = measure_jump(state, radius, directions) / radius
-                undecided = excuse_barrier(state, radius, radius, values[WORK] * slope)
-                continue
-            # Two directions of a plane that reach √2 as far enclose the circle.
-            kinks = (find_kink(state, np.sqrt(2) * radius, direction) for direction in directions)
-            undecided = next(filter(None, kinks), "")
-            if not undecided:
-                break
+        values[WORK], tolerances[WORK], undecided = _find_work(state, subject, distance)
     return Measurement(check_all(values, tolerances), undecided, idle=not state.forces.any())
+
+
+def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[float, float, str]:
+    """Return the work in closed loops, its tolerance, and why work that is left decides nothing.
+
+    The distance Z, a length, is that at which positions are rounded. Loops become smaller until none is left.
+    """
+    # A barrier begins with a jump in the curvature of its forces, which a loop may cross on a frozen pairing, too.
+    is_barrier = subject.traits.rules.enforcement == "barrier"
+    steady = state.pairing is not None and not is_barrier
+    work, tolerance, undecided = 0.0, 0.0, ""
+    for share in RADII[:1] if steady else RADII:
+        radius = share * state.case.resolution
+        work, tolerance, undecided = largest_work(state, radius), 64 * UNIT_ROUNDOFF * distance / radius, ""
+        if work <= tolerance or steady:
+            break
+        directions = random_directions(state.case.seed, 2 * N_LOOPS, state.case.z.size)
+        if is_barrier:
+            slope = measure_jump(state, radius, directions) / radius
+            undecided = excuse_barrier(state, radius, radius, work * slope)
+            continue
+        # Two directions of a plane that reach √2 as far enclose the circle.
+        kinks = (find_kink(state, np.sqrt(2) * radius, direction) for direction in directions)
+        undecided = next(filter(None, kinks), "")
+        if not undecided:
+            break
+    return work, tolerance, undecided
 
 
 def largest_work(state: FrozenState, radius: float) -> float:
