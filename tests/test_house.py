@@ -95,7 +95,7 @@ ROOMS = {
     # An engine writes files and starts programs; its code is imported inside `solve`.
     "contactverif_engines": Room(("contract",), ("numpy", "scipy", "skfem", "ngsolve", "netgen", "KratosMultiphysics")),
     # A library is a file, and a call of it needs ctypes.
-    "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy")),
+    "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo")),
     "properties.shared": Room(
         ("contract", "oracle", "mechanics", "problems", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),
