@@ -97,7 +97,7 @@ ROOMS = {
         ("contract",), ("numpy", "scipy", "skfem", "ngsolve", "netgen", "KratosMultiphysics", "getfem", "openseespy")
     ),
     # A library is a file, and a call of it needs ctypes.
-    "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk")),
+    "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo")),
     "properties.shared": Room(
         ("contract", "oracle", "mechanics", "problems", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),
