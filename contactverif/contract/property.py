@@ -27,6 +27,8 @@ LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says
 # With the 23 built-in formulations and 100 cases each, most properties leave none of 2300 cases undecided. Then the
 # share is below 3/2300 with a probability of 95 %.
 NONE_UNDECIDED = 3 / 2300
+# The reason of a case that is not asked of a formulation of open chains (`Abilities.chains`): no case to be judged.
+CLOSED_CHAIN = "a chain is closed, and the formulation takes open ones"
 PLANE = 2  # The number of coordinates of all interfaces.
 WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
 WITH_BARRIER = WITHOUT_BARRIER | {"barrier"}

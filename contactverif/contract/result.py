@@ -25,7 +25,7 @@ from contactverif.contract.case_counts import (
 )
 from contactverif.contract.foreign_text import LONGEST_FACT, clean, name_line, one_line
 from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.property import CLOSED_CHAIN, Outcome, PropertyInfo, Verdict, checked_numbers
 
 _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what right formulations decide was decided.
@@ -212,7 +212,8 @@ class Row:
         More than twice the usual share counts, and only if a binomial distribution makes that no chance.
         """
         counts, usual = self.tally.counts, self.info.usual_undecided
-        if not exceeds(counts.undecided, counts.cases, min(2 * usual, 1.0)):
+        closed = self.tally.reasons.get(CLOSED_CHAIN, 0)
+        if not exceeds(counts.undecided - closed, counts.cases - closed, min(2 * usual, 1.0)):
             return ""
         share = f"{percent(counts.undecided_share)} of the cases are undecided"
         return f"{share}, of right formulations {percent(usual)}: what is undecided may hide what is wrong"

@@ -180,7 +180,7 @@ class Abilities:
     motions : Literal['finite', 'small']
         ``"small"``: normals are those of the reference configuration, so that the state is not turned.
     chains : Literal['any', 'open']
-        ``"open"``: no chain of segments is closed. Of random states, those with a closed one are undecided.
+        ``"open"``: no chain of segments is closed. Of the states, those with a closed one are left out.
     """
 
     dimensions: tuple[int, ...] = (2,)

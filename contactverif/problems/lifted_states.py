@@ -17,6 +17,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import ACTIVATION, LEAST_GAP, Case
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.property import CLOSED_CHAIN
 from contactverif.contract.traits import Traits
 
 LEAST, LARGEST = 0.3, 0.7  # The range of the least gap over the activation distance.
@@ -25,7 +26,6 @@ UNEVEN = 0.1  # The largest part of the activation distance by which one node go
 N_TRIALS = 120  # Heights that are tried, by growing steps and then by halving.
 STRIDE = 1.4  # Each step over the one before; twice as long, a step would turn a small ring inside out.
 NOT_LIFTED = "the surfaces cannot be taken apart to a gap within the activation distance"
-CLOSED_CHAIN = "a chain is closed, and the formulation takes open ones"
 
 
 def activation_distance(interface: Interface, traits: Traits) -> float:

@@ -21,7 +21,15 @@ from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
-from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
+from contactverif.contract.property import (
+    CLOSED_CHAIN,
+    Outcome,
+    Property,
+    PropertyInfo,
+    Verdict,
+    checked_numbers,
+    judge,
+)
 from contactverif.contract.result import JUDGED_SHARE, Row
 from contactverif.contract.subject import Subject
 from contactverif.problems.lifted_states import fit_to_traits
@@ -119,9 +127,10 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
 
 def _fewest_judged(row: Row) -> float:
     """Return the least number of judged cases. Of a few random ones, the one that cannot be judged comes by chance."""
-    fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * row.planned
+    planned = max(row.planned - row.tally.reasons.get(CLOSED_CHAIN, 0), 1)
+    fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * planned
     is_list = any(outcome.case_or_summary.name for outcome in row.outcomes[:1])
-    return fewest if is_list else min(fewest, max(row.planned - 1, 1))
+    return fewest if is_list else min(fewest, max(planned - 1, 1))
 
 
 def _too_idle(row: Row) -> str:

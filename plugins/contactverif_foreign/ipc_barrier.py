@@ -46,8 +46,8 @@ class IpcBarrier:
         n_slave = interface.n_slave_nodes
         mesh.can_collide = self._ipctk.CollisionFilter(lambda first, second: (first < n_slave) != (second < n_slave))
         collisions = self._ipctk.NormalCollisions()
+        collisions.use_area_weighting = self.areas  # First, since one of the sets warns where there are no areas.
         collisions.collision_set_type = self._kind
-        collisions.use_area_weighting = self.areas
         collisions.build(mesh, _vertices(z), self._range(interface))
         return {"collisions": Handle((mesh, collisions))}
 

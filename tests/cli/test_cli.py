@@ -73,7 +73,7 @@ CASE = "nts.patch.flat.transmission"
 
 MISTAKES = [
     # argument, found, needed
-    (["verify"], r"NAME: found nothing; needed --all, or some of c, chen-hisada, feap, mortar, .*"),
+    (["verify"], r"NAME: found nothing; needed --all, or some of c, chen-hisada, feap, fedoo, ipctk, mortar, .*"),
     (["verify", "vts-pt"], r"formulation: found 'vts-pt'; needed a name that exists; the nearest: vts-ppt.*"),
     (["verify", "nts-ar:area=now"], r"area: found 'now'; needed 'current' or 'reference'"),
     (["verify", "nts:tau=2"], r"tau: found 2; needed a number ≥ 0 and < 1"),

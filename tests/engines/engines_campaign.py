@@ -73,7 +73,15 @@ CHOICES = (
 )
 
 
-LIBRARIES = tuple(Choice("ipctk", f"kind={kind}", library="ipctk") for kind in ("ipc", "improved", "ogc"))
+LIBRARIES = (
+    Choice("ipctk", "kind=ipc", library="ipctk"),
+    Choice("ipctk", "kind=improved", library="ipctk"),
+    Choice("ipctk", "kind=ogc", library="ipctk"),
+    Choice("opensees", "kind=nts", library="openseespy"),
+    Choice("opensees", "kind=interface", library="openseespy"),
+    Choice("fedoo", "kind=search_nearest", library="fedoo"),
+    Choice("fedoo", "kind=bucket", library="fedoo"),
+)
 
 
 def _interpreter(folder: Path, packages: tuple[str, ...]) -> Path:

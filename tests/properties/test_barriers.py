@@ -9,9 +9,10 @@ from subjects import judge_as, load_property
 
 from contactverif import Case, Interface, Rules, Subject, Traits, Verdict, judge_case, named_case
 from contactverif.contract.case import ACTIVATION, LEAST_GAP
-from contactverif.contract.property import Property
+from contactverif.contract.property import CLOSED_CHAIN, Property
 from contactverif.plugins.registry import property_ids
-from contactverif.problems.lifted_states import CLOSED_CHAIN, LARGEST, LEAST, fit_to_traits, least_distance
+from contactverif.problems.lifted_states import LARGEST, LEAST, fit_to_traits, least_distance
+from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, smooth_cases
 from contactverif.strategies.rings import closed_cases
@@ -182,3 +183,16 @@ def test_a_barrier_presses_evenly_where_meshes_match_and_weights_are_lengths() -
     case = Case(interface, positions.reshape(-1), 1.0, parameters)
     for make, verdict in ((LogBarrier, Verdict.PASS), (SameWeights, Verdict.FAIL)):
         judge_as(verdict, load_property("patch.flat.transmission"), case, Subject("barrier", make))
+
+
+def test_states_that_are_left_out_for_their_chains_do_not_keep_a_row_from_being_judged() -> None:
+    """Half of the states of `renumbering` are closed rings."""
+
+    class OpenChains(LogBarrier):
+        traits = LogBarrier.traits.revise(chains="open")
+
+    result = run([Subject("open", OpenChains)], [load_property("renumbering")], examples=20, seed=1)
+    (row,) = result.rows
+    assert row.verdict is Verdict.PASS, row.reason
+    assert row.tally.reasons[CLOSED_CHAIN] >= 10
+    assert not row.suspicion
