@@ -99,7 +99,14 @@ def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
     if not report.exists():
         journal = report.with_name(report.name + ".journal")
         name = choice.write_name(folder / "environments")
-        new = [*([name] if choice.library else ["--engine", name]), "--seed", "1", "--examples", str(examples)]
+        # A box forbids the socket that OpenSees opens when it is imported.
+        new = [
+            *([name, "--isolation", "process"] if choice.library else ["--engine", name]),
+            "--seed",
+            "1",
+            "--examples",
+            str(examples),
+        ]
         arguments = ["--resume", str(report)] if journal.exists() else [*new, "--out", str(report), "--no-memory"]
         command = [sys.executable, "-m", "contactverif", "verify", *arguments, "--keep-going", "-q", "--jobs", "2"]
         subprocess.run(command, check=False, cwd=folder)
