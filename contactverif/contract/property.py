@@ -207,12 +207,9 @@ class Property(PropertyInfo):
         if PLANE not in traits.abilities.dimensions:
             return "the interfaces are plane, and the formulation takes none of them"
         if traits.rules.enforcement in self.asks:
-            unknown = traits.rules.enforcement == "barrier" and traits.rules.activation is None
-            return (
-                "the barrier does not state the trait `activation`, so no gap is known"
-                if unknown
-                else self.applicable(traits)
-            )
+            if traits.rules.enforcement == "barrier" and traits.rules.activation is None:
+                return "the barrier does not state the trait `activation`, so no gap is known"
+            return self.applicable(traits)
         if traits.rules.enforcement == "barrier" and "penalty" in self.asks:
             return "the states penetrate, where a barrier is not defined"
         return f"the enforcement is by a {traits.rules.enforcement}"

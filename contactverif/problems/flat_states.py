@@ -173,9 +173,7 @@ def node_hit_states() -> tuple[Case, ...]:
 
 
 _EIGHT = (1.0, 0.75, 1.25, 1.0, 0.5, 1.5, 1.25, 0.75), (0.75, 1.25, 1.5, 0.875, 1.25, 0.875, 0.5, 1.0)
-
-
-MANY_EIGHTS = 38
+MANY_EIGHTS = 38  # So many of these make more segments than a number of one byte tells apart.
 
 
 @cache
@@ -196,7 +194,6 @@ def equal_length_states() -> tuple[Case, ...]:
             ("8 segments", _EIGHT, 2.0**-4, UPRIGHT, 16.0),
             ("8 segments, upright, soft and shallow", _EIGHT, 2.0**-12, (0, 1, 1), 2.0**-4),
             ("16 segments, stiff", sixteen, 2.0**-4, UPRIGHT, 2.0**20),
-            # More than fit into a number of one byte.
             (f"{8 * MANY_EIGHTS} segments", many, 2.0**-4, UPRIGHT, 16.0),
         )
     )

@@ -181,9 +181,12 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     """
     if isinstance(subject, EngineSubject):
         return FirstCall()  # It has no forces to ask for.
+    first_case, refused = fit_to_traits(named_case(FIRST), subject.traits)
+    if refused:
+        return FirstCall()  # A barrier whose activation is unknown is not defined in these states.
     try:
         with one_thread(), np.errstate(all="ignore"):
-            first = ask_first(subject, fit_to_traits(named_case(FIRST), subject.traits)[0], parts)
+            first = ask_first(subject, first_case, parts)
             opposite, seconds = _pulls_in_time(subject)
             if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
                 seconds = min(seconds, _pulls_in_time(subject)[1])

@@ -113,8 +113,10 @@ def engine_zero_load(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerance))
 
 
-KINK_TERMS = "(g/ℓ) tan(φ/2) (4 + tan(φ/2) tan(φ)/2) + u (8X/g + 4N) + a (1 + M U/(ℓ p)) + 1e-12 κ"
-KINK_REASON = "Penetration moves the kink along a facet, as in `patch.kinked`; displacements are wrong by a U."
+KINK_TERMS = (
+    "(g/ℓ) tan(φ/2) (4 + tan(φ/2) tan(φ)/2) + u (8X/g + 4N) + p (1 + ν)(1 − 2ν)/E + a (1 + M U/(ℓ p)) + 1e-12 κ"
+)
+KINK_REASON = "Penetration moves the kink along a facet, and blocks contract; displacements are wrong by a U."
 KINK_STRESS = Quantity("stress error", KINK_TERMS, KINK_REASON)
 KINK_FORCES = Quantity("error of a nodal force", KINK_TERMS, KINK_REASON)
 

@@ -12,6 +12,7 @@ from contactverif.contract.case import ACTIVATION, LEAST_GAP
 from contactverif.contract.property import CLOSED_CHAIN, Property
 from contactverif.plugins.registry import property_ids
 from contactverif.problems.lifted_states import LARGEST, LEAST, fit_to_traits, least_distance
+from contactverif.run.judge import FirstCall, call_first
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, smooth_cases
@@ -196,3 +197,16 @@ def test_states_that_are_left_out_for_their_chains_do_not_keep_a_row_from_being_
     assert row.verdict is Verdict.PASS, row.reason
     assert row.tally.reasons[CLOSED_CHAIN] >= 10
     assert not row.suspicion
+
+
+def test_a_barrier_that_states_no_activation_distance_is_not_called_for_the_first_time() -> None:
+    """A right barrier pushes on if the surfaces have passed each other, and that looks like a wrong sign."""
+
+    class Silent(LogBarrier):
+        traits = LogBarrier.traits.revise(activation=None)
+
+    assert call_first(Subject("silent", Silent), {"tangent"}) == FirstCall()
+    called = call_first(Subject("barrier", LogBarrier), {"tangent"})
+    assert called.answers is not None
+    assert not called.opposite_sign
+    assert call_first(Subject("pulls", Pulls), {"tangent"}).opposite_sign
