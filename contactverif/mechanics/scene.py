@@ -115,6 +115,12 @@ class Scene:
             raise MisuseError("bodies", "no slave within reach of a master", "bodies that can touch")
         return slaves + masters
 
+    @property
+    def nodes_in_reach(self) -> IntArray:
+        """The numbers (n_nodes,) of the interface's nodes among the nodes of all bodies, one body after the other."""
+        first = np.cumsum([0, *(len(body.nodes) for body in self.bodies)])
+        return np.concatenate([first[index] + self.bodies[index].contact_nodes for index in self.bodies_in_reach])
+
     @cached_property
     def condensed_bodies(self) -> tuple[CondensedBody, ...]:
         """The bodies within reach, condensed, in the order of `bodies_in_reach`."""

@@ -7,7 +7,7 @@ measured on the scene itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,9 +29,15 @@ class Pose:
     lowered: FloatArray  # (n_nodes, 2): by how much nodes were moved beforehand, in the axes of the arrays.
     scale: float  # The factor of all loads and imposed displacements.
 
-    def displacements(self, answer: EngineAnswer) -> FloatArray:
-        """Return the displacements (n_nodes, 2) of the bodies as they were, in global axes."""
-        return (self.lowered + answer.displacements) / self.scale @ self.turn.T
+    def restore(self, answer: EngineAnswer) -> EngineAnswer:
+        """Return an answer for the bodies as they were: in global axes, and under their own loads."""
+        forces, pressures = answer.contact_forces, answer.pressures
+        return replace(
+            answer,
+            displacements=(self.lowered + answer.displacements) / self.scale @ self.turn.T,
+            contact_forces=None if forces is None else forces / self.scale @ self.turn.T,
+            pressures=None if pressures is None else pressures / self.scale,
+        )
 
 
 def pose_bodies(

@@ -14,7 +14,6 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import Solution
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.scene_arrays import Pose
 from contactverif.mechanics.trace import Trace
 
 # Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
@@ -81,7 +80,7 @@ def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -
 def solve_by_engine(
     scene: Scene, subject: EngineSubject, *, lowered: bool = True, linear: bool = False
 ) -> tuple[Solution, EngineAnswer | None]:
-    """Return the solution of a scene by an engine, with its answer; None if the scene cannot be posed to it.
+    """Return the solution of a scene by an engine, with its restored answer; None if the scene cannot be posed to it.
 
     The scene is turned where the engine takes no inclined axes. Bodies that nothing holds are `lowered`, as in
     `Scene.pose`. Where its solution is linear in the loads, they are multiplied by the engine's `load_scale`.
@@ -92,17 +91,15 @@ def solve_by_engine(
         pose = scene.pose(upright=not traits.inclined_supports, lowered=lowered, scale=scale)
     except MisuseError as error:
         return Solution.from_displacements(scene, np.zeros_like(scene.interface.nodes), str(error)), None
-    answer = subject.solve(pose.arrays)
-    return engine_solution(scene, pose, answer), answer
+    answer = pose.restore(subject.solve(pose.arrays))
+    return engine_solution(scene, answer), answer
 
 
-def engine_solution(scene: Scene, pose: Pose, answer: EngineAnswer) -> Solution:
-    """Return the solution of a scene that an answer is.
+def engine_solution(scene: Scene, answer: EngineAnswer) -> Solution:
+    """Return the solution of a scene that an answer is, which `Pose.restore` returned.
 
     Its forces are those that the condensed bodies need for the displacements of the interface's nodes, so that the
     cells of the code do not matter.
     """
-    first = np.cumsum([0, *(len(body.nodes) for body in scene.bodies)])
-    nodes = np.concatenate([first[index] + scene.bodies[index].contact_nodes for index in scene.bodies_in_reach])
     no_solution = "" if answer.converged else f"did not converge: {one_line(answer.message) or 'no words about it'}"
-    return Solution.from_displacements(scene, pose.displacements(answer)[nodes], no_solution)
+    return Solution.from_displacements(scene, answer.displacements[scene.nodes_in_reach], no_solution)

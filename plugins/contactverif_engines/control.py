@@ -60,8 +60,18 @@ class Control:
                 break
         converged = step <= small
         displacements = (frames @ u).reshape(-1, 2)
-        forces, _ = _contact(scene, scene.nodes + displacements)
-        return EngineAnswer(displacements, converged, iteration, "" if converged else "no end", -forces.reshape(-1, 2))
+        forces = -_contact(scene, scene.nodes + displacements)[0].reshape(-1, 2)
+        message = "" if converged else "no end"
+        return EngineAnswer(displacements, converged, iteration, message, forces, _mean_pressures(scene, forces))
+
+
+def _mean_pressures(scene: SceneArrays, forces: FloatArray) -> FloatArray:
+    """Return the force (n_nodes, 2) on each node of the slave over the length of its segments."""
+    ends = scene.nodes[scene.slave]
+    halves = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2, 2)
+    lengths = np.bincount(scene.slave.reshape(-1), halves)
+    nodes = np.unique(scene.slave)
+    return np.asarray(np.hypot(*forces[nodes].T) / lengths[nodes])
 
 
 def _contact(scene: SceneArrays, positions: FloatArray) -> tuple[FloatArray, sparse.csr_array]:

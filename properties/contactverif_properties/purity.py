@@ -83,13 +83,14 @@ def purity(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** Two instances answer the same questions in different orders: residual, tangent and contact
     points in turn, at two states and on two interfaces in turn, and with two pairings of one state where it has two.
-    The measured numbers count entries that differ; the tolerance is 0, since the same operations on the same numbers
-    give the same bits. A third instance has another penalty. Its forces differ, and those of the first instance are
-    what they were. A batch may round otherwise, as if nodes had moved by uX. That changes a force by uX (k + |R|/ℓ): k
-    is the stiffness, and a segment turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has its own |R|,
-    and k is the larger of ε̂L and the change of the residual from one state to the other over the way between them. A
-    pairing that differs, or an interface that was changed, fails in words. A pairing with a handle is made twice at one
-    state, with another state in between: it must have the same entries and give the same answers.
+    One more state is paired in which one side, or half of all nodes, lies as before, so that a store with too small a
+    key is seen. The measured numbers count entries that differ; the tolerance is 0, since the same operations on the
+    same numbers give the same bits. A third instance has another penalty. Its forces differ, and those of the first
+    instance are what they were. A batch may round otherwise, as if nodes had moved by uX. That changes a force by uX (k
+    + |R|/ℓ): k is the stiffness, and a segment turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has
+    its own |R|, and k is the larger of ε̂L and the change of the residual from one state to the other over the way
+    between them. A pairing that differs, or an interface that was changed, fails in words. A pairing with a handle is
+    made twice at one state, with another state in between: it must have the same entries and give the same answers.
 
     A plugin that lives in a process of its own is asked in a second process too, which differs in what no answer may
     depend on: the seed of hashes, and the state that was asked first. The pairing is the same, and the residual is held
@@ -107,7 +108,9 @@ def purity(case: Case, subject: Subject) -> Measurement:
     formulation, state = prepare_state(case, subject)
     penalty = state.penalty if state.n_multipliers else subject.penalty(case)
     interface, z = state.interface, state.z
-    distant = z + np.random.default_rng(state.seed).uniform(-1, 1, z.size) * state.resolution / 4
+    random = np.random.default_rng(state.seed)
+    distant = z + random.uniform(-1, 1, z.size) * state.resolution / 4
+    partly = _move_some(state, distant, random)
     near = z + NEAR * (distant - z)
     other, z_other = interleaved_calls.renumber(state, formulation)
     before = _fingerprint(interface), _fingerprint(other)
@@ -120,7 +123,8 @@ def purity(case: Case, subject: Subject) -> Measurement:
     broken = []
     if formulation.pair(interface, z) != pairing:
         broken.append("the pairing of a state differs in a repeated call")
-    if any(
+    pairing_of_some = formulation.pair(interface, partly)
+    if second.pair(interface, partly) != pairing_of_some or any(
         second.pair(question.interface, question.z) != question.pairing for question in (*questions[1:3], questions[1])
     ):
         broken.append("the pairing of a state depends on the state before it")
@@ -147,7 +151,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
     if isinstance(subject, Restartable):
         far = subject.restart().with_penalty(penalty)
         far.residual(other, far.pair(other, z_other), z_other)
-        if far.pair(interface, z) != pairing:
+        if far.pair(interface, partly) != pairing_of_some or far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")
         forces_there = np.array(far.answers([("residual", interface, pairing, u) for u in (z, near)]))
         difference = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
@@ -169,6 +173,20 @@ def purity(case: Case, subject: Subject) -> Measurement:
         broken.append("the interface was changed")
     idle = not forces[:, : interface.n_unknowns].any()
     return Measurement(numbers, broken="; ".join(broken), idle=idle)
+
+
+def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Return a state (n_unknowns,) in which one side, or about half of all nodes, is where it was."""
+    n_slave, n_nodes = state.interface.n_slave_nodes, state.interface.n_nodes
+    stays = random.random(n_nodes) < 1 / 2
+    match random.integers(3):
+        case 0:
+            stays = np.arange(n_nodes) < n_slave
+        case 1:
+            stays = np.arange(n_nodes) >= n_slave
+    moves = np.ones(state.z.size, bool)
+    moves[: 2 * n_nodes] = np.repeat(~stays, 2)
+    return np.where(moves, distant, state.z)
 
 
 @Property.define(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,7 @@ from contactverif_properties.shared.conditioning import (
     measure_conditioning,
 )
 from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.wave_answer import answer_to_wave
+from contactverif_properties.shared.wave_answer import InterfaceAnswer, answer_to_wave
 from contactverif_properties.stability_forces import ExactMotion
 
 ROUNDINGS = forces_quantity("error of a solved force in roundings")
@@ -330,11 +331,18 @@ def locking(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where Newton's method finds no solution on that pairing.
     """
+    return measure_locking(case, subject, lambda columns, penalty: answer_to_wave(columns, penalty, subject), _UNSOLVED)
+
+
+def measure_locking(
+    case: Case, subject: Subject, answer_at: Callable[[tuple[int, int], float], InterfaceAnswer | None], unsolved: str
+) -> Measurement:
+    """Return the drift and the roughness of answers to the wave, which have the numbers of segments and ε̂ h/E."""
     n_slave, n_master = case.parameters["columns"].astype(int).tolist()
-    columns, penalty = (n_slave, n_master), case.parameter("stiffness")
-    answer = answer_to_wave(columns, penalty, subject)
+    columns = (n_slave, n_master)
+    answer = answer_at(columns, case.parameter("stiffness"))
     if answer is None:
-        return Measurement(undecided=_UNSOLVED)
+        return Measurement(undecided=unsolved)
     smooth = matching_answer(n_slave, case.penalty).pressure_range
     by_forces, by_points = answer.force_range / smooth, answer.point_range / smooth
     values = {ROUGHNESS: float(np.fmax(by_forces, by_points))}
@@ -342,9 +350,9 @@ def locking(case: Case, subject: Subject) -> Measurement:
     if np.isfinite(by_points):
         details["roughness of reported pressures"] = by_points
     if subject.traits.rules.enforcement == "penalty":
-        soft = answer_to_wave(columns, SOFT, subject)
+        soft = answer_at(columns, SOFT)
         if soft is None:
-            return Measurement(undecided=_UNSOLVED)
+            return Measurement(undecided=unsolved)
         at_soft = wave_blocks(*columns, SOFT, wave=0.0).penalty
         factor = soft.stiffness / at_soft  # Springs may act twice.
         ratio = answer.compliance / mean_of_matching(columns, factor * case.penalty)

@@ -50,6 +50,14 @@ class Plain:
                 break
         if self.fault == "finds nothing":
             return EngineAnswer(turn(frames, u), False, 40, "too many cutbacks")
+        if self.fault.startswith("reports"):
+            pushes = -contact(scene, scene.nodes + turn(frames, u), "", 0)[0].reshape(-1, 2)
+            halves = np.repeat(np.linalg.norm(np.diff(scene.nodes[scene.slave], axis=1)[:, 0], axis=1) / 2, 2)
+            nodes, lengths = np.unique(scene.slave), np.bincount(scene.slave.reshape(-1), halves)
+            pressures = np.linalg.norm(pushes[nodes], axis=1) / lengths[nodes]
+            pushes *= -1.0 if self.fault == "reports what pushes the other side" else 1.0
+            pressures *= 0.999 if self.fault == "reports a pressure that is too small" else 1.0
+            return EngineAnswer(turn(frames, u), True, 1, "", pushes, pressures)
         return EngineAnswer(turn(frames, u), True, 1)
 
 
@@ -116,12 +124,16 @@ def contact(scene, positions, fault, calls):
             low, high = np.clip([s2, s1], 0, 1)
             if s1 <= s2 or high <= low:
                 continue
-            s = (low + high) / 2 + (high - low) / 2 * ROOTS
+            s, shares = (low + high) / 2 + (high - low) / 2 * ROOTS, (high - low) * WEIGHTS
+            glued = fault == "glued at the nodes"
+            if glued:  # No fault where all is closed: it does not lock.
+                s = np.array([end for end in (0.0, 1.0) if low - 1e-3 <= end <= high + 1e-3])
+                shares = np.full(len(s), 0.5)
             xi = (s - s1) / (s2 - s1)
             points = positions[first] + s[:, None] * along
             feet = positions[head] + xi[:, None] * (positions[tail] - positions[head])
             gap = (points - feet) @ normal - 1e-6 * (fault == "thick surfaces")
-            weights = penalty * length * (high - low) * WEIGHTS * (gap < 0)
+            weights = penalty * length * shares * ((gap < 0) | glued)
             if fault == "short cells are left out" and length * (high - low) < 0.3:
                 weights *= 0.999
             if fault == "a tiny edge spoils the first one" and number == 0 and shortest(scene) < 1e-3:

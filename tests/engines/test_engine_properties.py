@@ -6,9 +6,11 @@ from plain_engine import Plain
 
 from contactverif import Property, Verdict, judge_case
 from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.measurement import Quantity
 from contactverif.plugins.registry import load_properties, property_ids
 from contactverif.sampling.draw import Sampling, draw_cases
 from contactverif_properties.patch_curved import count_bare
+from contactverif_properties.shared.engine_patch import REPORTED_FORCES, REPORTED_PRESSURES
 
 MUTANTS = {
     "engine.purity": "softer at every call",
@@ -22,6 +24,7 @@ MUTANTS = {
     "engine.short-segment": "a tiny edge spoils the first one",
     "engine.zero-load": "thick surfaces",
     "engine.kinked": "upright normals",
+    "engine.locking": "",  # Three springs between the nodes of both surfaces lock.
 }
 EXAMPLES = 12
 
@@ -52,6 +55,32 @@ def test_the_mutant_is_caught(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name, fault in MUTANTS.items() if fault])
 def test_a_right_engine_passes(name: str) -> None:
     assert set(verdicts(name, Plain())) == {Verdict.PASS}
+
+
+@pytest.mark.parametrize(
+    ("fault", "wrong"),
+    [
+        ("reports everything", None),
+        ("reports what pushes the other side", REPORTED_FORCES),
+        ("reports a pressure that is too small", REPORTED_PRESSURES),
+    ],
+)
+@pytest.mark.parametrize("name", ["patch.flat.solve", "patch.dead-zone"])
+def test_what_a_code_reports_is_judged(name: str, fault: str, wrong: Quantity | None) -> None:
+    question, subject = question_of(name), EngineSubject("engine/plain", Plain(fault, inclined=False))
+    cases = draw_cases(question.cases(None), seed=Sampling(examples=6, seed=1).key(question), examples=6).cases
+    judged, too_large = set(), set()
+    for case in cases:
+        for number in judge_case(question, case, subject).measurement.numbers:
+            name = number.quantity.name.removesuffix(", high penalty")
+            judged.add(name)
+            too_large |= {name} if number.value > number.tolerance else set()
+    assert {REPORTED_FORCES.name, REPORTED_PRESSURES.name} <= judged
+    assert too_large == ({wrong.name} if wrong else set())
+
+
+def test_springs_at_the_nodes_do_not_lock() -> None:
+    assert set(verdicts("engine.locking", Plain("glued at the nodes"))) == {Verdict.PASS}
 
 
 def test_nobody_is_turned_who_takes_no_inclined_supports() -> None:

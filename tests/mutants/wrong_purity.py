@@ -52,6 +52,19 @@ def _keeps_first_interface(*, penalty: float) -> Any:
     return wrap(penalty, residual=residual)
 
 
+def _knows_a_state_by_its_first_node(*, penalty: float) -> Any:
+    """Keep the pairings of an interface, and return one where the first node is where it was."""
+    pairings: dict[Any, Any] = {}
+
+    def pair(right: Any, interface: Any, z: Any) -> Any:
+        key = id(interface), z[:2].tobytes()
+        if key not in pairings:
+            pairings[key] = interface, right(interface, z)  # An interface that lives has an address of its own.
+        return pairings[key][1]
+
+    return wrap(penalty, pair=pair)
+
+
 class _KeepsFirstLengths(ResidualAlone):
     """Springs as stiff as if the longest slave segment were that of the first residual of an instance."""
 
@@ -199,6 +212,7 @@ MUTANTS = (
         )
     ),
     Mutant("residual of the first interface", PURITY, _keeps_first_interface),
+    Mutant("pairing kept while the first node stays", PURITY, _knows_a_state_by_its_first_node),
     Mutant("lengths of the first residual, kept by segment", PURITY,
            lambda *, penalty: _KeepsFirstLengths(contactverif_nts.vts_ppt_balanced(penalty=penalty))),
     Mutant("residual kept by its positions alone", PURITY, _caches_by_positions),

@@ -15,7 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.mechanics.accuracy import Solution
+from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.solving import solve_by_engine
 from contactverif.problems.blocks import pressure_of
@@ -23,8 +23,17 @@ from contactverif.problems.uniform_stress import stress_error
 from contactverif_properties.shared.uniform_pressure import consistent_forces, gap_error, normal_of
 
 OWN_PRESSURE = "mean pressure over that of hard contact"
-REPORTED_FORCES = "error of the total force that the code reports"
 ITERATIONS = "iterations until the code said that it converged"
+ALMOST = UNIT_ROUNDOFF**0.5  # A node is covered up to this share of its length.
+POSITION_ROUNDINGS = 64.0  # A node balances about 8 springs to 8 roundoffs.
+_TERMS = "a (1 + M U/(ℓ p)) + 1e-12 κ + 64 u X ε̂/p"
+_REASON = "It is that of the forces that the bodies need, and a stiff spring turns rounded positions X into a force"
+REPORTED_FORCES = Quantity("error of a contact force that the code reports", _TERMS, f"{_REASON}.")
+REPORTED_PRESSURES = Quantity(
+    "error of a contact pressure that the code reports",
+    f"({_TERMS}) L/m",
+    f"{_REASON}, on the length m of a node.",
+)
 
 
 def measure_engine(
@@ -33,12 +42,15 @@ def measure_engine(
     """Return the errors of stress, slave forces, master forces and gap of a scene whose pressure is uniform.
 
     Forces are those that the bodies need; what a rigid body needs is not known. A code with a stiffness of its own is
-    judged by its own mean pressure, and its gap is not asked.
+    judged by its own mean pressure, and neither its gap nor what it reports is asked. Forces and pressures that other
+    codes report are judged.
     """
     traits, stress, gap = subject.engine_traits, quantities[0], quantities[3]
     scene = replace(scene_of(case), penalty=penalty)
     solution, answer = solve_by_engine(scene, subject, linear=True)
-    details = {} if answer is None else {ITERATIONS: float(answer.iterations)}
+    if answer is None:
+        return Measurement(undecided=solution.no_solution)
+    details = {ITERATIONS: float(answer.iterations)}
     if solution.no_solution:
         return Measurement(undecided=solution.no_solution, details=details)
     pressure = float(pressure_of(case, penalty if traits.enforcement == "penalty" else np.inf))
@@ -47,13 +59,15 @@ def measure_engine(
         details[OWN_PRESSURE] = mean / pressure
         pressure = mean if mean > 0 else pressure
     q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
-    if answer is not None and answer.contact_forces is not None:
-        details[REPORTED_FORCES] = _reported_error(answer, case, scene, consistent_forces(case, pressure))
     values = {stress: stress_error(scene, scene.stresses(q), pressure)}
     values |= dict(zip(quantities[1:3], _force_errors(case, scene, solution, pressure), strict=True))
     tolerance = engine_tolerance(scene, solution, traits.accuracy, pressure)
     tolerances = dict.fromkeys(values, tolerance)
     if traits.enforcement != "own":
+        rounding = POSITION_ROUNDINGS * UNIT_ROUNDOFF * case.largest_coordinate * penalty / pressure
+        reported = _judge_reports(answer, case, scene, pressure)
+        values |= {quantity: error for quantity, (error, _) in reported.items()}
+        tolerances |= {quantity: (tolerance + rounding) / share for quantity, (_, share) in reported.items()}
         penetration = pressure / penalty if traits.enforcement == "penalty" else 0.0
         state = replace(case, z=solution.state.z, penalty=penalty)
         values[gap] = gap_error(state, penetration, pressure / penalty)
@@ -61,15 +75,27 @@ def measure_engine(
     return Measurement(check_all(values, tolerances), details=details)
 
 
-def _reported_error(answer: EngineAnswer, case: Case, scene: Scene, exact: FloatArray) -> float:
-    """Return by which share the total force on the slave that a code reports differs from the exact one."""
-    assert answer.contact_forces is not None
-    first = np.cumsum([0, *(len(body.nodes) for body in scene.bodies)])
-    nodes = [first[index] + scene.bodies[index].contact_nodes for index in scene.bodies_in_reach]
-    n_slave = case.interface.n_slave_nodes
-    totals = [forces[:n_slave].sum(axis=0) for forces in (answer.contact_forces[np.concatenate(nodes)], exact)]
-    sizes = np.linalg.norm(totals, axis=1)  # The code may have turned the scene.
-    return float(abs(sizes[0] / sizes[1] - 1))
+def _judge_reports(
+    answer: EngineAnswer, case: Case, scene: Scene, pressure: float
+) -> dict[Quantity, tuple[float, float]]:
+    """Return the largest error of a nodal force that a code reports, over p L, and of a pressure, over p.
+
+    Beside each stands the share of the slave's length L that carries it: all, or the shortest length of a node. The
+    pressures are those of nodes of the slave that the master covers with both their segments.
+    """
+    errors: dict[Quantity, tuple[float, float]] = {}
+    exact, n_slave = consistent_forces(case, pressure), case.interface.n_slave_nodes
+    if answer.contact_forces is not None:
+        differences = np.linalg.norm(answer.contact_forces[scene.nodes_in_reach] - exact, axis=1)
+        errors[REPORTED_FORCES] = float(differences.max() / (pressure * case.slave_length)), 1.0
+    if answer.pressures is not None:
+        places = np.argsort(np.argsort(scene.nodes_in_reach[:n_slave]))  # Reports are in the order of the numbers.
+        lengths = shape_integrals(case.interface.slave, case.interface.nodes)[:n_slave]
+        covered = np.linalg.norm(exact[:n_slave], axis=1) >= (1 - ALMOST) * pressure * lengths
+        shares = lengths[covered] / case.slave_length
+        differences = np.abs(answer.pressures[places][covered] / pressure - 1)
+        errors[REPORTED_PRESSURES] = float(differences.max(initial=0.0)), float(shares.min(initial=1.0))
+    return errors
 
 
 def _mean_pressure(case: Case, solution: Solution) -> float:

@@ -23,7 +23,7 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import Trace
 from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
-from contactverif_properties.shared.engine_patch import measure_engine
+from contactverif_properties.shared.engine_patch import REPORTED_FORCES, REPORTED_PRESSURES, measure_engine
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.newton_solution import end_details
 from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
@@ -61,7 +61,7 @@ MULTIPLIERS = Quantity(
     f"({STRESS_TOLERANCE})/s",
     f"{REASON} s is the smallest singular value of the loads of unit multipliers on the bodies over the largest one.",
 )
-QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE)
+QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE, REPORTED_FORCES, REPORTED_PRESSURES)
 
 
 def measure_once(case: Case, subject: Subject) -> Measurement:

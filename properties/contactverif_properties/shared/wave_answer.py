@@ -1,6 +1,7 @@
-"""The answer of a formulation to a wave of pressure between two blocks that are pressed together.
+"""The answer of a formulation or of a whole code to a wave of pressure between two blocks that are pressed together.
 
-Everything is the difference between two solutions, with the wave and without it, on the pairing of the uniform state.
+Everything is the difference between two solutions, with the wave and without it. Those of a formulation are on the
+pairing of the uniform state.
 """
 
 from __future__ import annotations
@@ -10,9 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.accuracy import shape_integrals
+from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
 from contactverif.problems.blocks import exact_unknowns
 from contactverif.problems.wave_blocks import LENGTH, MEAN_PRESSURE, WAVE, wave_blocks, wave_work
@@ -27,7 +32,7 @@ _LEAST_SHARE = UNIT_ROUNDOFF**0.5
 
 @dataclass(frozen=True, slots=True)
 class InterfaceAnswer:
-    """The answer of a formulation to the wave."""
+    """The answer of a formulation or a code to the wave."""
 
     compliance: float  # The work of the wave's load on the displacements that it causes.
     stiffness: float  # The distributed stiffness of the springs under the mean pressure.
@@ -35,7 +40,7 @@ class InterfaceAnswer:
     # larger one counts.
     force_range: float
     # The same of the pressures that the formulation reports; NaN if it reports none, or nodal forces.
-    point_range: float
+    point_range: float = np.nan
 
 
 def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> InterfaceAnswer | None:
@@ -54,15 +59,32 @@ def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -
         FrozenState(formulation, replace(case, z=system.state(u), n_multipliers=system.n_multipliers), pairing)
         for system, u in zip(systems, (before, after), strict=True)
     ]
-    total = -float((uniform.bodies[0].load * uniform.displacements(before[:n_free])[0]).sum())
+    answer = _interface_answer(uniform, wavy, before[:n_free], after[:n_free], states[1].forces - states[0].forces)
+    nodal = subject.traits.rules.penalty == "nodal" or not states[0].has_points
+    return answer if nodal else replace(answer, point_range=_point_range(*states))
+
+
+def answer_of_code(columns: tuple[int, int], penalty: float, subject: EngineSubject) -> InterfaceAnswer | None:
+    """Let a whole code solve two blocks with the wave and without it."""
+    uniform, wavy = (wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, WAVE))
+    before, after = (solve_by_engine(scene, subject, linear=True)[0] for scene in (uniform, wavy))
+    if before.no_solution or after.no_solution:
+        return None
+    q = [np.asarray(uniform.transformation.T @ item.displacements.reshape(-1)) for item in (before, after)]
+    return _interface_answer(uniform, wavy, q[0], q[1], after.forces - before.forces)
+
+
+def _interface_answer(
+    uniform: Scene, wavy: Scene, before: FloatArray, after: FloatArray, forces: FloatArray
+) -> InterfaceAnswer:
+    """Return the answer of two solutions (n_free,), and the forces (n_nodes, 2) that the wave adds at the interface."""
+    total = -float((uniform.bodies[0].load * uniform.displacements(before)[0]).sum())
     bodies = float(uniform.facts["compliance"].sum())
     springs = abs(total) / (MEAN_PRESSURE**2 * LENGTH) - bodies
-    nodal = subject.traits.rules.penalty == "nodal" or not states[0].has_points
     return InterfaceAnswer(
-        compliance=wave_work(uniform, wavy, before[:n_free], after[:n_free]),
+        compliance=wave_work(uniform, wavy, before, after),
         stiffness=1 / max(springs, _LEAST_SHARE * bodies),
-        force_range=_force_range(*states),
-        point_range=np.nan if nodal else _point_range(*states),
+        force_range=_force_range(uniform.interface, forces[:, 1]),
     )
 
 
@@ -76,8 +98,8 @@ def _uniform_state(system: System, subject: Subject) -> FloatArray:
     return np.append(exact, exact_multipliers(state, subject, system.formulation, MEAN_PRESSURE))
 
 
-def _force_range(before: FrozenState, after: FrozenState) -> float:
-    interface, across = before.case.interface, (after.forces - before.forces)[:, 1]
+def _force_range(interface: Interface, across: FloatArray) -> float:
+    """Return the range of the pressures of nodal forces (n_nodes,) across the interface, over the wave's."""
     sides = (
         (interface.slave, slice(0, interface.n_slave_nodes)),
         (interface.master, slice(interface.n_slave_nodes, None)),
