@@ -1,12 +1,14 @@
 """User elements of FEAP as formulations: `elmtNN(d, ul, xl, ix, tl, s, p, ndf, ndm, nst, isw)`, called with isw = 3.
 
 `xl` is the reference configuration and `ul(:,:,1)` the displacement from it; `p` is minus the residual and `s` its
-derivative, column by column. Both are zero before the call. Common blocks of FEAP are those of the library itself, and
-zero: an element that needs `nel` takes it from the number of its nodes.
+derivative, column by column. Both are zero before the call. Common blocks of FEAP are those of the library itself: what
+`eldata`, `cdata` and `eltran` say of an element is set before it is called, and all others are zero.
 """
 
 from __future__ import annotations
 
+import ctypes
+import struct
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,13 @@ _ORDER = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
 _TANGENT_AND_RESIDUAL = 3  # The value of isw.
 _SETS = 6  # Columns of displacements in `ul`: the total, the increment, and velocities and the like, which are zero.
 _MOST_ELEMENTS = 99
+# {common block: the kinds of its first variables}, the same in FEAP and FEAPpv. `ctan` has the factors of stiffness,
+# damping and mass in a tangent.
+_BLOCKS = {
+    "eldata": "=d5i",  # dm, n, ma, mct, iel, nel
+    "cdata": "=6i",  # numnp, numel, nummat, nen, neq, ipr
+    "eltran": "=6d",  # bpr(3), ctan(3)
+}
 
 
 def _arguments(n_nodes: int, n_properties: int, n_state: int) -> list[Argument]:
@@ -61,7 +70,21 @@ def _fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: 
     }
 
 
-_FEAP = Convention("feap", _arguments, _constants, _ORDER, _fill, "p", "s")
+def _set_common_blocks(library: ctypes.CDLL, n_nodes: int) -> None:
+    """Say that one element of so many nodes is asked, in a static step, to the common blocks that a library has."""
+    values = {
+        "eldata": (1.0, 1, 1, 0, 0, n_nodes),
+        "cdata": (n_nodes, 1, 1, n_nodes, 2 * n_nodes, 1),
+        "eltran": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    }
+    for block, kinds in _BLOCKS.items():
+        for name in fortran_names(block):
+            if hasattr(library, name):
+                memory = (ctypes.c_char * struct.calcsize(kinds)).in_dll(library, name)
+                struct.pack_into(kinds, memory, 0, *values[block])
+
+
+_FEAP = Convention("feap", _arguments, _constants, _ORDER, _fill, "p", "s", announce=_set_common_blocks)
 
 
 def feap(

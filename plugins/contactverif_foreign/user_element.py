@@ -45,6 +45,8 @@ class Convention:
     forces: str  # The argument with minus the residual.
     matrix: str  # The argument with its derivative, column by column.
     flaw: Callable[[SlotRows], tuple[int, str] | None] = lambda rows: None  # An element that gave up, and its words.
+    # Gets the library and the number of nodes before elements are called.
+    announce: Callable[[ctypes.CDLL, int], None] = lambda library, n_nodes: None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +54,7 @@ class Routine:
     """A loaded user element with its memory; it does not depend on the penalty."""
 
     convention: Convention
+    library: ctypes.CDLL
     function: Any
     state_variables: int
     slots: dict[tuple[int, int], tuple[GuardedSlot, list[Any]]] = field(default_factory=dict)
@@ -122,6 +125,7 @@ class UserElement:
         def describe_row(row: int) -> str:
             return f"{convention.name}: element {row + 1} (nodes {', '.join(map(str, elements.nodes[row]))})"
 
+        convention.announce(self.routine.library, elements.nodes.shape[1])
         rows.call(self.routine.function, values, describe_row)
         if (flaw := convention.flaw(rows)) is not None:
             raise ContractError(f"{describe_row(flaw[0])}: {flaw[1]}")
@@ -159,6 +163,7 @@ _read_traits = lru_cache(maxsize=16)(traits_beside)
 @lru_cache(maxsize=16)
 def _load_routine(convention: Convention, path: Path, names: tuple[str, ...], state_variables: int) -> Routine:
     """Return the subroutine of a library, with its memory."""
-    function = find_function(load_library(path), path, *names)
+    library = load_library(path)
+    function = find_function(library, path, *names)
     function.restype = None
-    return Routine(convention, function, state_variables)
+    return Routine(convention, library, function, state_variables)

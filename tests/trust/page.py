@@ -84,8 +84,9 @@ DAMAGE = """## How small a damage is caught off the flat
 The same with the sizes 1, 2 and 5 of each decade, for properties whose interface is bent or whose pressure varies. A
 cell says what was caught before these questions came closer, and today. The forces of a right formulation are scaled,
 turned, scaled on the master alone, handed on along the slave as if its points lay farther by a share of a segment, or
-lost where the slave ends; the rings of `patch.curved` are whole today, and have no ends. All cases of a property were asked, and no contact points were reported. A rate of
-`accuracy.hertz` caught springs that were 5e-3 too stiff, and none that were too soft; it accused a right formulation.
+lost where the slave ends; the rings of `patch.curved` are whole today, and have no ends. All cases of a property were
+asked, and no contact points were reported. A rate of `accuracy.hertz` caught springs that were 5e-3 too stiff, and none
+that were too soft; it accused a right formulation.
 
 """
 
