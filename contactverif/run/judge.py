@@ -21,6 +21,7 @@ from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
+from contactverif.contract.foreign_text import describe_error, place_of_error
 from contactverif.contract.property import (
     CLOSED_CHAIN,
     Outcome,
@@ -39,11 +40,12 @@ from contactverif.sampling.blas_threads import one_thread
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 # The state of the first answers. Its lengths of 3.2 and 2.8 are rounded: on A1 single precision makes no error.
 FIRST = "c-prime"
+RAISED = "the property raised "
 SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
 
 
 def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
-    """Judge one case, a new one or one that was stored. Whatever the plugin does is an outcome.
+    """Judge one case, a new one or one that was stored. Whatever the plugin or the property does is an outcome.
 
     Parameters
     ----------
@@ -57,12 +59,7 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
     Returns
     -------
     Outcome
-        Verdict, reason and numbers.
-
-    Raises
-    ------
-    Exception
-        Any error of the harness or the property itself, with the case as a note.
+        Verdict, reason and numbers. Where the property raises an exception, the case is undecided.
     """
     start = perf_counter()
     case, refused = fit_to_traits(case, subject.traits)
@@ -83,9 +80,8 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         return outcome(Verdict.FAIL, f"not finite: {error}", breach=True)
     except ContractError as error:
         return outcome(Verdict.FAIL, f"breaks the contract: {error}", breach=True)
-    except Exception as error:  # A mistake of the judge, which is not hidden.
-        error.add_note(f"while judging {question.id} of {subject.name} on {case!r}")
-        raise
+    except Exception as error:  # A mistake of the judge: `verdict_over_all` does not let it pass.
+        return outcome(Verdict.UNDECIDED, f"{RAISED}{describe_error(error)}{place_of_error(error)}")
     return replace(outcome(verdict, reason), measurement=measurement)
 
 
@@ -117,6 +113,8 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
     worst = max(everything, key=lambda outcome: badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         return worst.verdict, _reason_with_name(row, worst)
+    if raised := next((reason for reason in row.tally.reasons if reason.startswith(RAISED)), ""):
+        return Verdict.NOT_JUDGED, raised
     if row.judged < _fewest_judged(row):
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"

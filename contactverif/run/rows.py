@@ -238,6 +238,8 @@ class OpenRow:
 def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdict, str]:
     """Return verdict and reason of a row of which all cases are judged; `on_scene` as in `OpenRow.judge`."""
     verdict, reason = verdict_over_all(row)
+    if reason.startswith(judge.RAISED):
+        return verdict, reason
     if verdict is Verdict.NOT_JUDGED and opened.question.bodies and opened.may_stay_undecided(row, on_scene=on_scene):
         return Verdict.UNDECIDED, row.outcomes[0].reason or reason if on_scene else reason
     return verdict, reason

@@ -38,7 +38,7 @@ from contactverif_properties.shared.uniform_pressure import pushing_forces, unif
 
 _TOLERANCE = "u(8X/min(|g|, ℓ) + 4N)"
 DIRECTION = Quantity("part outside the normals", _TOLERANCE, SEGMENT_REASON)
-TOTAL = Quantity("excess of the total", _TOLERANCE, SEGMENT_REASON)
+TOTAL = Quantity("total force outside its bounds", _TOLERANCE, SEGMENT_REASON)
 TWO_PASSES = "springs act in two passes at most, on n + 1 nodes for n segments."
 SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASSES}")
 

@@ -77,10 +77,10 @@ UNSEEN = """## Wrong formulations that nobody here had seen
 
 Somebody who had not read the properties wrote {count} wrong formulations, as people get them wrong: rows of
 multipliers, a store with too small a key, the first call of a process, a gap of exactly zero, slaves that are steep,
-0.3 % in rare places. `contactverif verify NAME --seed 1` names {found} of them wrong, and {without} where they report no
-contact points. On one core beside other work the first broken promise came after {median} seconds (median), and in nine
-of ten after {late}. `unseen.csv` says which property found each. Two need a state
-that is a tie to the last bit, and half a stiffness is an element of the generalised derivative there. Not found:
+0.3 % in rare places. `contactverif verify NAME --seed 1` names {found} of them wrong, and {without} where they report
+no contact points. On one core beside other work the first broken promise came after {median} seconds (median), and in
+nine of ten after {late}. `unseen.csv` says which property found each. Two need a state that is a tie to the last bit,
+and half a stiffness is an element of the generalised derivative there. Not found:
 
 """
 SMALLEST = """## How small an error is caught
