@@ -94,7 +94,19 @@ ROOMS = {
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     # An engine writes files and starts programs; its code is imported inside `solve`.
     "contactverif_engines": Room(
-        ("contract",), ("numpy", "scipy", "skfem", "ngsolve", "netgen", "KratosMultiphysics", "getfem", "openseespy")
+        ("contract",),
+        (
+            "numpy",
+            "scipy",
+            "skfem",
+            "ngsolve",
+            "netgen",
+            "KratosMultiphysics",
+            "getfem",
+            "openseespy",
+            "fedoo",
+            "sfepy",
+        ),
     ),
     # A library is a file, and a call of it needs ctypes.
     "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo")),

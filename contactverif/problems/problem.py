@@ -80,7 +80,8 @@ class ProblemInstance:
     def best_pressure(self) -> float:
         """The error of the best continuous pressure that is linear between the slave's nodes, as `errors` counts it."""
         guess = self.first_guess
-        return best_pressure_error(guess.interface.slave, guess.positions, self.pressure, self.pressure_scale)
+        pressure = _checked("pressure", self.pressure)
+        return best_pressure_error(guess.interface.slave, guess.positions, pressure, self.pressure_scale)
 
     def errors(self, solution: Solution) -> Errors:
         """Return the errors of a solution by kind."""
@@ -92,11 +93,25 @@ class ProblemInstance:
             errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
             moves = solution.displacements
-            errors[kind] = displacement_error(surface, interface.nodes, moves, motion, self.parts)
-        pressure = pressure_error(solution, self.pressure, self.pressure_scale)
+            exact_motion = _checked("motions", motion, 2)
+            errors[kind] = displacement_error(surface, interface.nodes, moves, exact_motion, self.parts)
+        pressure = pressure_error(solution, _checked("pressure", self.pressure), self.pressure_scale)
         if pressure is not None:
             errors[PRESSURE] = pressure
         return errors | self.further(solution)
+
+
+def _checked(name: str, exact: Field, *components: int) -> Field:
+    """Return a field that refuses values of another shape than a number, or so many components, for each place."""
+
+    def values(places: FloatArray) -> FloatArray:
+        found, needed = np.asarray(exact(places)), (len(places), *components)
+        if found.shape != needed:
+            kind = "a vector" if components else "a number"
+            raise MisuseError(f"ProblemInstance.{name}", f"shape {found.shape}", f"{needed}, {kind} for each place")
+        return found
+
+    return values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

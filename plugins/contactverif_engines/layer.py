@@ -77,6 +77,20 @@ def make_layer(scene: SceneArrays, thickness: float = 1.0) -> Layer:
     )
 
 
+def deepen(layer: Layer, share: float) -> FloatArray:
+    """Return displacements (n_front, 2) that move each slave body out of itself, by a share of the largest body's size.
+
+    Codes that count no contact without depth begin so: a body that only touches would be free to move.
+    """
+    scene, moves = layer.scene, np.zeros((layer.n_front, 2))
+    body_of_edge = scene.body_of_node[scene.slave[:, 0]]
+    for body in np.unique(body_of_edge):
+        along = np.diff(scene.nodes[scene.slave[body_of_edge == body]], axis=1)[:, 0]
+        outwards = np.array([along[:, 1].sum(), -along[:, 0].sum()]) / np.linalg.norm(along, axis=1).sum()
+        moves[np.flatnonzero(scene.body_of_node == body)] = share * scene.unit * outwards
+    return moves
+
+
 def _faces(edges: IntArray, count: int) -> IntArray:
     """Return the faces (n, 4) over edges whose body is on the left, counter-clockwise seen from outside."""
     first, second = edges.T

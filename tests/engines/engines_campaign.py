@@ -70,6 +70,8 @@ CHOICES = (
     Choice("ngsolve", "", ("ngsolve",)),
     Choice("ngsolve", "order=15", ("ngsolve",)),
     Choice("opensees", "", ("openseespy",)),
+    Choice("fedoo", "", ("fedoo",)),
+    Choice("sfepy", "", ("sfepy",)),
 )
 
 

@@ -1,4 +1,4 @@
-"""GetFEM and OpenSees, by the interpreters that `GETFEM_PYTHON` and `OPENSEES_PYTHON` name, or in this one."""
+"""Codes by the interpreters that variables name, as `GETFEM_PYTHON` and `OPENSEES_PYTHON` do, or in this one."""
 
 import os
 from importlib.util import find_spec
@@ -13,9 +13,10 @@ from contactverif.isolation.limits import Limits
 from contactverif.plugins.engines import load_engine
 from contactverif.problems.catalogue import load_scene_case
 from contactverif_engines.control import Control
+from contactverif_engines.layer import deepen, make_layer
 from contactverif_engines.opensees import find_chains
 
-MODULES = {"getfem": "getfem", "opensees": "openseespy"}
+MODULES = {"getfem": "getfem", "opensees": "openseespy", "fedoo": "fedoo", "sfepy": "sfepy"}
 
 
 def load_code(name: str, options: str = "") -> EngineSubject:
@@ -34,13 +35,21 @@ def test_chains_follow_their_edges() -> None:
     assert find_chains(np.array([[0, 1], [1, 2], [2, 0]])) == [[0, 1, 2, 0]]
 
 
+def test_slaves_that_touch_get_deeper() -> None:
+    scene = load_scene("c").arrays(upright=True, lowered=True)
+    moves = deepen(make_layer(scene), 0.5)
+    slave, master = np.unique(scene.slave), np.unique(scene.master)
+    np.testing.assert_allclose(moves[slave], np.tile([0.0, -0.5 * scene.unit], (len(slave), 1)))
+    assert not moves[master].any()
+
+
 def test_getfem_passes_matching_meshes_alone() -> None:
     question, getfem = load_property("patch.flat.solve"), load_code("getfem")
     assert judge_case(question, load_scene_case("a1"), getfem).verdict is Verdict.PASS
     assert judge_case(question, load_scene_case("c"), getfem).verdict is Verdict.FAIL
 
 
-@pytest.mark.parametrize(("name", "error"), [("getfem", 1e-2), ("opensees", 0.1)])
+@pytest.mark.parametrize(("name", "error"), [("getfem", 1e-2), ("opensees", 0.1), ("fedoo", 0.15), ("sfepy", 1e-8)])
 def test_displacements_are_near_those_of_the_control(name: str, error: float) -> None:
     engine = load_code(name)
     arrays = load_scene("c").arrays(upright=True, lowered=True)
@@ -48,3 +57,13 @@ def test_displacements_are_near_those_of_the_control(name: str, error: float) ->
     assert answer.converged
     size = np.abs(right.displacements).max()
     np.testing.assert_allclose(answer.displacements, right.displacements, atol=error * size)
+
+
+def test_nodes_of_fedoo_bear_what_their_springs_push() -> None:
+    """The pressures of nodes are the same on matching meshes where inner nodes stand for twice the length of ends."""
+    engine = load_code("fedoo")
+    arrays = load_scene("a1").arrays(upright=True, lowered=True)
+    answer, right = engine.solve(arrays), Control().solve(arrays)
+    assert answer.converged
+    size = np.abs(right.displacements).max()
+    np.testing.assert_allclose(answer.displacements, right.displacements, atol=0.05 * size)

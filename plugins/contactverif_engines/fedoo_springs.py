@@ -1,0 +1,138 @@
+"""fedoo: a spring at each node of the slave, on the edge of the master that a search chooses.
+
+Source: the class `Contact` of fedoo 1.1, its documentation and `fedoo/constraint/contact.py`. Springs have one
+stiffness for all nodes, whatever the lengths of their edges.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
+from contactverif_engines.layer import Layer, deepen, make_layer
+
+_STEPS = 60
+_CONVERGED = 1e-11  # The norm of the last step over that of all displacements.
+_TOUCH = (
+    2.0**-30
+)  # The share of the size of a body by which slaves start deeper: fedoo counts no contact without depth.
+_AXES = ("DispX", "DispY")
+
+
+@dataclass(frozen=True)
+class Fedoo:
+    """The code fedoo with springs of nodes.
+
+    Attributes
+    ----------
+    search : Literal['nearest', 'bucket', 'ipctk']
+        The edges at the nearest node, the same found in buckets, as fedoo chooses by itself, or the edges near a node.
+    once : bool
+        Look for pairs once in an increment, as fedoo chooses by itself, or in each iteration.
+    increments : int
+        The number of steps in which loads and imposed displacements grow.
+    tol : float
+        The part of an edge by which a node may lie past its end; 0.1 is the default of fedoo.
+    """
+
+    search: Literal["nearest", "bucket", "ipctk"] = "nearest"
+    once: bool = False
+    increments: int = 1
+    tol: float = 0.1
+
+    @property
+    def traits(self) -> EngineTraits:
+        """The statements: springs of nodes are ε̂ in the mean alone, and no uniform pressure is promised."""
+        return EngineTraits("penalty", accuracy=1e-9, load_scale=2.0**-10)
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Make a problem of small strains, solve it by the method of Newton and Raphson, and read its displacements."""
+        with warnings.catch_warnings():  # It warns that its solver of linear systems is slow.
+            warnings.simplefilter("ignore")
+            import fedoo
+
+            layer = make_layer(scene)
+            space = fedoo.ModelingSpace("2D", name="")
+            bodies = _make_bodies(fedoo, layer, space)
+            contacts = self._make_contacts(fedoo, layer, space)
+            problem = fedoo.problem.NonLinear(fedoo.Assembly.sum(*bodies, *contacts, name=""), name="")
+            _add_supports_and_loads(problem, layer)
+            start = np.where(layer.fixed[: layer.n_front], 0.0, deepen(layer, _TOUCH))
+            problem.set_dof("Disp", start.T)
+            for contact in contacts:
+                contact.set_disp(start.T)
+            problem.set_nr_criterion("Displacement", tol=_CONVERGED, max_subiter=_STEPS)
+            message = self._run(problem)
+        moves = np.array(problem.get_disp().T[: len(scene.nodes)])
+        return EngineAnswer(moves, not message, message=message)
+
+    def _make_contacts(self, fedoo: Any, layer: Layer, space: Any) -> list[Any]:
+        """Return the contact of each slave body with all masters, its springs as stiff as ε̂ in the mean.
+
+        fedoo has its normals on the left of an edge, so that edges are turned around.
+        """
+        scene, contacts = layer.scene, []
+        kind = "search_nearest" if self.search == "nearest" else self.search
+        for edges in _edges_of_bodies(scene):
+            nodes, slave = layer.nodes[: layer.n_front, :2].copy(), np.unique(edges)
+            surface = fedoo.Mesh(nodes, scene.master[:, ::-1].copy(), "lin2", name="")
+            contact = fedoo.constraint.Contact(slave, surface, search_algorithm=kind, name="", space=space)
+            contact.eps_n = float(scene.penalty) * float(_lengths(scene, edges).sum()) / len(slave)
+            contact.max_dist = 2 * float(_lengths(scene, scene.master).max())
+            contact.contact_search_once, contact.tol = self.once, self.tol
+            contacts.append(contact)
+        return contacts
+
+    def _run(self, problem: Any) -> str:
+        """Solve the problem, and return why it has no solution; empty if it has one."""
+        step = 1 / self.increments
+        try:
+            problem.nlsolve(dt=step, update_dt=False, print_info=0, save_at_exact_time=False, interval_output=10**9)
+        except RuntimeError as error:
+            return str(error)
+        return ""
+
+
+def _make_bodies(fedoo: Any, layer: Layer, space: Any) -> list[Any]:
+    """Return an assembly of each body and kind of cells, all of them on the nodes of the front of a layer."""
+    scene, nodes, assemblies = layer.scene, layer.nodes[: layer.n_front, :2], []
+    kinds = (
+        ("tri3", layer.wedges[:, :3], layer.body_of_wedge),
+        ("quad4", layer.bricks[:, :4], layer.body_of_brick),
+    )
+    for body, rigid in enumerate(scene.rigid.tolist()):
+        young, poisson = (1.0, 0.0) if rigid else (float(scene.young[body]), float(scene.poisson[body]))
+        for kind, cells, bodies in kinds:
+            if (bodies == body).any():
+                law = fedoo.constitutivelaw.ElasticIsotrop(young, poisson)
+                form = fedoo.weakform.StressEquilibrium(law, nlgeom=False, space=space)
+                mesh = fedoo.Mesh(nodes.copy(), cells[bodies == body].copy(), kind, name="")
+                assemblies.append(fedoo.Assembly.create(form, mesh, name=""))
+    return assemblies
+
+
+def _add_supports_and_loads(problem: Any, layer: Layer) -> None:
+    """Add what is held, moved and loaded."""
+    front = slice(layer.n_front)
+    fixed, imposed, load = layer.fixed[front], layer.imposed[front], 2 * layer.load[front]  # The front bears half.
+    for axis, name in enumerate(_AXES):
+        if (supported := np.flatnonzero(fixed[:, axis])).size:
+            problem.bc.add("Dirichlet", supported, name, imposed[supported, axis])
+        if (loaded := np.flatnonzero(load[:, axis])).size:
+            problem.bc.add("Neumann", loaded, name, load[loaded, axis])
+
+
+def _edges_of_bodies(scene: SceneArrays) -> list[IntArray]:
+    """Return the slave edges of each body."""
+    bodies = scene.body_of_node[scene.slave[:, 0]]
+    return [scene.slave[bodies == body] for body in np.unique(bodies)]
+
+
+def _lengths(scene: SceneArrays, edges: IntArray) -> FloatArray:
+    """Return the lengths of edges."""
+    lengths: FloatArray = np.linalg.norm(np.diff(scene.nodes[edges], axis=1)[:, 0], axis=1)
+    return lengths
