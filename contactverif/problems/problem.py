@@ -80,7 +80,7 @@ class ProblemInstance:
     def best_pressure(self) -> float:
         """The error of the best continuous pressure that is linear between the slave's nodes, as `errors` counts it."""
         guess = self.first_guess
-        pressure = _checked("pressure", self.pressure)
+        pressure = _check_field("pressure", self.pressure)
         return best_pressure_error(guess.interface.slave, guess.positions, pressure, self.pressure_scale)
 
     def errors(self, solution: Solution) -> Errors:
@@ -93,23 +93,24 @@ class ProblemInstance:
             errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
             moves = solution.displacements
-            exact_motion = _checked("motions", motion, 2)
+            exact_motion = _check_field("motions", motion, 2)
             errors[kind] = displacement_error(surface, interface.nodes, moves, exact_motion, self.parts)
-        pressure = pressure_error(solution, _checked("pressure", self.pressure), self.pressure_scale)
+        pressure = pressure_error(solution, _check_field("pressure", self.pressure), self.pressure_scale)
         if pressure is not None:
             errors[PRESSURE] = pressure
         return errors | self.further(solution)
 
 
-def _checked(name: str, exact: Field, *components: int) -> Field:
+def _check_field(name: str, exact: Field, *components: int) -> Field:
     """Return a field that refuses values of another shape than a number, or so many components, for each place."""
 
     def values(places: FloatArray) -> FloatArray:
-        found, needed = np.asarray(exact(places)), (len(places), *components)
-        if found.shape != needed:
+        exact_values, needed = np.asarray(exact(places)), (len(places), *components)
+        if exact_values.shape != needed:
             kind = "a vector" if components else "a number"
-            raise MisuseError(f"ProblemInstance.{name}", f"shape {found.shape}", f"{needed}, {kind} for each place")
-        return found
+            text = f"{needed}, {kind} for each place"
+            raise MisuseError(f"ProblemInstance.{name}", f"shape {exact_values.shape}", text)
+        return exact_values
 
     return values
 

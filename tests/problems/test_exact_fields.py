@@ -14,8 +14,8 @@ from contactverif.problems.wavy import WAVY
 FORMULATION = load_formulation("vts-ppt")
 
 
-@pytest.fixture(scope="module")
-def solved() -> tuple[ProblemInstance, Any]:
+@pytest.fixture(scope="module", name="solved")
+def solve_once() -> tuple[ProblemInstance, Any]:
     instance = WAVY.pose(WAVY.meshes[0], 10.0, FORMULATION.traits, Variation())
     formulation = FORMULATION.with_penalty(instance.scene.penalty)
     return instance, solution_of(solve(instance.scene, formulation), formulation, nodal=False)
