@@ -6,7 +6,7 @@ import meshio
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from plain_engine import Plain
 
@@ -77,6 +77,7 @@ _items = st.recursive(
 )
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # No clock decides a test.
 @given(_items)
 def test_plain_messages_are_those_of_msgspec(item: object) -> None:
     assert decode(msgspec.msgpack.encode(item)) == item

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from page_reader import complaints
 from studies.bench_results import make_cells, make_results
@@ -252,6 +252,7 @@ def test_each_curve_with_a_colour_is_named_beside_its_end() -> None:
     assert sorted(names) == sorted(3 * [*highlights(RESULTS)])
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # No clock decides a test.
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6).map(sorted))
 def test_names_of_curves_do_not_overlap_and_stand_beside_the_panel(heights: list[float]) -> None:
     places = spread(heights)
