@@ -31,7 +31,8 @@ class GetFEM:
     Attributes
     ----------
     kind : Literal['penalty', 'multiplier']
-        Springs of the stiffness ε̂, or multipliers at the nodes of the slave with an augmentation of E/h.
+        Springs of the stiffness ε̂, or multipliers at the nodes of the slave with an augmentation, which is
+        part of the solution where points of an edge are open, as the manual says: so far bodies have no part in it.
     order : int
         The order of integration on the slave's edges: 1 to 19, and only odd numbers where cells are triangles.
     """
@@ -66,7 +67,10 @@ class GetFEM:
         moves = np.where(layer.fixed[: layer.n_front], layer.imposed[: layer.n_front], moves)
         for side, name in zip(sides, ("u1", "u2"), strict=True):
             model.set_variable(name, side.to_unknowns(moves))
-        n_steps = _solve(model)
+        try:
+            n_steps = _solve(model)
+        except RuntimeError as error:  # The words of GetFEM, as those of a projection that did not converge
+            return EngineAnswer(moves[: len(scene.nodes)].copy(), False, message=" ".join(str(error).split()))
         for side, name in zip(sides, ("u1", "u2"), strict=True):
             side.read_moves(model.variable(name), moves)
         converged = n_steps <= _STEPS
@@ -83,7 +87,7 @@ class GetFEM:
                 slave.on_edges, "u1", "u2", "r", _REGION, _REGION
             )
             return
-        model.add_initialized_data("r", [float(scene.young[~scene.rigid].max()) / float(scene.unit)])
+        model.add_initialized_data("r", [_augmentation(scene)])
         multipliers = gf.MeshFem(slave.mesh, 1)
         for count, (_, element, _) in _SHAPES.items():
             if len(cells := slave.cells_of[count]):
@@ -178,6 +182,18 @@ class _Side:
     def read_moves(self, vector: Any, moves: FloatArray) -> None:
         """Write the unknowns of this side into the displacements of nodes (n_front, 2)."""
         moves[self.node_numbers] = np.asarray(vector)[self.unknowns[self.node_numbers]]
+
+
+def _augmentation(scene: SceneArrays) -> float:
+    """Return the largest E over the length of the slave, of those surfaces alone that are near the other side."""
+    ends, masters = scene.nodes[scene.slave], np.unique(scene.master)
+    ways = np.linalg.norm(ends.mean(axis=1)[:, None] - scene.nodes[masters], axis=2)
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    others = scene.nodes[scene.master]
+    near = ways.min(axis=1) <= lengths + np.linalg.norm(others[:, 1] - others[:, 0], axis=1).max()
+    near |= ~near.any()
+    bodies = np.unique(scene.body_of_node[np.concatenate([scene.slave[near, 0], masters[ways[near].argmin(axis=1)]])])
+    return float(scene.young[bodies[~scene.rigid[bodies]]].max() / lengths[near].sum())
 
 
 def _corners_of_faces(shape: str) -> list[set[int]]:

@@ -20,8 +20,11 @@ import numpy as np
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
 from contactverif_engines.layer import Layer, make_layer
 
-_RESIDUAL = 1e-10  # The share of the first residual that may be left; the default is 1e-4.
-_ROUNDOFF = 1e-13  # The share of loads or reactions that may be left. The default is 1e-9 in whatever unit.
+# Kratos compares the sum of the squares of residuals with the first one, and their mean square with a number: the
+# defaults of 1e-4 and, in whatever unit, 1e-9 leave a hundredth of the first residual, or 3e-5.
+_RESIDUAL = 1e-10  # The share of the first residual that may be left.
+_ROUNDOFF = 1e-13  # The share of loads or reactions that may be left.
+_GAP_ROUNDOFF = 1e-15  # The share of E times the largest coordinate, as gaps are differences of places.
 _ITERATIONS = 60
 _NORMALS = {"fixed": "no_derivatives_computation", "updated": "no_derivatives_computation_with_normal_update"}
 _SEARCHES = {"boxes": "in_radius_with_obb", "radius": "in_radius"}
@@ -128,12 +131,12 @@ class Kratos:
                 "contact_settings": {
                     "mortar_type": mortar,
                     "fancy_convergence_criterion": False,
-                    "contact_residual_relative_tolerance": _RESIDUAL,
-                    "contact_residual_absolute_tolerance": _ROUNDOFF * _largest_force(scene),
+                    "contact_residual_relative_tolerance": _RESIDUAL**2,
+                    "contact_residual_absolute_tolerance": _roundoff(scene, self.kind) ** 2,
                 },
                 "convergence_criterion": "contact_residual_criterion",
-                "residual_relative_tolerance": _RESIDUAL,
-                "residual_absolute_tolerance": _ROUNDOFF * _largest_force(scene),
+                "residual_relative_tolerance": _RESIDUAL**2,
+                "residual_absolute_tolerance": _roundoff(scene, self.kind) ** 2,
                 "max_iteration": _ITERATIONS,
                 "linear_solver_settings": {"solver_type": "LinearSolversApplication.sparse_lu"},
             },
@@ -154,6 +157,12 @@ def _largest_force(scene: SceneArrays) -> float:
     """Return the size of loads or reactions, whichever is larger."""
     moved = float(np.abs(scene.imposed).max(initial=0.0)) * float(scene.young.max())
     return max(float(np.abs(scene.load).sum()), moved)
+
+
+def _roundoff(scene: SceneArrays, kind: str) -> float:
+    """Return the force that may be left as roundoff; the penalty of springs is 10⁴ E/h."""
+    place = float(scene.young[~scene.rigid].max()) * float(np.abs(scene.nodes).max())
+    return _ROUNDOFF * _largest_force(scene) + _GAP_ROUNDOFF * place * (1e4 if kind == "penalty" else 1.0)
 
 
 @contextmanager

@@ -29,7 +29,7 @@ CHANGE = Quantity(
     "2 (a (1 + M U/(ℓ p)) + 1e-12 κ)",
     "Both displacements are wrong by their accuracy a, which strains the shortest segment.",
 )
-LENGTH, MODULUS = 2.0**6, 4.0**-3  # Other units
+LENGTH, MODULUS = 2.0**6, 4.0**-8  # Other units, and another one of force, which is their product
 ANGLES = (17.3, 45.0, 90.0, 135.0)  # Degrees
 DISTANCE = 64.0  # The distance of the far body over the size of the scene
 IMAGE = np.diag([-1.0, 1.0])
@@ -154,8 +154,8 @@ def engine_renumbering(case: Case, subject: Subject) -> Measurement:
 def engine_scaling(case: Case, subject: Subject) -> Measurement:
     """Other units of length and force change nothing but the numbers.
 
-    **Question.** All lengths of a random scene are 64 times as large, and all moduli 1/64. Are the forces that the
-    bodies need the old ones, as numbers?
+    **Question.** All lengths of a random scene are 64 times as large, and all moduli 1/65536, so that forces are
+    1/1024. Are the forces that the bodies need the old ones, times that?
 
     **Why it matters.** A user of millimetres must not get another answer than a user of metres. Absolute tolerances of
     a search or of a convergence test are such mistakes.

@@ -19,8 +19,11 @@ def block(columns, low, face):
     return mesh
 
 
-def press(upper, lower, order=5, overlap=0.0, penalty=10.0):
-    """Return the pressure of each element of the upper block, which overlaps the lower one at the start by so much."""
+def press(upper, lower, order=5, overlap=0.0, penalty=10.0, multiplier=False):
+    """Return the pressure of each element of the upper block, which overlaps the lower one at the start by so much.
+
+    With multipliers the penalty is that of the augmentation.
+    """
     gf.util_trace_level(0)
     model = gf.Model("real")
     model.add_initialized_data("lame", [0.0])
@@ -38,7 +41,13 @@ def press(upper, lower, order=5, overlap=0.0, penalty=10.0):
         model.add_normal_Dirichlet_condition_with_multipliers(rule, name, 1, 3)
         rules.append(rule)
         fields.append(field)
-    model.add_penalized_contact_between_nonmatching_meshes_brick(rules[0], "u1", "u2", "penalty", 1, 1)
+    if multiplier:
+        pressures = gf.MeshFem(meshes[0], 1)
+        pressures.set_fem(gf.Fem("FEM_QK(2,1)"))
+        model.add_filtered_fem_variable("pressure", pressures, 1)
+        model.add_integral_contact_between_nonmatching_meshes_brick(rules[0], "u1", "u2", "pressure", "penalty", 1, 1)
+    else:
+        model.add_penalized_contact_between_nonmatching_meshes_brick(rules[0], "u1", "u2", "penalty", 1, 1)
     model.solve("max_res", 1e-12, "max_iter", 50, "lsolver", "mumps")
     y = model.variable("u1")[1::2]
     numbers = [fields[0].basic_dof_from_cvid(cell)[0][1::2] // 2 for cell in meshes[0].cvid()]

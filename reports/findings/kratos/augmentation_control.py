@@ -11,3 +11,8 @@ for unit in (1.0, 64.0):
 for unit in (1.0, 64.0):
     converged, pressures, gap = press([0, 2], [-2, 0, 2, 4], {"search_parameters": SEARCH}, unit=unit)
     print(f"matching, unit {unit:g}: converged {converged}, pressure {pressures[0]:.6f}, mean gap {gap:.6f}")
+for unit in (1.0, 64.0):
+    augmented = {"stiffness_factor": 1 / unit, "penalty_scale_factor": unit}
+    settings = {"search_parameters": SEARCH, "advance_ALM_parameters": augmented}
+    converged, pressures, gap = press([0, 2], [-1, 0, 1.2, 3], settings, unit=unit)
+    print(f"penalty {1 / unit:g} E/h, unit {unit:g}: pressure {pressures[0]:.6f}, mean gap {gap:.6f}")

@@ -25,10 +25,11 @@ def part(name, nodes, **others):
     )
 
 
-def press(upper, lower, settings, kind="ALM", unit=1.0, overlap=0.0, pushed=0.1):
+def press(upper, lower, settings, kind="ALM", unit=1.0, overlap=0.0, pushed=0.1, young=1.0, tolerances=()):
     """Return the pressure of each upper element, and the mean gap, of blocks with columns between these places x.
 
     All lengths are multiplied by the unit. Blocks that overlap do so at the start, before the upper one is pushed.
+    Tolerances are the relative and the absolute one of the residual, 1e-4 and 1e-9 unless they are given.
     """
     os.chdir(tempfile.mkdtemp())
     Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
@@ -52,7 +53,7 @@ def press(upper, lower, settings, kind="ALM", unit=1.0, overlap=0.0, pushed=0.1)
     with open("blocks.mdpa", "w") as file:
         file.write("\n".join(text) + "\n")
     law = {"name": "LinearElasticPlaneStrain2DLaw"}
-    material = {"constitutive_law": law, "Variables": {"YOUNG_MODULUS": 1.0, "POISSON_RATIO": 0.0}, "Tables": {}}
+    material = {"constitutive_law": law, "Variables": {"YOUNG_MODULUS": young, "POISSON_RATIO": 0.0}, "Tables": {}}
     with open("materials.json", "w") as file:
         json.dump({"properties": [{"model_part_name": "B.Solid", "properties_id": 1, "Material": material}]}, file)
     contact = {
@@ -74,6 +75,9 @@ def press(upper, lower, settings, kind="ALM", unit=1.0, overlap=0.0, pushed=0.1)
         "contact_settings": {"mortar_type": f"{kind}ContactFrictionless"},
         "convergence_criterion": "contact_residual_criterion",
     }
+    for word, tolerance in zip(("relative", "absolute"), tolerances, strict=False):
+        solver[f"residual_{word}_tolerance"] = tolerance
+        solver["contact_settings"][f"contact_residual_{word}_tolerance"] = tolerance
     problem = {"problem_name": "B", "start_time": 0.0, "end_time": 1.0, "parallel_type": "OpenMP", "echo_level": 0}
     whole = {"problem_data": problem, "solver_settings": solver, "processes": {"contact_process_list": [process]}}
     model = Kratos.Model()
