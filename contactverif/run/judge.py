@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain
 from math import inf
 from time import perf_counter
 
@@ -109,12 +108,13 @@ def badness(info: PropertyInfo, outcome: Outcome) -> tuple[int, float]:
 
 def verdict_over_all(row: Row) -> tuple[Verdict, str]:
     """Return verdict and reason of a row from its outcomes."""
-    everything = chain(row.outcomes, [row.witness] if row.witness else [])
+    everything = [*row.outcomes, *([row.witness] if row.witness else [])]
+    # Before any failure: one that is stated would let the mistake of the property pass.
+    if raised := next((outcome.reason for outcome in everything if outcome.reason.startswith(RAISED)), ""):
+        return Verdict.NOT_JUDGED, raised
     worst = max(everything, key=lambda outcome: badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         return worst.verdict, _reason_with_name(row, worst)
-    if raised := next((reason for reason in row.tally.reasons if reason.startswith(RAISED)), ""):
-        return Verdict.NOT_JUDGED, raised
     if row.judged < _fewest_judged(row):
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"

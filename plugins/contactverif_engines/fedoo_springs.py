@@ -17,9 +17,6 @@ from contactverif_engines.layer import Layer, deepen, make_layer
 
 _STEPS = 60
 _CONVERGED = 1e-11  # The norm of the last step over that of all displacements.
-_TOUCH = (
-    2.0**-30
-)  # The share of the size of a body by which slaves start deeper: fedoo counts no contact without depth.
 _AXES = ("DispX", "DispY")
 
 
@@ -61,7 +58,7 @@ class Fedoo:
             contacts = self._make_contacts(fedoo, layer, space)
             problem = fedoo.problem.NonLinear(fedoo.Assembly.sum(*bodies, *contacts, name=""), name="")
             _add_supports_and_loads(problem, layer)
-            start = np.where(layer.fixed[: layer.n_front], 0.0, deepen(layer, _TOUCH))
+            start = np.where(layer.fixed[: layer.n_front], 0.0, deepen(layer))
             problem.set_dof("Disp", start.T)
             for contact in contacts:
                 contact.set_disp(start.T)

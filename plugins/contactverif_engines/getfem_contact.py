@@ -31,8 +31,8 @@ class GetFEM:
     Attributes
     ----------
     kind : Literal['penalty', 'multiplier']
-        Springs of the stiffness ε̂, or multipliers at the nodes of the slave with an augmentation, which is
-        part of the solution where points of an edge are open, as the manual says: so far bodies have no part in it.
+        Springs of the stiffness ε̂, or multipliers at the nodes of the slave with an augmentation of E/L. Where points
+        of an edge are open it changes the solution, as the manual says, so that bodies far away have no part in it.
     order : int
         The order of integration on the slave's edges: 1 to 19, and only odd numbers where cells are triangles.
     """

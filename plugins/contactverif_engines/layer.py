@@ -77,7 +77,7 @@ def make_layer(scene: SceneArrays, thickness: float = 1.0) -> Layer:
     )
 
 
-def deepen(layer: Layer, share: float) -> FloatArray:
+def deepen(layer: Layer, share: float = 2.0**-30) -> FloatArray:
     """Return displacements (n_front, 2) that move each slave body out of itself, by a share of the largest body's size.
 
     Codes that count no contact without depth begin so: a body that only touches would be free to move.

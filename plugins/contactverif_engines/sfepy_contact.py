@@ -17,7 +17,6 @@ from contactverif_engines.layer import Layer, deepen, make_layer
 _STEPS = 200
 _CONVERGED = 1e-10  # The norm of the residual over the size of forces.
 _ROUNDED = 2.0**-53  # The share of the largest coordinate by which a gap may be rounded.
-_TOUCH = 2.0**-30  # The share of the size of a body by which slaves start deeper: no depth is no contact.
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class SfePy:
         options = {"i_max": _STEPS, "eps_a": _small_force(scene), "eps_r": 1.0, "lin_red": None}
         search = {"ls_on": 1.0, "ls_red": 0.5, "ls_red_warp": 0.5}  # As in the example of sfepy with two bodies.
         problem.set_solver(Newton(options | search, lin_solver=ScipyDirect({}), status=status))
-        guess = deepen(layer, _TOUCH)
+        guess = deepen(layer)
         guess[: len(scene.nodes)] += scene.start
         try:
             state = problem.solve(state0=guess.reshape(-1), save_results=False, verbose=False)
@@ -101,10 +100,8 @@ class _Model:
             total = total + Term.new("dw_lin_elastic(solid.D, v, u)", Integral("j", 2), region, solid=solid, **both)
         load = 2 * self.layer.load[: self.layer.n_front]  # The front of a layer bears half of it.
         if (loaded := np.flatnonzero(load.any(axis=1))).size:
-            push, region = (
-                Material("push", values={".force": load[loaded]}),
-                self._make_region("vertex", loaded, "Loaded"),
-            )
+            push = Material("push", values={".force": load[loaded]})
+            region = self._make_region("vertex", loaded, "Loaded")
             total = total - Term.new("dw_point_load(push.force, v)", Integral("k", 0), region, push=push, v=self.test)
         return Equations([Equation("balance", total)])
 

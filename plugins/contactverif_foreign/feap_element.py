@@ -24,13 +24,6 @@ _ORDER = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
 _TANGENT_AND_RESIDUAL = 3  # The value of isw.
 _SETS = 6  # Columns of displacements in `ul`: the total, the increment, and velocities and the like, which are zero.
 _MOST_ELEMENTS = 99
-# {common block: the kinds of its first variables}, the same in FEAP and FEAPpv. `ctan` has the factors of stiffness,
-# damping and mass in a tangent.
-_BLOCKS = {
-    "eldata": "=d5i",  # dm, n, ma, mct, iel, nel
-    "cdata": "=6i",  # numnp, numel, nummat, nen, neq, ipr
-    "eltran": "=6d",  # bpr(3), ctan(3)
-}
 
 
 def _arguments(n_nodes: int, n_properties: int, n_state: int) -> list[Argument]:
@@ -72,16 +65,17 @@ def _fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: 
 
 def _set_common_blocks(library: ctypes.CDLL, n_nodes: int) -> None:
     """Say that one element of so many nodes is asked, in a static step, to the common blocks that a library has."""
-    values = {
-        "eldata": (1.0, 1, 1, 0, 0, n_nodes),
-        "cdata": (n_nodes, 1, 1, n_nodes, 2 * n_nodes, 1),
-        "eltran": (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    # Their first variables are the same in FEAP and FEAPpv; `ctan` has the factors of stiffness, damping and mass.
+    blocks = {
+        "eldata": ("=d5i", 1.0, 1, 1, 0, 0, n_nodes),  # dm, n, ma, mct, iel, nel
+        "cdata": ("=6i", n_nodes, 1, 1, n_nodes, 2 * n_nodes, 1),  # numnp, numel, nummat, nen, neq, ipr
+        "eltran": ("=6d", 0.0, 0.0, 0.0, 1.0, 0.0, 0.0),  # bpr(3), ctan(3)
     }
-    for block, kinds in _BLOCKS.items():
+    for block, (kinds, *values) in blocks.items():
         for name in fortran_names(block):
             if hasattr(library, name):
                 memory = (ctypes.c_char * struct.calcsize(kinds)).in_dll(library, name)
-                struct.pack_into(kinds, memory, 0, *values[block])
+                struct.pack_into(kinds, memory, 0, *values)
 
 
 _FEAP = Convention("feap", _arguments, _constants, _ORDER, _fill, "p", "s", announce=_set_common_blocks)

@@ -72,9 +72,9 @@ def test_what_a_code_reports_is_judged(name: str, fault: str, wrong: Quantity | 
     judged, too_large = set(), set()
     for case in cases:
         for number in judge_case(question, case, subject).measurement.numbers:
-            name = number.quantity.name.removesuffix(", high penalty")
-            judged.add(name)
-            too_large |= {name} if number.value > number.tolerance else set()
+            quantity = number.quantity.name.removesuffix(", high penalty")
+            judged.add(quantity)
+            too_large |= {quantity} if number.value > number.tolerance else set()
     assert {REPORTED_FORCES.name, REPORTED_PRESSURES.name} <= judged
     assert too_large == ({wrong.name} if wrong else set())
 

@@ -545,26 +545,32 @@ def test_profiles() -> None:
     assert PROFILES["ci"].resolve().seed == 0
 
 
-@pytest.mark.parametrize("late", [False, True])
-def test_a_property_that_raises_is_not_judged_and_nobody_is_accused(late: bool) -> None:
-    """While judging and while shrinking: the property, not the plugin, raises."""
+@pytest.mark.parametrize("largest", [0.0, 1.0])
+def test_a_property_that_raises_is_not_judged_whatever_else_it_finds(largest: float) -> None:
+    """A failure that is stated would let the mistake of the property pass."""
+
+    def mistaken(case: Case, subject: Subject) -> Measurement:
+        if len(case.interface.slave) == 1:
+            raise ZeroDivisionError("in a property")
+        return Measurement([ERROR.check(largest, 0.5)])
+
+    row = one_row(subject(), replace(ZERO, measure=mistaken, cases=lambda _: sizes(2)))
+    assert row.verdict is Verdict.NOT_JUDGED
+    assert row.reason.startswith("the property raised ZeroDivisionError: in a property (test_run.py, line ")
+    assert row.unexpected
+
+
+def test_a_property_that_raises_while_its_failure_is_shrunk_has_failed() -> None:
     failed = False
 
     def mistaken(case: Case, subject: Subject) -> Measurement:
         nonlocal failed
-        if failed or not late:
+        if failed:
             raise ZeroDivisionError("in a property")
         failed = len(case.interface.slave) > 1
         return Measurement([ERROR.check(float(failed), 0.5)])
 
-    question = replace(ZERO, measure=mistaken, cases=lambda _: sizes(2))
-    row = one_row(subject(), question)
-    if late:  # What was found before counts.
-        assert row.verdict is Verdict.FAIL
-    else:
-        assert row.verdict is Verdict.NOT_JUDGED
-        assert row.reason.startswith("the property raised ZeroDivisionError: in a property (test_run.py, line ")
-        assert row.unexpected
+    assert one_row(subject(), replace(ZERO, measure=mistaken, cases=lambda _: sizes(2))).verdict is Verdict.FAIL
 
 
 @pytest.mark.parametrize("call", [3, 45])
