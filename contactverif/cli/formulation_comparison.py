@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -29,11 +31,12 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
-from contactverif.plugins.engines import load_subject, the_subject
+from contactverif.plugins.engines import that_loads
 from contactverif.plugins.registry import formulation_names, load_properties
 from contactverif.run.judge import forces_on
 from contactverif.run.rows import find_gap
-from contactverif.run.scheduler import worker_pool
+from contactverif.run.subject_loading import begin_loading
+from contactverif.run.worker_pool import worker_pool
 from contactverif.studies.comparison_study import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.compare.comparison import Differing
@@ -41,24 +44,26 @@ from contactverif_reports.html.comparison_page import Drawing, comparison_page
 from contactverif_reports.html.pages import write_page
 
 
-def _load(job: VerifyJob) -> tuple[Subject, Plugins]:
+def _load(job: VerifyJob, executor: Executor | None) -> tuple[Subject, Plugins]:
     """Load the reference, which is the first formulation, and all other formulations and the properties."""
     reference_name, *names = job.options.names
     if not names:
         others = ", ".join(name for name in formulation_names() if name != reference_name)
         raise MisuseError("NAME", "nothing", f"some of {others}, or two reports OLD.nc NEW.nc")
-    limits, properties = job.limits(), load_properties(job.options.properties, engines=True)
+    load_reference, *loaders = begin_loading(job.options.names, job.limits(), executor)
+    properties = load_properties(job.options.properties, engines=True)
     try:
-        reference = the_subject(reference_name, limits)
+        reference = that_loads(reference_name, load_reference())
     except MisuseError as error:
         raise MisuseError("--against", error.found, error.needed) from None
-    return reference, Plugins([reference, *(load_subject(name, limits) for name in names)], properties)
+    return reference, Plugins([reference, *(load() for load in loaders)], properties)
 
 
 def compare_formulations(job: VerifyJob, screen: ScreenOptions) -> int:
     """Run all properties, show what was found and write the files; return the exit status."""
-    with watch_for_stops(job), job.begin(partial(_load, job)) as ((reference, plugins), journal):
+    with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
+            (reference, plugins), journal = stack.enter_context(job.begin(partial(_load, job, executor)))
             options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
         gap = partial(find_gap, study.run, plugins.subjects, plugins.questions, job.sampling)

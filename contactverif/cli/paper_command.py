@@ -46,7 +46,7 @@ def paper(
     check_folder(folder)  # before the slow import of what computes
     from contactverif.cli.console import say
     from contactverif.cli.progress import Bar
-    from contactverif.run.scheduler import CASES_A_WORKER, check_jobs, default_jobs, worker_pool
+    from contactverif.run.worker_pool import CASES_A_WORKER, check_jobs, default_jobs, worker_pool
     from contactverif_paper import compute, steps
 
     n_jobs = default_jobs(2 * CASES_A_WORKER) if jobs is None else check_jobs(jobs)

@@ -165,9 +165,16 @@ class WorkerOptions:
 
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help=JOBS_HELP, metavar="N")] = None
 
+    def prepare(self, *, every_property: bool) -> None:
+        """Start the server of workers before anything large is imported, if the run is likely to have some."""
+        from contactverif.run.worker_pool import start_server
+
+        if self.jobs != 1 and every_property:
+            start_server()
+
     def number(self, n_formulations: int, n_properties: int, examples: int) -> int:
         """Return the number of processes: the user's, or one that fits the work."""
-        from contactverif.run.scheduler import check_jobs, default_jobs
+        from contactverif.run.worker_pool import check_jobs, default_jobs
 
         if self.jobs is None:
             return default_jobs(n_formulations * n_properties * examples)

@@ -105,6 +105,7 @@ def verify(
         workers,
         isolation,
     )
+    workers.prepare(every_property=not properties)
     settings = read_settings()
     if resume is not None:
         job = resumed_job(resume, typed)
@@ -125,12 +126,12 @@ def run_job(job: VerifyJob, screen: ScreenOptions, *, memory: bool = False) -> i
     from contactverif.run.failure_memory import FailureMemory
     from contactverif.run.rows import find_gap
     from contactverif.run.run import run
-    from contactverif.run.scheduler import worker_pool
+    from contactverif.run.worker_pool import worker_pool
 
     failures = FailureMemory() if memory and job.place is None else None
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            plugins, journal = stack.enter_context(job.begin(job.load))
+            plugins, journal = stack.enter_context(job.begin(partial(job.load, executor)))
             if failures is not None:
                 journal.earlier_failures = failures.recall(job.options.names, job.options.properties)
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.

@@ -24,6 +24,8 @@ from contactverif.cli.shared_options import PlaceOptions, SamplingOptions, Worke
 from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from contactverif.contract.case import Case
     from contactverif.contract.interface import Interface
     from contactverif.contract.property import Property
@@ -111,14 +113,14 @@ class VerifyJob:
     command: str = VERIFY
     hidden: tuple[Path, ...] = ()  # Other files of the run that a plugin in a box does not see.
 
-    def load(self) -> Plugins:
-        """Load the formulations and the properties."""
-        from contactverif.plugins.engines import load_subject
+    def load(self, executor: Executor | None = None) -> Plugins:
+        """Load the formulations, in the workers where there are any, and the properties meanwhile."""
         from contactverif.plugins.registry import load_properties
+        from contactverif.run.subject_loading import begin_loading
 
-        limits = self.limits()
+        loaders = begin_loading(self.options.names, self.limits(), executor)
         questions = load_properties(self.options.properties, engines=True)
-        return Plugins([load_subject(name, limits) for name in self.options.names], questions)
+        return Plugins([load() for load in loaders], questions)
 
     def limits(self) -> Limits | None:
         """Return the limits of the plugins' processes; in a box they do not see what this run writes."""

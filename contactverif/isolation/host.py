@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter, OrderedDict
 from collections.abc import Mapping, Sequence
 from math import inf
+from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -76,6 +77,7 @@ class Host:
         self.opaque: bool | None = None  # Pairings have a handle, which stays there; None until the first one is known.
         self.n_ended = 0  # Ends before it was told to.
         self.n_started = 0
+        self.code_files_there: list[Path] = []
         self.last_question = 0.0  # By the clock of `time.monotonic`.
 
     def load(self) -> Reply:
@@ -120,9 +122,9 @@ class Host:
         return question
 
     @property
-    def libraries(self) -> list[str]:
-        """Return name and digest of the compiled code that its process has loaded beyond that of the judge."""
-        return [] if self._process is None else self._process.libraries
+    def code_files(self) -> list[Path]:
+        """The files whose compiled code its process has loaded, or its process in another process of the judge."""
+        return self.code_files_there if self._process is None else self._process.code_files
 
     @property
     def has_process(self) -> bool:

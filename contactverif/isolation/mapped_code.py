@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
@@ -17,13 +17,13 @@ _MOST = 500  # The number of files that are read.
 _LARGEST = 1 << 25  # Bytes. A compiler such as LLVM has more, which would take a third of a second.
 
 
-def list_libraries(pid: int) -> list[str]:
-    """Return name and digest of each file whose code a process runs, and this process does not."""
-    paths = sorted({*_mapped_files(pid)} - {*_mapped_files("self")})
+def list_libraries(files: Iterable[Path]) -> list[str]:
+    """Return name and digest of each of the files whose code this process does not run."""
+    paths = sorted({*files} - {*mapped_files("self")})
     return [f"{one_line(path.name)} {_digest(path)}" for path in paths[:_MOST]]
 
 
-def _mapped_files(pid: int | str) -> Iterator[Path]:
+def mapped_files(pid: int | str) -> Iterator[Path]:
     """Yield the files from which a process has mapped code."""
     with suppress(OSError):  # It has ended, or the system has no such folder.
         for line in os.fsdecode(Path(f"/proc/{pid}/maps").read_bytes()).split("\n"):

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache, cached_property
 from multiprocessing import util
+from pathlib import Path
 from typing import IO
 
 import psutil
@@ -31,7 +32,7 @@ from contactverif.isolation.child import Child, name_of_signal
 from contactverif.isolation.confinement import MEMORY
 from contactverif.isolation.control_group import ControlGroup
 from contactverif.isolation.limits import MEGABYTE, Limits
-from contactverif.isolation.mapped_code import list_libraries
+from contactverif.isolation.mapped_code import mapped_files
 from contactverif.isolation.messages import MessageError, Reply, decode_replies
 from contactverif.isolation.one_core import JUDGE
 from contactverif.isolation.one_thread import ONE_THREAD
@@ -180,9 +181,9 @@ class PluginProcess:
             self._core = JUDGE.core
 
     @property
-    def libraries(self) -> list[str]:
-        """Return name and digest of the compiled code that the process has loaded beyond that of the judge."""
-        return list_libraries(self._worker_pid)
+    def code_files(self) -> list[Path]:
+        """The files whose compiled code the process has loaded."""
+        return [*mapped_files(self._worker_pid)]
 
     @cached_property
     def _worker_pid(self) -> int:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from scipy import sparse
@@ -26,6 +27,7 @@ from contactverif.contract.traits import Traits
 from contactverif.isolation.box import Box
 from contactverif.isolation.host import Host, answer_of, host_of
 from contactverif.isolation.limits import Limits
+from contactverif.isolation.mapped_code import list_libraries
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
 from contactverif.isolation.remote_engine import RemoteEngineSubject
@@ -61,14 +63,24 @@ def count_ends(subject: Subject) -> int:
     return subject.host.n_ended if isinstance(subject, RemoteSubject | RemoteEngineSubject) else 0
 
 
+def code_files(subject: Subject) -> list[Path]:
+    """Return the files whose compiled code the process of a formulation has loaded; none if it has none of its own."""
+    return subject.host.code_files if isinstance(subject, RemoteSubject | RemoteEngineSubject) else []
+
+
+def note_code_files(subject: Subject, files: list[Path]) -> None:
+    """Keep what the process of a formulation has loaded that belongs to another process of the judge."""
+    if isinstance(subject, RemoteSubject | RemoteEngineSubject):
+        subject.host.code_files_there = files
+
+
 def places(subjects: Iterable[Subject]) -> dict[str, str]:
     """Return {attribute of the report: value}: where formulations lived, what was open to them, and their libraries."""
     facts: dict[str, set[str]] = {"isolation": set(), "opened": set(), "libraries": set()}
     for subject in subjects:
         remote = isinstance(subject, RemoteSubject | RemoteEngineSubject)
         box = subject.box if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None
-        if isinstance(subject, RemoteSubject | RemoteEngineSubject):
-            facts["libraries"] |= set(subject.host.libraries)
+        facts["libraries"] |= set(list_libraries(code_files(subject)))
         inside = "process" if remote else "inline"
         facts["isolation"].add(inside if box is None else box.kind)
         facts["opened"] |= set(box.opened) if box is not None else set()

@@ -54,10 +54,14 @@ def load_subject(text: str, limits: Limits | None = None) -> Subject | NotLoaded
 
 def the_subject(text: str, limits: Limits | None = None) -> Subject:
     """Return the formulation or engine of that name; one that does not load is a mistake here."""
-    subject = load_subject(text, limits)
-    if isinstance(subject, NotLoaded):
-        raise MisuseError("formulation", f"{text}, which does not load ({subject.reason})", "one that loads")
-    return subject
+    return that_loads(text, load_subject(text, limits))
+
+
+def that_loads(text: str, loaded: Subject | NotLoaded) -> Subject:
+    """Return what was loaded by that name; that it does not load is a mistake here."""
+    if isinstance(loaded, NotLoaded):
+        raise MisuseError("formulation", f"{text}, which does not load ({loaded.reason})", "one that loads")
+    return loaded
 
 
 def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotLoaded:

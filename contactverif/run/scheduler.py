@@ -4,32 +4,17 @@ A job is a plain function of data that can be pickled. Jobs may end in any order
 
 - A job that cannot be encoded, because a notebook or a function defines its formulation, runs in the parent.
 - A worker that dies ends the run with one clear line. The run never waits for a dead worker.
-- Ctrl-C goes to the parent alone, which ends the workers. If the parent is killed, they end by themselves.
 """
 
 from __future__ import annotations
 
 import io
-import multiprocessing
-import os
 import pickle
-import signal
-import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from multiprocessing.process import BaseProcess
 from typing import Any, Literal
 
 import numpy as np
@@ -40,14 +25,9 @@ from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.result import Row
 from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
-from contactverif.isolation.one_thread import ONE_THREAD, one_thread_for_children
-from contactverif.isolation.parent_death import die_with_parent
 from contactverif.plugins.registry import installed_properties, load_property
 
 Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
-CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
-# What the server of processes imports once for all workers: the judge, and, as it is imported, all properties.
-_PRELOAD = ["contactverif.run.run", "contactverif.plugins.preload"]
 _SILENCE = 5.0  # Seconds after which the last step is reported once more, to show that the run goes on.
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
@@ -143,29 +123,37 @@ class Scheduler:
 
     def _submit(self, job: Job) -> Future[bytes] | None:
         """Hand a job to the executor; return None if the parent has to do it."""
-        if self._executor is None:
-            return None
-        try:
-            encoded = encode((job.function, job.arguments, hangs()))
-        except Exception:  # Pickle raises errors of many kinds.
-            return None
-        try:
-            return self._executor.submit(_do, encoded)
-        except BrokenExecutor as error:
-            raise _worker_error() from error
+        return None if self._executor is None else submit(self._executor, job.function, *job.arguments)
 
     def _result(self, future: Future[bytes], job: Job) -> Any:
         """Return the result of a job that a worker has done; one that it could not import is done now."""
-        try:
-            answer = future.result()
-        except BrokenExecutor as error:
-            raise _worker_error() from error
-        if answer == _NOT_HERE:
-            return job.function(*job.arguments, **self._counter(job))
-        result, words, known_hangs = decode(answer)
-        note_last_words(words)
-        note_hangs(known_hangs)
-        return result
+        return fetch(future, partial(job.function, *job.arguments, **self._counter(job)))
+
+
+def submit(executor: Executor, function: Callable[..., Any], *arguments: Any) -> Future[bytes] | None:
+    """Hand a call to an executor; return None if it cannot be encoded."""
+    try:
+        encoded = encode((function, arguments, hangs()))
+    except Exception:  # Pickle raises errors of many kinds.
+        return None
+    try:
+        return executor.submit(_do, encoded)
+    except BrokenExecutor as error:
+        raise _worker_error() from error
+
+
+def fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
+    """Return the result of a call that a worker has done, or that of a call here if the worker could not import it."""
+    try:
+        answer = future.result()
+    except BrokenExecutor as error:
+        raise _worker_error() from error
+    if answer == _NOT_HERE:
+        return here()
+    result, words, known_hangs = decode(answer)
+    note_last_words(words)
+    note_hangs(known_hangs)
+    return result
 
 
 def _do(encoded: bytes) -> bytes:
@@ -183,96 +171,6 @@ def _worker_error() -> WorkerError:
         "a worker process died, so the run is not complete; a plugin may have crashed or ended it. "
         "Run again with --jobs 1 to see where"
     )
-
-
-def usable_cores() -> int:
-    """Return the number of cores that this process may use, which in a container may be few."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def default_jobs(planned: int) -> int:
-    """Return the number of workers for a number of planned cases: one for each 1000, at most one for each core.
-
-    Under pytest it is 1, because pytest-xdist has started as many processes as there are cores.
-    """
-    if "PYTEST_CURRENT_TEST" in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
-        return 1
-    return max(1, min(usable_cores(), planned // CASES_A_WORKER))
-
-
-def check_jobs(jobs: int) -> int:
-    """Return the number of processes that the user wants, at least 1; too many would fill the memory."""
-    most = max(16, 4 * usable_cores())
-    if not 1 <= jobs <= most:
-        raise MisuseError("--jobs", str(jobs), f"at least 1, at most {most} on this machine")
-    return jobs
-
-
-@contextmanager
-def worker_pool(jobs: int) -> Iterator[Executor | None]:
-    """Yield an executor with so many worker processes; None for one job, which the parent does itself.
-
-    Enter it before plugins and properties are loaded: the workers import while the parent does.
-    """
-    if jobs < 1:
-        raise MisuseError("jobs", str(jobs), "at least 1")
-    if jobs == 1:
-        yield None
-        return
-    before = set(multiprocessing.active_children())
-    try:
-        pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_begin_worker)
-    except (OSError, ImportError) as error:  # Python needs semaphores for it, and they are in shared memory.
-        reason = f"{jobs}, but processes cannot share memory here: {getattr(error, 'strerror', None) or error}"
-        raise MisuseError("--jobs", reason, "--jobs 1, or a /dev/shm that can be written") from error
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for worker in set(multiprocessing.active_children()) - before:
-            worker.terminate()
-        raise
-    pool.shutdown()
-
-
-def _context() -> Any:
-    """Return the way to start processes: from a server that has imported the harness, where there is one."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    from multiprocessing import forkserver  # Windows has none.
-
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(_PRELOAD)
-    with _interrupts_wait(), one_thread_for_children():  # The server inherits both, and hears no Ctrl-C.
-        forkserver.ensure_running()  # It imports while the parent goes on.
-    return context
-
-
-@contextmanager
-def _interrupts_wait() -> Iterator[None]:
-    """Open a block behind which Ctrl-C is heard at the latest."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _begin_worker() -> None:
-    """Leave interrupts to the parent, end with it, and let what is loaded from now on compute on one thread."""
-    os.environ.update(ONE_THREAD)  # For a worker that no server of ours has started.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    die_with_parent()
-    parent = multiprocessing.parent_process()
-    if parent is not None:  # The server of processes may outlive it.
-        threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
-
-
-def _end_after(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
 
 
 class CaseChunk:

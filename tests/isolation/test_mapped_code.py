@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.isolation.mapped_code import list_libraries
+from contactverif.isolation.mapped_code import list_libraries, mapped_files
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux shows what a process has mapped")
 MAPS = """
@@ -38,7 +38,7 @@ def mapping(tmp_path: Path) -> Iterator[tuple[int, Path, Path]]:
 
 def test_a_name_may_have_any_characters(mapping: tuple[int, Path, Path]) -> None:
     pid, _, _ = mapping
-    names = [line.split()[0] for line in list_libraries(pid) if ".so" in line]
+    names = [line.split()[0] for line in list_libraries(mapped_files(pid)) if ".so" in line]
     assert {"usual.so", r"a\x0bb\rc.so"} <= set(names)
 
 
@@ -52,5 +52,5 @@ def test_what_has_no_end_is_not_read(mapping: tuple[int, Path, Path], kind: str)
         os.mkfifo(other)
     else:
         other.symlink_to("/dev/zero")
-    (line,) = (line for line in list_libraries(pid) if line.startswith("usual.so"))
+    (line,) = (line for line in list_libraries(mapped_files(pid)) if line.startswith("usual.so"))
     assert line in ("usual.so (deleted) which is no file", "usual.so (deleted) which is gone")

@@ -17,7 +17,7 @@ from contactverif.isolation import host, process
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import load_remote
 from contactverif.isolation.remote_formulation import RemoteSubject, count_ends, places
-from contactverif.run.scheduler import worker_pool
+from contactverif.run.worker_pool import worker_pool
 
 CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)

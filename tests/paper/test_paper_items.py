@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from contactverif.mechanics import newton
 from contactverif.mechanics.trace import End
 from contactverif.problems import catalogue
-from contactverif.run.scheduler import worker_pool
+from contactverif.run.worker_pool import worker_pool
 from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3
 from contactverif_paper.example_2 import mesh_lines, thin_out
 from contactverif_paper.figure_style import new_panels

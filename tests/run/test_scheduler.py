@@ -23,7 +23,8 @@ from contactverif.isolation import host
 from contactverif.isolation.limits import Limits
 from contactverif.run import scheduler
 from contactverif.run.run import run
-from contactverif.run.scheduler import CaseChunk, WorkerError, decode, default_jobs, encode, usable_cores, worker_pool
+from contactverif.run.scheduler import CaseChunk, WorkerError, decode, encode
+from contactverif.run.worker_pool import default_jobs, usable_cores, worker_pool
 
 PROPERTY_IDS = ("balance.moment", "patch.flat.transmission", "hard.deep", "hard.dead-zone")
 
@@ -87,7 +88,7 @@ def test_an_executor_with_threads_is_refused() -> None:
 
 
 def test_the_default_number_of_jobs_follows_the_planned_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scheduler, "usable_cores", lambda: 4)
+    monkeypatch.setattr("contactverif.run.worker_pool.usable_cores", lambda: 4)
     assert default_jobs(10**6) == 1  # Here pytest runs.
     for name in ("PYTEST_CURRENT_TEST", "PYTEST_XDIST_WORKER"):
         monkeypatch.delenv(name, raising=False)

@@ -15,7 +15,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Outcome, Property, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
-from contactverif.run.scheduler import worker_pool
+from contactverif.run.worker_pool import worker_pool
 from contactverif.studies.comparison_study import find_differing, run_comparison
 from contactverif.studies.evaluation_cost import make_state, measure_costs
 from contactverif_properties.newton_convergence import newton_order
