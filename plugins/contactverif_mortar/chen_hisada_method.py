@@ -188,17 +188,8 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     """Chen & Hisada: node gaps as in NTS, pressures interpolated along the slave and integrated over cells.
 
     It passes the flat patch test and conserves force and moment. It does not cover an overhang: the pressure falls to
-    zero at the node that overhangs, not at the end of the master.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : str
-        "current" or "reference": the configuration in which lengths are measured.
-    tau : float
-        The part of a master segment by which a node's foot may lie past its free end and still count. With 0 a node
-        that faces a free end exactly is lost to roundoff, and neither patch tests nor convergence are promised.
+    zero at the node that overhangs, not at the end of the master. `tau` is the part of a master segment by which a foot
+    may lie past its free end and still count.
 
     References
     ----------

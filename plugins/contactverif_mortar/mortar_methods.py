@@ -149,18 +149,8 @@ def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -
 
     Cells are integrated exactly and forces balance point by point. So force and moment are conserved, the flat patch
     test is passed, and an overhang is covered. The tangent is exact and unsymmetric: forces are along the slave's
-    normal, the gradient of the gap is not.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : str
-        "current" or "reference": the configuration in which lengths are measured.
-    normals : str
-        "segment": each slave segment looks along its own normal. "averaged": normals are averaged at slave nodes and
-        interpolated in between, which is smoother, fails the patch test on a kinked surface, and promises no
-        continuity.
+    normal, the gradient of the gap is not. With `normals="averaged"` normals are averaged at slave nodes and
+    interpolated in between, which is smoother, and fails the patch test on a kinked surface.
 
     References
     ----------
@@ -186,13 +176,6 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
 
     Its promises are those of `mortar`, except that no continuity is promised: at given multipliers forces jump where a
     node is released. The constraints are independent, so the multipliers are unique.
-
-    Parameters
-    ----------
-    penalty : float
-        Scale c > 0 of the decision λ_j − c G_j ≥ 0, force per length per length. No solution depends on it.
-    area, normals : str
-        As for `mortar`.
 
     References
     ----------

@@ -79,16 +79,8 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
 
     Slave and master segments that face each other are cut to their overlap. Gap and force are along the normal of the
     slave segment, and the force acts at both facing points. So force and moment are conserved exactly, the flat patch
-    test is passed, and an overhang is covered. At a high penalty its springs are
-    more conditions than the surfaces can follow, and it locks. The tangent is exact and unsymmetric: the gradient of
-    the gap is not along the slave's normal.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : str
-        "current" or "reference": the configuration in which lengths are measured.
+    test is passed, and an overhang is covered. At a high penalty its springs are more conditions than the surfaces can
+    follow, and it locks. The tangent is exact and unsymmetric: the gradient of the gap is not along the slave's normal.
 
     References
     ----------

@@ -223,19 +223,11 @@ def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -
     It passes the flat patch test and covers an overhang, with Gauss points that know nothing of the nodes on the other
     side. Slave and master may be exchanged. Forces and moments balance as well as both surfaces see the same gap, which
     is not exactly: it fails where one surface is tilted against the other. It converges at soft penalties, and not at
-    stiff ones where surfaces are not parallel, so it promises nothing there. With two Gauss points the two surfaces
-    weigh different gaps where nodes do not match. From 60 E/h on, the unsymmetric stiffness is then almost singular at
-    some penalties: 12 on 8 segments were 3.4 times too compliant at 100 E/h, and 0.85 times at 110 E/h. Five points
-    move this beyond 1e3 E/h. For that reason nothing is promised of kinks with stiff springs either.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : str
-        "current" or "reference": the configuration in which lengths are measured.
-    n : int
-        Number of Gauss points on the covered range of a segment, ≥ 2.
+    stiff ones where surfaces are not parallel, so it promises nothing there. `n` ≥ 2 is the number of Gauss points on
+    the covered range of a segment. With two of them the two surfaces weigh different gaps where nodes do not match.
+    From 60 E/h on, the unsymmetric stiffness is then almost singular at some penalties: 12 on 8 segments were 3.4 times
+    too compliant at 100 E/h, and 0.85 times at 110 E/h. Five points move this beyond 1e3 E/h. For that reason nothing
+    is promised of kinks with stiff springs either.
 
     References
     ----------

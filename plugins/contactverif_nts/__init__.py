@@ -5,6 +5,16 @@
 forces of Box 3. `eq6_tangent` and `box3_tangent` differentiate both, and `turned_force` holds what they share.
 `nts_multipliers` puts Lagrange multipliers in the place of springs. `two_passes` wraps any one-pass formulation. All of
 them are frictionless, stateless and two-dimensional.
+
+| argument of a factory | meaning |
+|---|---|
+| `penalty` | stiffness ε̂ > 0, force per length per length of penetration; of `nts` it is ε > 0, force per length |
+| `penalty` of `…_lm` | the scale c > 0 of the decision λ − c g ≥ 0, in the same units; no solution depends on it |
+| `n` | number of points on a slave segment, ≥ 1 |
+| `area` | configuration in which lengths of areas of competence are measured: "current" or "reference" |
+| `tau` | part of a master segment by which a foot may lie past its free end and still count |
+| `free_end` | what happens to an area of competence that overhangs a free end of the master; `walk` says it |
+| `threads` | how many threads share the work on a large interface, ≥ 1; the answers have the same bits |
 """
 
 from contactverif_nts.nts_multipliers import nts_lm, vts_me_lm, vts_ppt_lm

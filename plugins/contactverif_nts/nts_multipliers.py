@@ -28,13 +28,6 @@ def nts_lm(*, penalty: float, tau: float = 1e-2) -> PointContact:
     It fails the flat patch test in one pass (case B): the multipliers fit the gaps at the slave nodes only, and the
     master nodes get what Eq. 6 hands on. Its constraints are independent, and its saddle point is symmetric.
 
-    Parameters
-    ----------
-    penalty : float
-        Scale c > 0 of the decision λ − c g ≥ 0, force per length. No solution depends on it.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
-
     References
     ----------
     Zavarise & De Lorenzis (2009), Section 5.1.3; rows and tangent: here.
@@ -55,13 +48,6 @@ def vts_me_lm(*, penalty: float, n: int = 2, area: str = "current", tau: float =
 
     Its promises are those of `vts_me`: it fails the flat patch test (case C′). With n ≥ 2 its multipliers are not
     unique (case A1).
-
-    Parameters
-    ----------
-    penalty : float
-        Scale c > 0 of the decision λ − c g ≥ 0, force per length per length. No solution depends on it.
-    n, area, tau : int or str or float
-        As for `vts_me`.
 
     References
     ----------
@@ -86,17 +72,6 @@ def vts_ppt_lm(
     tangent is unsymmetric. With n ≥ 2 its multipliers are not unique (case A1). With a fine slave the saddle point is
     singular in the positions too, and Newton's method may find no solution though there is an exact one (case C with
     each segment divided by two). With n = 1 neither happens.
-
-    Parameters
-    ----------
-    penalty : float
-        Scale c > 0 of the decision λ − c g ≥ 0, force per length per length. No solution depends on it.
-    n : int
-        As for `vts_ppt` or `vts_ppt_balanced`.
-    transmission : str
-        "printed" as that of `vts_ppt`, or "balanced" as that of `vts_ppt_balanced`.
-    free_end, tau, threads : str or float or int
-        As for `vts_ppt` or `vts_ppt_balanced`; an empty `free_end` is the default of the chosen transmission.
 
     References
     ----------

@@ -184,22 +184,6 @@ def vts_ppt(
     master segment that the area covers. It does not conserve force and moment where the surfaces are tilted: the slave
     pushes with lengths along itself, the master with lengths projected on it. It does not cover an overhang.
 
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    n : int
-        Number of virtual slave nodes on a slave segment, ≥ 1; the paper has 2.
-    free_end : str
-        What happens to an area of competence that overhangs a free end of the master, where the paper is silent:
-        "truncate" (the master loses what lies past its end, the slave keeps its force), "extend" (Box 3 read literally,
-        the last segment is continued) or "cover" (the area is cut to what faces the master). Elsewhere it acts on
-        nothing.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
-    threads : int
-        How many threads share the work on a large interface, ≥ 1; the answers have the same bits.
-
     References
     ----------
     Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Appendix A.

@@ -185,13 +185,6 @@ def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
     The nodal springs know nothing of areas, so a uniform pressure does not come out on meshes of unequal segments: it
     fails the flat patch test (case A1). Its tangent is exact and symmetric.
 
-    Parameters
-    ----------
-    penalty : float
-        Nodal stiffness ε > 0, force per length.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
-
     References
     ----------
     Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
@@ -205,15 +198,6 @@ def nts_ar(*, penalty: float, area: str = "current", tau: float = 1e-2) -> Point
 
     The slave side is loaded exactly, the master side is not where a slave node's area covers several master segments:
     it fails the flat patch test (case B). Its tangent is exact, and symmetric with reference areas.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    area : str
-        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
 
     References
     ----------
@@ -230,17 +214,6 @@ def vts_g(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e-
     A Gauss point does not balance the moment of the part of the segment that it stands for, so it fails the flat patch
     test (case B). Its tangent is exact, and symmetric with reference areas.
 
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    n : int
-        Number of Gauss points on a slave segment, ≥ 1.
-    area : str
-        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
-
     References
     ----------
     Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g w l_AB / 2.
@@ -256,17 +229,6 @@ def vts_me(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e
 
     Moments balance where each part faces one master segment only, as in case B. Where a part covers several, it fails
     the flat patch test (case C′; with an odd n also case B). Its tangent is exact, and symmetric with reference areas.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per length per length of penetration.
-    n : int
-        Number of virtual slave nodes on a slave segment, ≥ 1; with 2 they are the quarter points.
-    area : str
-        "current" or "reference": the configuration in which the lengths of areas of competence are measured.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
 
     References
     ----------
