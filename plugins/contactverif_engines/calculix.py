@@ -1,7 +1,8 @@
 """CalculiX (ccx): surfaces that touch by penalty springs or by multipliers of its mortar method.
 
 Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL version 2.20, keywords *CONTACT PAIR, *SURFACE BEHAVIOR, *CONTROLS.
-The deck is a layer of solids in plane strain. ccx reads 20 characters of a number, and prints 7 digits.
+The deck is a layer of solids, since ccx knows contact in three dimensions alone. All displacements across it are held,
+so that it is in plane strain. ccx reads 20 characters of a number, and prints 7 digits.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, SceneArrays
-from contactverif_engines.layer import Layer, make_layer
+from contactverif.contract.engine import BoolArray, EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
+from contactverif_engines.plane import PlaneScene, make_plane
 
 FIELD = 20  # The characters of a number that ccx reads.
 Kind = Literal["surface", "nodes", "mortar", "linmortar"]
@@ -60,7 +61,7 @@ class CalculiX:
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a deck, run ccx on it, and read the displacements that it prints."""
-        layer = make_layer(_in_larger_units(scene) if self.scaled else scene, scene.unit)
+        layer = make_layer(_in_larger_units(scene) if self.scaled else scene)
         with tempfile.TemporaryDirectory() as folder:
             deck = Path(folder, "scene.inp")
             deck.write_text("\n".join(write_deck(layer, self.kind)) + "\n", encoding="ascii")
@@ -85,9 +86,44 @@ def _in_larger_units(scene: SceneArrays) -> SceneArrays:
     return replace(scene, **forces)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """A layer of solids over a plane scene, as thick as its largest body; the front has the first nodes."""
+
+    plane: PlaneScene
+    nodes: FloatArray  # (2 n, 3)
+    solids: tuple[tuple[IntArray, IntArray], ...]  # Wedges (n, 6), then bricks (n, 8), each with the body of each.
+    slave: IntArray  # (n_segments, 4): the faces of the slave, seen from outside of its body counter-clockwise.
+    master: IntArray
+    frames: FloatArray  # (2 n, 2, 2), as those of the plane; the rest, too.
+    fixed: BoolArray  # (2 n, 2)
+    imposed: FloatArray  # (2 n, 2)
+    load: FloatArray  # (2 n, 2), that of the thickness, half of it on each side.
+
+
+def make_layer(scene: SceneArrays) -> Layer:
+    """Return the layer of a scene."""
+    plane, thickness = make_plane(scene), scene.unit
+    count = len(plane.nodes)
+    frames, fixed, imposed, load = (
+        np.concatenate([each, each]) for each in (plane.frames, plane.fixed, plane.imposed, plane.load)
+    )
+    return Layer(
+        plane,
+        np.vstack([np.column_stack([plane.nodes, np.full(count, z)]) for z in (0.0, thickness)]),
+        tuple((np.hstack([cells, cells + count]), bodies) for cells, bodies in plane.cells),
+        np.hstack([scene.slave, scene.slave[:, ::-1] + count]),
+        np.hstack([scene.master, scene.master[:, ::-1] + count]),
+        frames,
+        fixed,
+        imposed,
+        load * thickness / 2,
+    )
+
+
 def write_deck(layer: Layer, kind: Kind) -> list[str]:
     """Return the lines of the deck."""
-    scene = layer.scene
+    scene = layer.plane.scene
     stiffness = _number(scene.penalty) + (f", {_number(_tension(scene))}" if kind == "nodes" else "")
     return [
         "*NODE, NSET=ALL",
@@ -107,7 +143,8 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
 def _elements_and_surfaces(layer: Layer) -> list[str]:
     """Return the lines of the elements of each body, and of the faces of both surfaces."""
     lines, number, faces = [], 1, dict[frozenset[int], tuple[int, int]]()
-    for corners, cells, bodies in ((6, layer.wedges, layer.body_of_wedge), (8, layer.bricks, layer.body_of_brick)):
+    for cells, bodies in layer.solids:
+        corners = cells.shape[1]
         for body in np.unique(bodies):
             lines.append(f"*ELEMENT, TYPE=C3D{corners}, ELSET=B{body}")
             for cell in cells[bodies == body]:
@@ -122,10 +159,9 @@ def _elements_and_surfaces(layer: Layer) -> list[str]:
 
 
 def _materials(layer: Layer) -> list[str]:
-    """Return the lines of the material of each body; that of a rigid one does not matter."""
-    lines, scene = [], layer.scene
-    for body in np.unique(np.concatenate([layer.body_of_wedge, layer.body_of_brick])):
-        young, poisson = (1.0, 0.0) if scene.rigid[body] else (scene.young[body], scene.poisson[body])
+    """Return the lines of the material of each body."""
+    lines = []
+    for body, (young, poisson) in enumerate(layer.plane.materials):
         lines += [f"*MATERIAL, NAME=M{body}", "*ELASTIC", f"{_number(young)}, {_number(poisson)}"]
         lines.append(f"*SOLID SECTION, ELSET=B{body}, MATERIAL=M{body}")
     return lines
@@ -136,8 +172,8 @@ def _springs_across(layer: Layer) -> list[str]:
 
     The mortar methods find no pivot where a node of the slave is held there by a support.
     """
-    stiffness = _STIFF * float(layer.scene.young.max()) * layer.scene.unit
-    first = len(layer.wedges) + len(layer.bricks) + 1
+    stiffness = _STIFF * float(layer.plane.scene.young.max()) * layer.plane.scene.unit
+    first = sum(len(cells) for cells, _ in layer.solids) + 1
     nodes = enumerate(np.unique(layer.slave).tolist(), start=first)
     lines = ["*ELEMENT, TYPE=SPRING1, ELSET=ACROSS", *(f"{number}, {node + 1}" for number, node in nodes)]
     return [*lines, "*SPRING, ELSET=ACROSS", "3", _number(stiffness)]

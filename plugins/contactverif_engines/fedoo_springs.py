@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
-from contactverif_engines.layer import Layer, deepen, make_layer
+from contactverif_engines.plane import PlaneScene, deepen, make_plane
 
 _STEPS = 60
 _CONVERGED = 1e-11  # The norm of the last step over that of all displacements.
@@ -52,13 +52,13 @@ class Fedoo:
             warnings.simplefilter("ignore")
             import fedoo
 
-            layer = make_layer(scene)
+            plane = make_plane(scene)
             space = fedoo.ModelingSpace("2D", name="")
-            bodies = _make_bodies(fedoo, layer, space)
-            contacts = self._make_contacts(fedoo, layer, space)
+            bodies = _make_bodies(fedoo, plane, space)
+            contacts = self._make_contacts(fedoo, plane, space)
             problem = fedoo.problem.NonLinear(fedoo.Assembly.sum(*bodies, *contacts, name=""), name="")
-            _add_supports_and_loads(problem, layer)
-            start = np.where(layer.fixed[: layer.n_front], 0.0, deepen(layer))
+            _add_supports_and_loads(problem, plane)
+            start = np.where(plane.fixed, 0.0, deepen(plane))
             problem.set_dof("Disp", start.T)
             for contact in contacts:
                 contact.set_disp(start.T)
@@ -67,16 +67,16 @@ class Fedoo:
         moves = np.array(problem.get_disp().T[: len(scene.nodes)])
         return EngineAnswer(moves, not message, message=message)
 
-    def _make_contacts(self, fedoo: Any, layer: Layer, space: Any) -> list[Any]:
+    def _make_contacts(self, fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
         """Return the contact of each slave body with all masters, its springs as stiff as ε̂ in the mean.
 
         fedoo has its normals on the left of an edge, so that edges are turned around.
         """
-        scene, contacts = layer.scene, []
+        scene, contacts = plane.scene, []
         kind = "search_nearest" if self.search == "nearest" else self.search
         for edges in _edges_of_bodies(scene):
-            nodes, slave = layer.nodes[: layer.n_front, :2].copy(), np.unique(edges)
-            surface = fedoo.Mesh(nodes, scene.master[:, ::-1].copy(), "lin2", name="")
+            slave = np.unique(edges)
+            surface = fedoo.Mesh(plane.nodes.copy(), scene.master[:, ::-1].copy(), "lin2", name="")
             contact = fedoo.constraint.Contact(slave, surface, search_algorithm=kind, name="", space=space)
             contact.eps_n = float(scene.penalty) * float(_lengths(scene, edges).sum()) / len(slave)
             contact.max_dist = 2 * float(_lengths(scene, scene.master).max())
@@ -94,33 +94,26 @@ class Fedoo:
         return ""
 
 
-def _make_bodies(fedoo: Any, layer: Layer, space: Any) -> list[Any]:
-    """Return an assembly of each body and kind of cells, all of them on the nodes of the front of a layer."""
-    scene, nodes, assemblies = layer.scene, layer.nodes[: layer.n_front, :2], []
-    kinds = (
-        ("tri3", layer.wedges[:, :3], layer.body_of_wedge),
-        ("quad4", layer.bricks[:, :4], layer.body_of_brick),
-    )
-    for body, rigid in enumerate(scene.rigid.tolist()):
-        young, poisson = (1.0, 0.0) if rigid else (float(scene.young[body]), float(scene.poisson[body]))
-        for kind, cells, bodies in kinds:
+def _make_bodies(fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
+    """Return an assembly of each body and kind of cells, all of them on the same nodes."""
+    assemblies = []
+    for body, material in enumerate(plane.materials):
+        for kind, (cells, bodies) in zip(("tri3", "quad4"), plane.cells, strict=True):
             if (bodies == body).any():
-                law = fedoo.constitutivelaw.ElasticIsotrop(young, poisson)
+                law = fedoo.constitutivelaw.ElasticIsotrop(*material)
                 form = fedoo.weakform.StressEquilibrium(law, nlgeom=False, space=space)
-                mesh = fedoo.Mesh(nodes.copy(), cells[bodies == body].copy(), kind, name="")
+                mesh = fedoo.Mesh(plane.nodes.copy(), cells[bodies == body].copy(), kind, name="")
                 assemblies.append(fedoo.Assembly.create(form, mesh, name=""))
     return assemblies
 
 
-def _add_supports_and_loads(problem: Any, layer: Layer) -> None:
+def _add_supports_and_loads(problem: Any, plane: PlaneScene) -> None:
     """Add what is held, moved and loaded."""
-    front = slice(layer.n_front)
-    fixed, imposed, load = layer.fixed[front], layer.imposed[front], 2 * layer.load[front]  # The front bears half.
     for axis, name in enumerate(_AXES):
-        if (supported := np.flatnonzero(fixed[:, axis])).size:
-            problem.bc.add("Dirichlet", supported, name, imposed[supported, axis])
-        if (loaded := np.flatnonzero(load[:, axis])).size:
-            problem.bc.add("Neumann", loaded, name, load[loaded, axis])
+        if (supported := np.flatnonzero(plane.fixed[:, axis])).size:
+            problem.bc.add("Dirichlet", supported, name, plane.imposed[supported, axis])
+        if (loaded := np.flatnonzero(plane.load[:, axis])).size:
+            problem.bc.add("Neumann", loaded, name, plane.load[loaded, axis])
 
 
 def _edges_of_bodies(scene: SceneArrays) -> list[IntArray]:

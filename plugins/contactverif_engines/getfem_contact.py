@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
-from contactverif_engines.layer import Layer, make_layer
+from contactverif_engines.plane import PlaneScene, make_plane
 
 _STEPS = 60
 _CONVERGED = 1e-13  # The last step over the largest displacement.
@@ -54,17 +54,15 @@ class GetFEM:
 
         gf.util_trace_level(0)
         gf.util_warning_level(0)
-        layer = make_layer(scene)
+        plane = make_plane(scene)
         is_slave = np.zeros(len(scene.axes), bool)
         is_slave[scene.body_of_node[scene.slave[:, 0]]] = True
         model = gf.Model("real")
-        sides = [_Side(layer, wanted, edges) for wanted, edges in ((is_slave, scene.slave), (~is_slave, scene.master))]
+        sides = [_Side(plane, wanted, edges) for wanted, edges in ((is_slave, scene.slave), (~is_slave, scene.master))]
         for side, name in zip(sides, ("u1", "u2"), strict=True):
             side.add_to(model, name, self.order)
         self._add_contact(model, sides[0], scene)
-        moves = np.zeros((layer.n_front, 2))
-        moves[: len(scene.nodes)] = scene.start
-        moves = np.where(layer.fixed[: layer.n_front], layer.imposed[: layer.n_front], moves)
+        moves = np.where(plane.fixed, plane.imposed, plane.start)
         for side, name in zip(sides, ("u1", "u2"), strict=True):
             model.set_variable(name, side.to_unknowns(moves))
         try:
@@ -101,20 +99,19 @@ class GetFEM:
 class _Side:
     """The bodies of a side as a mesh of GetFEM, with the numbers of its unknowns."""
 
-    def __init__(self, layer: Layer, wanted: Any, edges: IntArray) -> None:
+    def __init__(self, plane: PlaneScene, wanted: Any, edges: IntArray) -> None:
         import getfem as gf
 
-        self.layer, self.mesh = layer, gf.Mesh("empty", 2)
+        self.plane, self.mesh = plane, gf.Mesh("empty", 2)
         self.cells_of: dict[int, list[int]] = {3: [], 4: []}
         corners_of, self.bodies = dict[int, IntArray](), dict[int, list[int]]()
-        nodes, sides = layer.nodes[:, :2], {frozenset(edge) for edge in edges.tolist()}
-        faces = []
-        kinds = ((3, layer.wedges[:, :3], layer.body_of_wedge), (4, layer.bricks[:, :4], layer.body_of_brick))
-        for count, cells, bodies in kinds:
+        faces, sides = [], {frozenset(edge) for edge in edges.tolist()}
+        for cells, bodies in plane.cells:
+            count = cells.shape[1]
             shape = gf.GeoTrans(_SHAPES[count][0])
             for cell, body in zip(cells[wanted[bodies]], bodies[wanted[bodies]].tolist(), strict=True):
                 corners = cell[_ORDERS[count]]
-                number = int(np.ravel(self.mesh.add_convex(shape, np.ascontiguousarray(nodes[corners].T)))[0])
+                number = int(np.ravel(self.mesh.add_convex(shape, np.ascontiguousarray(plane.nodes[corners].T)))[0])
                 corners_of[number] = corners
                 self.cells_of[count].append(number)
                 self.bodies.setdefault(body, []).append(number)
@@ -125,7 +122,7 @@ class _Side:
         for count, (_, element, _) in _SHAPES.items():
             if self.cells_of[count]:
                 self.field.set_fem(gf.Fem(element), self.cells_of[count])
-        self.unknowns = np.full((layer.n_front, 2), -1)
+        self.unknowns = np.full(plane.nodes.shape, -1)
         for number, corners in corners_of.items():
             self.unknowns[corners] = np.asarray(self.field.basic_dof_from_cvid(number)[0]).reshape(-1, 2)
         self.node_numbers = np.flatnonzero(self.unknowns[:, 0] >= 0)
@@ -145,7 +142,6 @@ class _Side:
         """Add the displacements of the side, its materials, supports and loads to a model."""
         import getfem as gf
 
-        scene, n_front = self.layer.scene, self.layer.n_front
         for count, (_, _, rule) in _SHAPES.items():
             if self.cells_of[count]:
                 exact, finer = (f"{rule}(2,{n})" if count == 4 else f"{rule}({n})" for n in (3, order))
@@ -153,34 +149,30 @@ class _Side:
                 self.on_edges.set_integ(gf.Integ(finer), self.cells_of[count])
         model.add_fem_variable(name, self.field)
         for body in self.bodies:
-            young, poisson = (1.0, 0.0) if scene.rigid[body] else (float(scene.young[body]), float(scene.poisson[body]))
+            young, poisson = self.plane.materials[body]
             lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
             names = [f"{word}{body}" for word in ("lambda", "mu")]
             for word, value in zip(names, lame, strict=True):
                 model.add_initialized_data(word, [value])
             model.add_isotropic_linearized_elasticity_brick(self.in_cells, name, *names, body + 1)
-        load = np.zeros((n_front, 2))
-        load[self.node_numbers] = 2 * self.layer.load[self.node_numbers]  # The front of a layer bears half of it.
-        model.add_explicit_rhs(name, self.to_unknowns(load))
-        supports = [
-            (n, part) for n, part in np.argwhere(self.layer.fixed[:n_front]).tolist() if self.unknowns[n, part] >= 0
-        ]
+        model.add_explicit_rhs(name, self.to_unknowns(self.plane.load))
+        supports = np.argwhere(self.plane.fixed & (self.unknowns >= 0)).tolist()
         if supports:
             selection = gf.Spmat("empty", len(supports), self.field.nbdof())
             for row, (node, part) in enumerate(supports):
                 selection.add(row, int(self.unknowns[node, part]), 1.0)
-            values = np.array([self.layer.imposed[node, part] for node, part in supports])
+            values = np.array([self.plane.imposed[node, part] for node, part in supports])
             model.add_variable(f"reactions_of_{name}", len(supports))
             model.add_constraint_with_multipliers(name, f"reactions_of_{name}", selection, values)
 
     def to_unknowns(self, values: FloatArray) -> FloatArray:
-        """Return values of nodes (n_front, 2) as a vector of unknowns."""
+        """Return values of nodes (n, 2) as a vector of unknowns."""
         vector = np.zeros(self.field.nbdof())
         vector[self.unknowns[self.node_numbers]] = values[self.node_numbers]
         return vector
 
     def read_moves(self, vector: Any, moves: FloatArray) -> None:
-        """Write the unknowns of this side into the displacements of nodes (n_front, 2)."""
+        """Write the unknowns of this side into the displacements of nodes (n, 2)."""
         moves[self.node_numbers] = np.asarray(vector)[self.unknowns[self.node_numbers]]
 
 

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
-from contactverif_engines.layer import Layer, make_layer
+from contactverif_engines.plane import PlaneScene, make_plane
 
 # Kratos compares the sum of the squares of residuals with the first one, and their mean square with a number: the
 # defaults of 1e-4 and, in whatever unit, 1e-9 leave a hundredth of the first residual, or 3e-5.
@@ -67,7 +67,7 @@ class Kratos:
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a model, solve it in a static step, and read the displacements of its nodes."""
-        layer = make_layer(scene)
+        plane = make_plane(scene)
         with tempfile.TemporaryDirectory() as folder, _working_in(folder):
             import KratosMultiphysics as Kratos
             import KratosMultiphysics.ContactStructuralMechanicsApplication
@@ -76,21 +76,20 @@ class Kratos:
                 StructuralMechanicsAnalysis,
             )
 
-            Path("scene.mdpa").write_text("\n".join(write_model(layer)) + "\n")
-            Path("materials.json").write_text(json.dumps(_materials(scene)))
+            Path("scene.mdpa").write_text("\n".join(write_model(plane)) + "\n")
+            Path("materials.json").write_text(json.dumps(_materials(plane)))
             Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
             model = Kratos.Model()
             job = StructuralMechanicsAnalysis(model, Kratos.Parameters(json.dumps(self._settings(scene))))
             job.Initialize()
-            part, flat = model["Structure"], layer.n_front
+            part = model["Structure"]
             for node in part.Nodes:
                 index = node.Id - 1
                 for axis, variable in enumerate((Kratos.DISPLACEMENT_X, Kratos.DISPLACEMENT_Y)):
-                    if layer.fixed[:flat][index, axis]:
+                    if plane.fixed[index, axis]:
                         node.Fix(variable)
-                        node.SetSolutionStepValue(variable, float(layer.imposed[index, axis]))
-                x, y = 2 * layer.load[index]  # The front of a layer bears half of it.
-                node.SetSolutionStepValue(Structural.POINT_LOAD, Kratos.Array3([float(x), float(y), 0.0]))
+                        node.SetSolutionStepValue(variable, float(plane.imposed[index, axis]))
+                node.SetSolutionStepValue(Structural.POINT_LOAD, Kratos.Array3([*plane.load[index].tolist(), 0.0]))
             solver = job._GetSolver()
             job.time = solver.AdvanceInTime(job.time)
             job.InitializeSolutionStep()
@@ -176,12 +175,12 @@ def _working_in(folder: str) -> Iterator[None]:
         os.chdir(before)
 
 
-def write_model(layer: Layer) -> list[str]:
-    """Return the lines of the front of a layer as a model of Kratos: nodes, elements, edges, loads, and its parts."""
-    scene, nodes = layer.scene, layer.nodes[: layer.n_front]
+def write_model(plane: PlaneScene) -> list[str]:
+    """Return the lines of a model of Kratos: nodes, elements, edges, loads, and its parts."""
+    scene = plane.scene
     lines = ["Begin ModelPartData", "End ModelPartData", "Begin Properties 0", "End Properties"]
-    lines += ["Begin Nodes", *(f"{n} {x!r} {y!r} 0.0" for n, (x, y, _) in enumerate(nodes.tolist(), 1)), "End Nodes"]
-    elements, parts = _elements(layer)
+    lines += ["Begin Nodes", *(f"{n} {x!r} {y!r} 0.0" for n, (x, y) in enumerate(plane.nodes.tolist(), 1)), "End Nodes"]
+    elements, parts = _elements(plane)
     edges = np.vstack([scene.slave, scene.master])
     rows = [f"{n} 0 {_words(edge + 1)}" for n, edge in enumerate(edges, 1)]
     lines += [*elements, "Begin Conditions LineCondition2D2N", *rows, "End Conditions"]
@@ -196,16 +195,16 @@ def write_model(layer: Layer) -> list[str]:
     return lines + parts + _part("Slave", slave, (), range(1, len(scene.slave) + 1))
 
 
-def _elements(layer: Layer) -> tuple[list[str], list[str]]:
+def _elements(plane: PlaneScene) -> tuple[list[str], list[str]]:
     """Return the lines of all elements, and those of a part for each body."""
     lines, parts, first = list[str](), list[str](), 1
-    kinds = ((3, layer.wedges[:, :3], layer.body_of_wedge), (4, layer.bricks[:, :4], layer.body_of_brick))
-    for body in range(len(layer.scene.axes)):
+    for body in range(len(plane.scene.axes)):
         begin, corners = first, list[Any]()
-        for count, cells, bodies in kinds:
+        for cells, bodies in plane.cells:
             of_body = cells[bodies == body]
             rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in enumerate(of_body, first)]
-            lines += [f"Begin Elements SmallDisplacementElement2D{count}N", *rows, "End Elements"] if rows else []
+            begin_of_kind = f"Begin Elements SmallDisplacementElement2D{cells.shape[1]}N"
+            lines += [begin_of_kind, *rows, "End Elements"] if rows else []
             corners.append(of_body.reshape(-1))
             first += len(of_body)
         parts += _part(f"Body{body}", (np.unique(np.concatenate(corners)) + 1).tolist(), range(begin, first), ())
@@ -224,11 +223,11 @@ def _part(name: str, nodes: Sequence[int], elements: Sequence[int], conditions: 
     return [*lines, "End SubModelPart"]
 
 
-def _materials(scene: SceneArrays) -> dict[str, Any]:
-    """Return the material of each body; that of a rigid one does not matter."""
+def _materials(plane: PlaneScene) -> dict[str, Any]:
+    """Return the material of each body."""
     materials = []
-    for body, (young, poisson, rigid) in enumerate(zip(scene.young, scene.poisson, scene.rigid, strict=True)):
-        values = {"YOUNG_MODULUS": 1.0 if rigid else float(young), "POISSON_RATIO": 0.0 if rigid else float(poisson)}
+    for body, (young, poisson) in enumerate(plane.materials):
+        values = {"YOUNG_MODULUS": young, "POISSON_RATIO": poisson}
         law = {"constitutive_law": {"name": "LinearElasticPlaneStrain2DLaw"}, "Variables": values, "Tables": {}}
         materials.append({"model_part_name": f"Structure.Body{body}", "properties_id": body + 1, "Material": law})
     return {"properties": materials}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
-from contactverif_engines.layer import Layer, make_layer
+from contactverif_engines.plane import PlaneScene, make_plane
 
 _STEPS = 60
 _CONVERGED = 1e-13  # The last step over the largest displacement.
@@ -39,27 +39,26 @@ class NGSolve:
         """Make a mesh, find the minimum of the energy by Newton's method, and return its displacements."""
         import ngsolve as ng
 
-        layer = make_layer(scene)
-        flat, mesh = layer.n_front, _make_mesh(layer)
+        plane = make_plane(scene)
+        mesh, count = _make_mesh(plane), len(plane.nodes)
         space = ng.VectorH1(mesh, order=1)
-        numbers = np.array([[space.GetDofNrs(ng.NodeId(ng.VERTEX, n))[part] for part in (0, 1)] for n in range(flat)])
+        numbers = np.array([[space.GetDofNrs(ng.NodeId(ng.VERTEX, n))[part] for part in (0, 1)] for n in range(count)])
         free = ng.BitArray(space.ndof)
         free.Set()
-        for node, part in np.argwhere(layer.fixed[:flat]).tolist():
+        for node, part in np.argwhere(plane.fixed).tolist():
             free.Clear(int(numbers[node, part]))
         u = space.TrialFunction()
-        first, second = _stiffnesses(mesh, scene)
+        first, second = _stiffnesses(mesh, plane)
         energy, strain = ng.BilinearForm(space), ng.Sym(ng.Grad(u))
         energy += ng.Variation((second * ng.InnerProduct(strain, strain) + first / 2 * ng.Trace(strain) ** 2) * ng.dx)
         contact = ng.ContactBoundary(mesh.Boundaries("slave"), mesh.Boundaries("master"))
         place = ng.CF((ng.x, ng.y))
         depth = (place + u - place.Other() - u.Other()) * contact.normal
         contact.AddEnergy(ng.IfPos(depth, float(scene.penalty) / 2 * depth * depth, 0))
-        moves, start, load = ng.GridFunction(space), np.zeros((flat, 2)), np.zeros(space.ndof)
+        moves, load = ng.GridFunction(space), np.zeros(space.ndof)
         values = moves.vec.FV().NumPy()
-        start[: len(scene.nodes)] = scene.start
-        values[numbers] = np.where(layer.fixed[:flat], layer.imposed[:flat], start)
-        load[numbers] = 2 * layer.load[:flat]  # The front of a layer bears half of it.
+        values[numbers] = np.where(plane.fixed, plane.imposed, plane.start)
+        load[numbers] = plane.load
         n_steps = self._minimise(energy, contact, moves, free, load, float(scene.unit))
         answer = np.array(values[numbers][: len(scene.nodes)])
         converged = n_steps <= _STEPS
@@ -84,19 +83,18 @@ class NGSolve:
         return _STEPS + 1
 
 
-def _make_mesh(layer: Layer) -> Any:
-    """Return the front of a layer as a mesh, whose domains are the bodies and whose boundaries have names."""
+def _make_mesh(plane: PlaneScene) -> Any:
+    """Return a mesh, whose domains are the bodies and whose boundaries have names."""
     import ngsolve as ng
     from netgen.meshing import Element1D, Element2D, FaceDescriptor, MeshPoint, Pnt
     from netgen.meshing import Mesh as NetgenMesh
 
-    scene, mesh = layer.scene, NetgenMesh(dim=2)
-    points = [mesh.Add(MeshPoint(Pnt(x, y, 0.0))) for x, y, _ in layer.nodes[: layer.n_front].tolist()]
+    scene, mesh = plane.scene, NetgenMesh(dim=2)
+    points = [mesh.Add(MeshPoint(Pnt(x, y, 0.0))) for x, y in plane.nodes.tolist()]
     for body in range(len(scene.axes)):
         mesh.Add(FaceDescriptor(surfnr=body + 1, domin=body + 1, bc=body + 1))
         mesh.SetMaterial(body + 1, f"body{body}")
-    kinds = ((layer.wedges[:, :3], layer.body_of_wedge), (layer.bricks[:, :4], layer.body_of_brick))
-    for cells, bodies in kinds:
+    for cells, bodies in plane.cells:
         for cell, body in zip(cells.tolist(), bodies.tolist(), strict=True):
             mesh.Add(Element2D(body + 1, [points[node] for node in cell]))
     for index, (name, side) in enumerate((("slave", scene.slave), ("master", scene.master)), start=1):
@@ -106,9 +104,9 @@ def _make_mesh(layer: Layer) -> Any:
     return ng.Mesh(mesh)
 
 
-def _stiffnesses(mesh: Any, scene: SceneArrays) -> list[Any]:
-    """Return Lamé's constants λ and μ of each body as coefficients; those of a rigid body do not matter."""
-    young, poisson = np.where(scene.rigid, 1.0, scene.young), np.where(scene.rigid, 0.0, scene.poisson)
+def _stiffnesses(mesh: Any, plane: PlaneScene) -> list[Any]:
+    """Return Lamé's constants λ and μ of each body as coefficients."""
+    young, poisson = np.transpose(plane.materials)
     both = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     names = [f"body{body}" for body in range(len(young))]
     return [mesh.MaterialCF(dict(zip(names, values.tolist(), strict=True))) for values in both]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, IntArray, SceneArrays
-from contactverif_engines.layer import Layer, make_layer
+from contactverif_engines.plane import PlaneScene, make_plane
 
 _STEPS = 60
 _MANY = 60  # With the handler "Transformation" an element of 67 nodes damages memory (`reports/findings`).
@@ -42,24 +42,23 @@ class OpenSees:
         """Make a model, solve it in a static step, and read the displacements of its nodes."""
         import openseespy.opensees as ops
 
-        layer = make_layer(scene)
+        plane = make_plane(scene)
         ops.wipe()
         ops.model("basic", "-ndm", 2, "-ndf", 2)
-        _add_bodies(ops, layer)
-        _add_supports_and_loads(ops, layer)
-        self._add_contact(ops, layer)
+        _add_bodies(ops, plane)
+        _add_supports_and_loads(ops, plane)
+        self._add_contact(ops, plane)
         steps: list[int] = []
         tolerance = _CONVERGED * _size_of_displacements(scene) + _ROUNDED * float(np.abs(scene.nodes).max())
-        converged = _run(ops, tolerance, steps.append, _choose_handler(layer))
+        converged = _run(ops, tolerance, steps.append, _choose_handler(plane))
         count = range(1, len(scene.nodes) + 1)
         moves = np.array([[ops.nodeDisp(node, part) for part in (1, 2)] for node in count], np.float64)
         ops.wipe()
         return EngineAnswer(moves, converged, steps[0], "" if converged else "analyze failed in one step")
 
-    def _add_contact(self, ops: Any, layer: Layer) -> None:
+    def _add_contact(self, ops: Any, plane: PlaneScene) -> None:
         """Add an element for each pair of a slave's and a master's chain of edges."""
-        scene = layer.scene
-        number = len(layer.wedges) + len(layer.bricks)
+        scene, number = plane.scene, len(plane.triangles) + len(plane.quads)
         for slave in find_chains(scene.slave):
             for master in find_chains(scene.master):
                 number += 1
@@ -88,37 +87,30 @@ def find_chains(edges: IntArray) -> list[list[int]]:
     return chains
 
 
-def _add_bodies(ops: Any, layer: Layer) -> None:
-    """Add all nodes, materials and elements of the front of a layer."""
-    for number, (x, y, _) in enumerate(layer.nodes[: layer.n_front].tolist(), start=1):
+def _add_bodies(ops: Any, plane: PlaneScene) -> None:
+    """Add all nodes, materials and elements."""
+    for number, (x, y) in enumerate(plane.nodes.tolist(), start=1):
         ops.node(number, x, y)
-    scene, number = layer.scene, 0
-    for body, rigid in enumerate(scene.rigid.tolist()):
-        young, poisson = (1.0, 0.0) if rigid else (float(scene.young[body]), float(scene.poisson[body]))
-        ops.nDMaterial("ElasticIsotropic", body + 1, young, poisson)
-    kinds = (
-        ("tri31", layer.wedges[:, :3], layer.body_of_wedge),
-        ("quad", layer.bricks[:, :4], layer.body_of_brick),
-    )
-    for kind, cells, bodies in kinds:
+    for body, material in enumerate(plane.materials, start=1):
+        ops.nDMaterial("ElasticIsotropic", body, *material)
+    number = 0
+    for kind, (cells, bodies) in zip(("tri31", "quad"), plane.cells, strict=True):
         for cell, body in zip((cells + 1).tolist(), bodies.tolist(), strict=True):
             number += 1
             ops.element(kind, number, *cell, 1.0, "PlaneStrain", body + 1)
 
 
-def _add_supports_and_loads(ops: Any, layer: Layer) -> None:
+def _add_supports_and_loads(ops: Any, plane: PlaneScene) -> None:
     """Add what is held, moved and loaded."""
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
-    fixed, imposed = layer.fixed[: layer.n_front], layer.imposed[: layer.n_front]
-    supports = fixed & (imposed == 0)
+    supports = plane.fixed & (plane.imposed == 0)
     for node in np.flatnonzero(supports.any(axis=1)).tolist():
         ops.fix(node + 1, *supports[node].astype(int).tolist())
-    for node, part in np.argwhere(fixed & (imposed != 0)).tolist():
-        ops.sp(node + 1, part + 1, float(imposed[node, part]))
-    load = 2 * layer.load[: layer.n_front]  # The front of a layer bears half of it.
-    for node in np.flatnonzero(load.any(axis=1)).tolist():
-        ops.load(node + 1, *load[node].tolist())
+    for node, part in np.argwhere(plane.fixed & (plane.imposed != 0)).tolist():
+        ops.sp(node + 1, part + 1, float(plane.imposed[node, part]))
+    for node in np.flatnonzero(plane.load.any(axis=1)).tolist():
+        ops.load(node + 1, *plane.load[node].tolist())
 
 
 def _size_of_displacements(scene: SceneArrays) -> float:
@@ -127,11 +119,11 @@ def _size_of_displacements(scene: SceneArrays) -> float:
     return max(float(np.abs(scene.imposed).max()), float(np.abs(scene.start).max()), loaded)
 
 
-def _choose_handler(layer: Layer) -> str:
+def _choose_handler(plane: PlaneScene) -> str:
     """Return the handler of supports: "Plain" knows no imposed displacement but 0, and "Transformation" few nodes."""
-    if not (layer.fixed & (layer.imposed != 0)).any():
+    if not (plane.fixed & (plane.imposed != 0)).any():
         return "Plain"
-    many = len(np.unique(layer.scene.slave)) + len(np.unique(layer.scene.master)) > _MANY
+    many = len(np.unique(plane.scene.slave)) + len(np.unique(plane.scene.master)) > _MANY
     return "Lagrange" if many else "Transformation"
 
 

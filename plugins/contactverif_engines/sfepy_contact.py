@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, IntArray, SceneArrays
-from contactverif_engines.layer import Layer, deepen, make_layer
+from contactverif_engines.plane import PlaneScene, deepen, make_plane
 
 _STEPS = 200
 _CONVERGED = 1e-10  # The norm of the residual over the size of forces.
@@ -44,18 +44,17 @@ class SfePy:
         from sfepy.solvers.nls import Newton
 
         output.set_output(quiet=True)
-        layer = make_layer(scene)
-        if (cells := _cells_of_one_kind(layer)) is None:
+        plane = make_plane(scene)
+        if (cells := _cells_of_one_kind(plane)) is None:
             start = np.where(scene.fixed, scene.imposed, 0.0)
             return EngineAnswer(start, False, message="a field has triangles or quadrilaterals, and not both")
-        status, model = IndexedStruct(), _Model(layer, *cells)
+        status, model = IndexedStruct(), _Model(plane, *cells)
         problem = Problem("scene", equations=model.write_equations(self.order))
         problem.set_bcs(ebcs=model.write_supports())
         options = {"i_max": _STEPS, "eps_a": _small_force(scene), "eps_r": 1.0, "lin_red": None}
         search = {"ls_on": 1.0, "ls_red": 0.5, "ls_red_warp": 0.5}  # As in the example of sfepy with two bodies.
         problem.set_solver(Newton(options | search, lin_solver=ScipyDirect({}), status=status))
-        guess = deepen(layer)
-        guess[: len(scene.nodes)] += scene.start
+        guess = deepen(plane) + plane.start
         try:
             state = problem.solve(state0=guess.reshape(-1), save_results=False, verbose=False)
         except (OverflowError, MemoryError) as error:  # The search has squares between bodies that fly apart.
@@ -67,16 +66,15 @@ class SfePy:
 
 
 class _Model:
-    """The front of a layer as a domain of sfepy, with its field and its variables."""
+    """A plane scene as a domain of sfepy, with its field and its variables."""
 
-    def __init__(self, layer: Layer, cells: IntArray, bodies: IntArray) -> None:
+    def __init__(self, plane: PlaneScene, cells: IntArray, bodies: IntArray) -> None:
         from sfepy.discrete import FieldVariable
         from sfepy.discrete.fem import FEDomain, Field, Mesh
 
-        nodes, kind = layer.nodes[: layer.n_front, :2], f"2_{cells.shape[1]}"
-        order = np.argsort(bodies, kind="stable")
-        self.layer, self.bodies = layer, bodies[order]
-        mesh = Mesh.from_data("scene", nodes.copy(), None, [cells[order].astype(np.int32)], [bodies[order]], [kind])
+        kind, order = f"2_{cells.shape[1]}", np.argsort(bodies, kind="stable")
+        self.plane, self.bodies, corners = plane, bodies[order], cells[order].astype(np.int32)
+        mesh = Mesh.from_data("scene", plane.nodes.copy(), None, [corners], [self.bodies], [kind])
         self.domain = FEDomain("domain", mesh)
         everything = self.domain.create_region("All", "all")
         field = Field.from_args("displacement", np.float64, "vector", everything, approx_order=1)
@@ -89,18 +87,16 @@ class _Model:
         from sfepy.mechanics.matcoefs import stiffness_from_youngpoisson
         from sfepy.terms import Term
 
-        scene, both = self.layer.scene, {"v": self.test, "u": self.unknown}
-        springs = Material("springs", values={".stiffness": float(scene.penalty)})
+        plane, both = self.plane, {"v": self.test, "u": self.unknown}
+        springs = Material("springs", values={".stiffness": float(plane.scene.penalty)})
         edges = self._make_region("facet", self._contact_edges(), "Contact")
         total = Term.new("dw_contact(springs.stiffness, v, u)", Integral("i", order), edges, springs=springs, **both)
-        for body, rigid in enumerate(scene.rigid.tolist()):
-            young, poisson = (1.0, 0.0) if rigid else (float(scene.young[body]), float(scene.poisson[body]))
-            solid = Material("solid", values={"D": stiffness_from_youngpoisson(2, young, poisson, plane="strain")})
+        for body, material in enumerate(plane.materials):
+            solid = Material("solid", values={"D": stiffness_from_youngpoisson(2, *material, plane="strain")})
             region = self._make_region("cell", np.flatnonzero(self.bodies == body), f"Body{body}")
             total = total + Term.new("dw_lin_elastic(solid.D, v, u)", Integral("j", 2), region, solid=solid, **both)
-        load = 2 * self.layer.load[: self.layer.n_front]  # The front of a layer bears half of it.
-        if (loaded := np.flatnonzero(load.any(axis=1))).size:
-            push = Material("push", values={".force": load[loaded]})
+        if (loaded := np.flatnonzero(plane.load.any(axis=1))).size:
+            push = Material("push", values={".force": plane.load[loaded]})
             region = self._make_region("vertex", loaded, "Loaded")
             total = total - Term.new("dw_point_load(push.force, v)", Integral("k", 0), region, push=push, v=self.test)
         return Equations([Equation("balance", total)])
@@ -110,10 +106,10 @@ class _Model:
         from sfepy.discrete import Function
         from sfepy.discrete.conditions import Conditions, EssentialBC
 
-        front, conditions = slice(self.layer.n_front), []
+        conditions = []
         for part, name in enumerate("xy"):
-            if (nodes := np.flatnonzero(self.layer.fixed[front, part])).size:
-                values = self.layer.imposed[front][nodes, part]
+            if (nodes := np.flatnonzero(self.plane.fixed[:, part])).size:
+                values = self.plane.imposed[nodes, part]
                 function = Function(name, lambda ts, coors, values=values, **more: values)
                 region = self._make_region("vertex", nodes, f"Held_{name}")
                 conditions.append(EssentialBC(name, region, {f"u.{part}": function}))
@@ -133,19 +129,19 @@ class _Model:
         """Return the numbers of the contact edges of both sides."""
         ends = self.domain.cmesh.get_conn(1, 0).indices.reshape(-1, 2).tolist()
         number = {frozenset(pair): index for index, pair in enumerate(ends)}
-        edges = np.vstack([self.layer.scene.slave, self.layer.scene.master]).tolist()
+        edges = np.vstack([self.plane.scene.slave, self.plane.scene.master]).tolist()
         return np.sort(np.array([number[frozenset(edge)] for edge in edges], np.uint32))
 
 
-def _cells_of_one_kind(layer: Layer) -> tuple[IntArray, IntArray] | None:
+def _cells_of_one_kind(plane: PlaneScene) -> tuple[IntArray, IntArray] | None:
     """Return the cells and the body of each, quadrilaterals of rigid bodies halved where others are triangles."""
-    triangles, quads = layer.wedges[:, :3], layer.bricks[:, :4]
+    (triangles, bodies), (quads, body_of_quad) = plane.cells
     if not len(triangles):
-        return quads, layer.body_of_brick
-    if not layer.scene.rigid[layer.body_of_brick].all():
+        return quads, body_of_quad
+    if not plane.scene.rigid[body_of_quad].all():
         return None
     halves = np.vstack([triangles, quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return halves, np.concatenate([layer.body_of_wedge, layer.body_of_brick, layer.body_of_brick])
+    return halves, np.concatenate([bodies, body_of_quad, body_of_quad])
 
 
 def _small_force(scene: SceneArrays) -> float:

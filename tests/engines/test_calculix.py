@@ -9,15 +9,13 @@ from subjects import load_property
 from contactverif import Verdict, judge_case, load_scene
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.problems.catalogue import load_scene_case
-from contactverif_engines.calculix import FIELD, CalculiX, read_displacements, write_deck
-from contactverif_engines.layer import Layer, make_layer
+from contactverif_engines.calculix import FIELD, CalculiX, Layer, make_layer, read_displacements, write_deck
 
 needs_program = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not installed")
 
 
 def layer_of(name: str) -> Layer:
-    arrays = load_scene(name).arrays(lowered=True)
-    return make_layer(arrays, arrays.unit)
+    return make_layer(load_scene(name).arrays(lowered=True))
 
 
 def block_of(lines: list[str], keyword: str) -> list[list[float]]:
@@ -37,7 +35,7 @@ def test_a_deck_read_back_is_the_scene(name: str) -> None:
     lines = write_deck(layer, "surface")
     nodes = np.array(block_of(lines, "*NODE,"))
     np.testing.assert_allclose(nodes[:, 1:], layer.nodes, rtol=1e-13, atol=1e-300)
-    assert len(block_of(lines, "*ELEMENT")) == len(layer.wedges) + len(layer.bricks)
+    assert len(block_of(lines, "*ELEMENT")) == sum(len(cells) for cells, _ in layer.solids)
     supports = block_of(lines, "*BOUNDARY")
     assert len(supports) == len(layer.nodes) + layer.fixed.sum()
     imposed = {(int(row[0]) - 1, int(row[1]) - 1): row[3] for row in supports if len(row) == 4}
