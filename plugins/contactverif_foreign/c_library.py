@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.errors import ContractError, MisuseError
@@ -34,6 +33,7 @@ from contactverif_foreign.c_view import (
 from contactverif_foreign.guarded_slot import GuardedSlot, SlotRows
 from contactverif_foreign.shared_library import find_file, find_function, load_library, parse_numbers
 from contactverif_foreign.traits_file import parse_traits_text, traits_beside
+from contactverif_foreign.user_element import assemble, unknowns_of
 
 VERSION = 1  # `CV_VERSION` of `contactverif.h`.
 _ROOM = 16  # Integers that `cv_pair` may write in its first call.
@@ -86,7 +86,7 @@ class LibraryForces:
         forces: Array = np.zeros(z.size)
         for views, decisions in self._groups(interface, pairing):
             rows = self._call(interface, views, decisions, z.reshape(-1, 2), with_tangent=False)
-            np.add.at(forces, _unknowns(views), rows["residual"])
+            np.add.at(forces, unknowns_of(views.nodes), rows["residual"])
         return forces
 
     def _views(self, interface: Interface, windows: Mapping[str, Any]) -> list[Views]:
@@ -160,23 +160,11 @@ class LibraryElements(LibraryForces):
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
         """Return the residual and its derivative from one call of each element."""
-        forces, rows, columns, entries = np.zeros(z.size), [], [], []
+        parts = []
         for views, decisions in self._groups(interface, pairing):
             answer = self._call(interface, views, decisions, z.reshape(-1, 2), with_tangent=True)
-            unknowns = _unknowns(views)
-            np.add.at(forces, unknowns, answer["residual"])
-            shape = (*unknowns.shape, unknowns.shape[1])
-            first, last = (np.broadcast_to(each, shape).ravel() for each in (unknowns[..., None], unknowns[:, None]))
-            rows.append(first if self.order == "row" else last)
-            columns.append(last if self.order == "row" else first)
-            entries.append(answer["tangent"].ravel())
-        places = np.concatenate(rows), np.concatenate(columns)
-        return forces, sparse.coo_array((np.concatenate(entries), places), shape=(z.size, z.size)).tocsr()
-
-
-def _unknowns(views: Views) -> IntArray:
-    """Return the numbers (n, 2 n_nodes) of the unknowns of elements."""
-    return (2 * views.nodes[..., None] + np.arange(2)).reshape(len(views.nodes), -1)
+            parts.append((unknowns_of(views.nodes), answer["residual"], answer["tangent"]))
+        return assemble(z.size, parts, by_columns=self.order == "column")
 
 
 def _describe(views: Views, row: int) -> str:

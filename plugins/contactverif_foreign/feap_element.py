@@ -98,19 +98,15 @@ def feap(
     penalty : float
         The stiffness, in d(1): nodal or distributed, as the trait `penalty` says.
     file : str
-        The shared library, absolute or relative to the working folder.
+        The shared library, as for `uel`.
     number : int
         The number NN of the subroutine `elmtNN`.
     nodes : int | str
-        3: a slave node and its nearest master segment. 4: a slave and a master segment that overlap. "n": a slave and a
-        master chain.
+        3, 4 or "n", as for `uel`.
     props : float | str
-        The properties from d(3) on, with ":" between them. d(2) is the reference length of the slave part: half of the
-        segments at a slave node, the slave segment, or the slave chain.
-    traits : str
-        A TOML file with the traits. Without it the file counts that lies beside the library, see `traits_beside`.
-    tau : float
-        The part of a master segment by which a foot may lie past its free end and still count.
+        The properties from d(3) on, with ":" between them. d(2) is the reference length, as for `uel`.
+    traits, tau : str | float
+        As for `uel`.
     """
     if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MOST_ELEMENTS:
         raise MisuseError("option number", repr(number), f"a whole number from 1 to {_MOST_ELEMENTS}")

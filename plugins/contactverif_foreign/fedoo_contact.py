@@ -17,10 +17,12 @@ from scipy import sparse
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Evidence, Rules, Traits
 
-_SEARCHES = ("bucket", "search_nearest", "ipctk")
+# {word of the option `kind`: the packages that the search needs}
+_SEARCHES = {"bucket": ("fedoo",), "search_nearest": ("fedoo",), "ipctk": ("fedoo", "ipctk")}
 
 
 class FedooContact:
@@ -105,9 +107,7 @@ def fedoo(*, penalty: float, kind: str, reach: float = inf, tol: float = 0.1) ->
     MisuseError
         If there is no such search, or a library is not installed.
     """
-    if kind not in _SEARCHES:
-        raise MisuseError("kind", repr(kind), " or ".join(map(repr, _SEARCHES)))
-    for package in ("fedoo", "ipctk") if kind == "ipctk" else ("fedoo",):
+    for package in choose("kind", kind, _SEARCHES):
         if find_spec(package) is None:
             raise MisuseError(package, "no such package", "pip install 'contactverif[fedoo]'")
     return FedooContact(penalty, kind, reach, tol)

@@ -15,6 +15,7 @@ from scipy import sparse
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import choose
 from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Promises, Rules, Traits
 
@@ -30,7 +31,7 @@ class IpcBarrier:
         self.penalty, self.activation, self.areas = penalty, activation, areas
         ipctk.set_num_threads(1)  # Sums whose order depends on threads would differ in their last bits.
         self._ipctk = ipctk
-        self._kind = getattr(ipctk.NormalCollisions, _SETS[kind])
+        self._kind = getattr(ipctk.NormalCollisions, kind)
         # The potential is κ w d̂ times a number. A weight w is a length where nodes have areas, and 1 elsewhere.
         self.traits = Traits(
             Promises(tangent="exact", symmetric=True, conserves_force=True, conserves_moment=True, unbiased=True),
@@ -90,11 +91,10 @@ def ipctk(*, penalty: float, kind: str, activation: float = 0.5, areas: bool = T
     MisuseError
         If there is no such collision set, or ipctk is not installed.
     """
-    if kind not in _SETS:
-        raise MisuseError("kind", repr(kind), " or ".join(map(repr, _SETS)))
+    collision_set = choose("kind", kind, _SETS)
     if find_spec("ipctk") is None:
         raise MisuseError("ipctk", "no such package", "pip install 'contactverif[ipctk]'")
-    return IpcBarrier(penalty, activation, kind, areas)
+    return IpcBarrier(penalty, activation, collision_set, areas)
 
 
 def _vertices(z: FloatArray) -> Any:

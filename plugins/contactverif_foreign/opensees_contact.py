@@ -15,6 +15,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.option_checks import choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Abilities, Evidence, Promises, Rules, Traits
 from contactverif_foreign.element_pairs import walk_chains
@@ -96,11 +97,10 @@ def opensees(*, penalty: float, kind: str) -> OpenSeesContact:
     MisuseError
         If there is no such element, or OpenSeesPy is not installed.
     """
-    if kind not in _ELEMENTS:
-        raise MisuseError("kind", repr(kind), " or ".join(map(repr, _ELEMENTS)))
+    element = choose("kind", kind, _ELEMENTS)
     if find_spec("openseespy") is None:
         raise MisuseError("openseespy", "no such package", "pip install 'contactverif[opensees]'")
-    return OpenSeesContact(penalty, _ELEMENTS[kind])
+    return OpenSeesContact(penalty, element)
 
 
 def _open_chains(surface: Surface) -> list[IntArray]:

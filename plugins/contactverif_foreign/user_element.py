@@ -7,7 +7,7 @@ of the decisions, and it travels in a `Handle`: the harness pairs anew at each s
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, check_tau
@@ -97,21 +97,12 @@ class UserElement:
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
         """Return the residual and its derivative from one call of each element."""
-        forces, rows, columns, entries = np.zeros(z.size), [], [], []
-        displacements = z.reshape(-1, 2) - interface.nodes
+        displacements, parts = z.reshape(-1, 2) - interface.nodes, []
         for elements in pairing.handle:
-            if not len(elements.nodes):
-                continue
-            vectors, matrices = self._sweep(elements, interface.nodes, displacements)
-            unknowns = (2 * elements.nodes[..., None] + [0, 1]).reshape(len(elements.nodes), -1)
-            np.add.at(forces, unknowns, -vectors)
-            rows.append(np.broadcast_to(unknowns[:, None, :], matrices.shape).ravel())  # Columns come first.
-            columns.append(np.broadcast_to(unknowns[:, :, None], matrices.shape).ravel())
-            entries.append(matrices.ravel())
-        if not entries:
-            return forces, sparse.csr_array((z.size, z.size))
-        places = np.concatenate(rows), np.concatenate(columns)
-        return forces, sparse.coo_array((np.concatenate(entries), places), shape=(z.size, z.size)).tocsr()
+            if len(elements.nodes):
+                vectors, matrices = self._sweep(elements, interface.nodes, displacements)
+                parts.append((unknowns_of(elements.nodes), -vectors, matrices))
+        return assemble(z.size, parts, by_columns=True)
 
     def _sweep(self, elements: Elements, reference: FloatArray, displacements: FloatArray) -> tuple[Array, Array]:
         """Call the element for each pair; return copies of its vectors (n, size) and matrices (n, size, size)."""
@@ -130,6 +121,31 @@ class UserElement:
         if (flaw := convention.flaw(rows)) is not None:
             raise ContractError(f"{describe_row(flaw[0])}: {flaw[1]}")
         return rows[convention.forces][:, :size].copy(), rows[convention.matrix].reshape(-1, size, size).copy()
+
+
+def unknowns_of(nodes: IntArray) -> IntArray:
+    """Return the numbers (n, 2 n_nodes) of the unknowns of elements with nodes (n, n_nodes)."""
+    return (2 * nodes[..., None] + np.arange(2)).reshape(len(nodes), -1)
+
+
+def assemble(
+    size: int, parts: Iterable[tuple[IntArray, Array, Array]], *, by_columns: bool
+) -> tuple[FloatArray, sparse.csr_array]:
+    """Return the sum of all vectors (size,) and that of all matrices, sparse.
+
+    A part is elements alike: their unknowns (n, m), vectors (n, m), and matrices of m² entries, row by row or column by
+    column.
+    """
+    total, rows, columns, entries = np.zeros(size), [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+    for unknowns, vectors, matrices in parts:
+        np.add.at(total, unknowns, vectors)
+        shape = (*unknowns.shape, unknowns.shape[1])
+        first, last = (np.broadcast_to(each, shape).ravel() for each in (unknowns[..., None], unknowns[:, None]))
+        rows.append(last if by_columns else first)
+        columns.append(first if by_columns else last)
+        entries.append(matrices.ravel())
+    places = np.concatenate(rows), np.concatenate(columns)
+    return total, sparse.coo_array((np.concatenate(entries), places), shape=(size, size)).tocsr()
 
 
 def load_element(
