@@ -19,23 +19,10 @@ OF_DIGITS = ("stability.",)
 
 
 def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> str:
-    """Return what kind of mistake a formulation makes, in a sentence.
+    """Return what kind of mistake a formulation makes that fails a property, in a sentence; empty if no rule knows it.
 
-    Parameters
-    ----------
-    subject : Subject
-        A formulation that fails.
-    property_id : str
-        The property whose failure is to be explained. For one of tangents the tangent is looked at, for one of purity
-        what calls change, else the forces.
-    others : Sequence[str]
-        The other properties that fail. Where one is of forces, these are looked at first: a tangent of wrong forces
-        fits nothing.
-
-    Returns
-    -------
-    str
-        The sentence; empty if no rule knows the mistake, or the formulation has no answer where the rules ask.
+    For a property of tangents the tangent is looked at, for one of purity what calls change, else the forces. Where one
+    of the other properties that fail is of forces, these come first: a tangent of wrong forces fits nothing.
     """
     try:
         with np.errstate(all="ignore"):

@@ -28,29 +28,15 @@ _GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # Two points integrate cubic func
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatState:
-    """A state of the flat interface with its exact forces, piece by piece.
+    """A state of the flat interface with its exact forces, piece by piece."""
 
-    Attributes
-    ----------
-    case : Case
-        The state. Its normal, out of the master, is y.
-    pieces : FloatArray, shape (n_pieces, n_nodes)
-        The size of the force by which the pressure on a piece pushes each node.
-    starts, lengths : FloatArray, shape (n_pieces,)
-        The place along the interface where a piece begins, and its length.
-    slave_segment, master_segment : IntArray, shape (n_pieces,)
-        The segments that face each other there.
-    n_slave_nodes : int
-        The number of slave nodes, which come first.
-    """
-
-    case: Case
-    pieces: FloatArray
-    starts: FloatArray
+    case: Case  # Its normal, out of the master, is y.
+    pieces: FloatArray  # (n_pieces, n_nodes) The size of the force by which the pressure on a piece pushes each node.
+    starts: FloatArray  # (n_pieces,) The place along the interface where a piece begins, and its length.
     lengths: FloatArray
-    slave_segment: IntArray
+    slave_segment: IntArray  # (n_pieces,) The segments that face each other there.
     master_segment: IntArray
-    n_slave_nodes: int
+    n_slave_nodes: int  # The slave nodes come first.
 
     @property
     def exact(self) -> FloatArray:

@@ -101,14 +101,7 @@ def _evaluate(node: ast.expr) -> float:
 def case_text(example: Counterexample, diagnosis: str = "", *, solved: bool) -> str:
     """Return in Markdown the numbers of a counterexample beside their tolerances, and how these come about.
 
-    Parameters
-    ----------
-    example : Counterexample
-        A case that fails.
-    diagnosis : str
-        What kind of mistake the formulation makes, as the report says it; empty if it says nothing.
-    solved : bool
-        The case is a scene. The numbers in its tolerances are those of its solution, which are not stored.
+    Where the case is `solved`, the numbers in its tolerances are those of its solution, which are not stored.
     """
     measured = checked_numbers(example.row.info, example.outcome.measurement)
     wrong = [number for number in measured if number.ratio > 1] or list(measured)

@@ -28,11 +28,6 @@ def change_units(scene: Scene, length: float, modulus: float) -> Scene:
     A nodal force is multiplied by length × modulus, a pressure by the modulus, and the distributed stiffness ε̂ by
     modulus / length. The facts of the scene are left out.
 
-    Returns
-    -------
-    Scene
-        The scene in the other units.
-
     Examples
     --------
     >>> from contactverif import load_scene

@@ -30,21 +30,11 @@ _LONGEST_WARNING = 2000  # Characters of what meshio prints.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Cells of one type.
+    """Cells of one type."""
 
-    Attributes
-    ----------
-    type : str
-        The type, as meshio calls it.
-    dim : int
-        The dimension of such a cell: 0 for a point, 1 for a line, 2 for a triangle.
-    data : IntArray, shape (n_cells, n_nodes)
-        The nodes of each cell: numbers of points of the mesh.
-    """
-
-    type: str
-    dim: int
-    data: IntArray
+    type: str  # The type, as meshio calls it.
+    dim: int  # The dimension of such a cell: 0 for a point, 1 for a line, 2 for a triangle.
+    data: IntArray  # (n_cells, n_nodes) The nodes of each cell: numbers of points of the mesh.
 
     def __len__(self) -> int:
         return len(self.data)
@@ -52,30 +42,15 @@ class Block:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainMesh:
-    """A mesh, checked.
+    """A mesh, checked."""
 
-    Attributes
-    ----------
-    points : FloatArray, shape (n_points, 2 or 3)
-        Positions. Those of points that no cell names may be NaN or infinite.
-    cells : tuple[Block, ...]
-        Cells by type.
-    cell_sets : dict[str, list[IntArray]]
-        {name: for each block the numbers of its members}.
-    cell_data : dict[str, list[IntArray]]
-        {key: for each block the number of each cell, shape (n_cells,)}, for the keys among `TAGS`.
-    field_data : dict[str, tuple[int, int]]
-        {name: number and dimension} of the physical groups of Gmsh.
-    warnings : str
-        What meshio prints.
-    """
-
-    points: FloatArray
-    cells: tuple[Block, ...]
-    cell_sets: dict[str, list[IntArray]]
+    points: FloatArray  # (n_points, 2 or 3) Positions. Those of points that no cell names may be NaN or infinite.
+    cells: tuple[Block, ...]  # Cells by type.
+    cell_sets: dict[str, list[IntArray]]  # {name: for each block the numbers of its members}.
+    # {key: for each block the number of each cell, shape (n_cells,)}, for the keys among `TAGS`.
     cell_data: dict[str, list[IntArray]]
-    field_data: dict[str, tuple[int, int]]
-    warnings: str
+    field_data: dict[str, tuple[int, int]]  # {name: number and dimension} of the physical groups of Gmsh.
+    warnings: str  # What meshio prints.
 
 
 def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:

@@ -25,11 +25,6 @@ _PYTHON = "python"
 _FORM = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 
 
-def engine_names() -> tuple[str, ...]:
-    """Return the names of the installed engines, sorted; nothing is loaded."""
-    return tuple(entries_by_name(ENGINES))
-
-
 def describe_engines() -> dict[str, str]:
     """Return the installed engines, sorted, each with the first line of its docstring, or why it does not load."""
     words = {}
@@ -65,25 +60,7 @@ def that_loads(text: str, loaded: Subject | NotLoaded) -> Subject:
 
 
 def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotLoaded:
-    """Load the engine that a text names, `engine/NAME:OPTION=VALUE`.
-
-    Parameters
-    ----------
-    text : str
-        The name, with options.
-    limits : Limits | None
-        The limits of a process of its own, in which the engine lives; None to load it in this process.
-
-    Returns
-    -------
-    EngineSubject | NotLoaded
-        The engine, or the reason why it does not load.
-
-    Raises
-    ------
-    MisuseError
-        If the text is malformed, no such engine is installed, or it has no such option.
-    """
+    """Load the engine that a text names, `engine/NAME:OPTION=VALUE`, in this process or, within limits, in its own."""
     name, options = parse_name("engine", text.removeprefix(ENGINE), _FORM)
     installed = entries_by_name(ENGINES)
     if name not in installed:

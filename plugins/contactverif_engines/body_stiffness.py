@@ -11,13 +11,7 @@ from contactverif.contract.engine import SceneArrays
 
 
 def assemble(scene: SceneArrays) -> sparse.csr_array:
-    """Return the stiffness (2 n_nodes, 2 n_nodes), row 2 × node + component, in the axes of each node's body.
-
-    Parameters
-    ----------
-    scene : SceneArrays
-        The scene.
-    """
+    """Return the stiffness (2 n_nodes, 2 n_nodes), row 2 × node + component, in the axes of each node's body."""
     size = 2 * len(scene.nodes)
     total = sparse.csr_array((size, size))
     triangles = scene.cells[:, 3] < 0

@@ -35,22 +35,14 @@ _FIELD = "1e-8, 1e-8, , , 1e-8, , , 1e-20"
 
 @dataclass(frozen=True)
 class CalculiX:
-    """CalculiX with one of its kinds of contact.
+    """CalculiX with one of its kinds of contact."""
 
-    Attributes
-    ----------
-    kind : Literal['surface', 'nodes', 'mortar', 'linmortar']
-        ``"surface"``: face-to-face springs; ``"nodes"``: a spring at each slave node; ``"mortar"`` and ``"linmortar"``:
-        dual mortar methods. All have linear springs of the stiffness ε̂.
-    program : str
-        The program.
-    scaled : bool
-        Forces are given in a unit in which moduli are some 1e9. The tests of convergence of ccx hold absolute numbers:
-        with forces of 1e-5 it ends, and says that it converged, while contact still changes.
-    """
-
+    # "surface": face-to-face springs; "nodes": a spring at each slave node; "mortar" and "linmortar": dual mortar
+    # methods. All have linear springs of the stiffness ε̂.
     kind: Kind = "surface"
     program: str = "ccx"
+    # Forces are given in a unit in which moduli are some 1e9. The tests of convergence of ccx hold absolute numbers:
+    # with forces of 1e-5 it ends, and says that it converged, while contact still changes.
     scaled: bool = True
 
     @property

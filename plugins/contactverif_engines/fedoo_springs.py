@@ -22,24 +22,13 @@ _AXES = ("DispX", "DispY")
 
 @dataclass(frozen=True)
 class Fedoo:
-    """The code fedoo with springs of nodes.
+    """The code fedoo with springs of nodes."""
 
-    Attributes
-    ----------
-    search : Literal['nearest', 'bucket', 'ipctk']
-        The edges at the nearest node, the same found in buckets, as fedoo chooses by itself, or the edges near a node.
-    once : bool
-        Look for pairs once in an increment, as fedoo chooses by itself, or in each iteration.
-    increments : int
-        The number of steps in which loads and imposed displacements grow.
-    tol : float
-        The part of an edge by which a node may lie past its end; 0.1 is the default of fedoo.
-    """
-
+    # The edges at the nearest node, the same found in buckets, as fedoo chooses by itself, or the edges near a node.
     search: Literal["nearest", "bucket", "ipctk"] = "nearest"
-    once: bool = False
-    increments: int = 1
-    tol: float = 0.1
+    once: bool = False  # Look for pairs once in an increment, as fedoo does by itself, or in each iteration.
+    increments: int = 1  # The number of steps in which loads and imposed displacements grow.
+    tol: float = 0.1  # The part of an edge by which a node may lie past its end; 0.1 is the default of fedoo.
 
     @property
     def traits(self) -> EngineTraits:

@@ -26,18 +26,12 @@ _SHAPES = {3: ("GT_PK(2,1)", "FEM_PK(2,1)", "IM_TRIANGLE"), 4: ("GT_QK(2,1)", "F
 
 @dataclass(frozen=True)
 class GetFEM:
-    """GetFEM with one of its contact bricks for small strains.
+    """GetFEM with one of its contact bricks for small strains."""
 
-    Attributes
-    ----------
-    kind : Literal['penalty', 'multiplier']
-        Springs of the stiffness ε̂, or multipliers at the nodes of the slave with an augmentation of E/L. Where points
-        of an edge are open it changes the solution, as the manual says, so that bodies far away have no part in it.
-    order : int
-        The order of integration on the slave's edges: 1 to 19, and only odd numbers where cells are triangles.
-    """
-
+    # Springs of the stiffness ε̂, or multipliers at the nodes of the slave with an augmentation of E/L. Where points of
+    # an edge are open it changes the solution, as the manual says, so that bodies far away have no part in it.
     kind: Literal["penalty", "multiplier"] = "penalty"
+    # The order of integration on the slave's edges: 1 to 19, and only odd numbers where cells are triangles.
     order: int = 5
 
     @property

@@ -36,27 +36,16 @@ _PROCESSES = {
 
 @dataclass(frozen=True)
 class Kratos:
-    """Kratos with one of its kinds of mortar contact.
+    """Kratos with one of its kinds of mortar contact."""
 
-    Attributes
-    ----------
-    kind : Literal['multiplier', 'penalty']
-        The augmented Lagrangian method with dual multipliers, or penalty springs of the stiffness that Kratos chooses.
-    search : Literal['boxes', 'radius']
-        Pairs of edges whose boxes meet, as Kratos chooses by itself, or all within the radius.
-    search_factor : float
-        The radius in which pairs are searched, over the size of a condition; 3.5 is the default of Kratos.
-    normals : Literal['fixed', 'updated']
-        Normals of the start of a step, as Kratos chooses by itself, or those of each iterate.
-    augmentation : float
-        The penalty of the augmented Lagrangian method over E/h; 1 is the default of Kratos.
-    """
-
+    # The augmented Lagrangian method with dual multipliers, or penalty springs of the stiffness that Kratos chooses.
     kind: Literal["multiplier", "penalty"] = "multiplier"
+    # Pairs of edges whose boxes meet, as Kratos chooses by itself, or all within the radius.
     search: Literal["boxes", "radius"] = "boxes"
-    search_factor: float = 3.5
+    search_factor: float = 3.5  # The radius in which pairs are searched, over the size of a condition.
+    # Those of the start of a step, as Kratos chooses by itself, or of each iterate.
     normals: Literal["fixed", "updated"] = "fixed"
-    augmentation: float = 1.0
+    augmentation: float = 1.0  # The penalty of the augmented Lagrangian method over E/h.
 
     @property
     def traits(self) -> EngineTraits:

@@ -20,15 +20,9 @@ _CONVERGED = 1e-13  # The last step over the largest displacement.
 
 @dataclass(frozen=True)
 class NGSolve:
-    """NGSolve with penalty springs.
+    """NGSolve with penalty springs."""
 
-    Attributes
-    ----------
-    order : int
-        The order of integration of the energy on each edge of the slave.
-    """
-
-    order: int = 5
+    order: int = 5  # The order of integration of the energy on each edge of the slave.
 
     @property
     def traits(self) -> EngineTraits:

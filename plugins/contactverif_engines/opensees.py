@@ -23,14 +23,9 @@ _ROUNDED = 1e-14  # Steps below this share of the largest coordinate are roundof
 
 @dataclass(frozen=True)
 class OpenSees:
-    """OpenSees with node-to-segment springs.
+    """OpenSees with node-to-segment springs."""
 
-    Attributes
-    ----------
-    stiffness : float
-        The stiffness of all springs of a length of the surface over ε̂, in the mean: nodes of both sides have springs.
-    """
-
+    # The stiffness of all springs of a length of the surface over ε̂, in the mean: nodes of both sides have springs.
     stiffness: float = 1.0
 
     @property

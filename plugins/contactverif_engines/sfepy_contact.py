@@ -21,15 +21,9 @@ _ROUNDED = 2.0**-53  # The share of the largest coordinate by which a gap may be
 
 @dataclass(frozen=True)
 class SfePy:
-    """The code sfepy with penalty springs.
+    """The code sfepy with penalty springs."""
 
-    Attributes
-    ----------
-    order : int
-        The order of integration on each edge.
-    """
-
-    order: int = 2
+    order: int = 2  # The order of integration on each edge.
 
     @property
     def traits(self) -> EngineTraits:

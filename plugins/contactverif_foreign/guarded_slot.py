@@ -37,26 +37,14 @@ class Argument:
 
 
 class GuardedSlot:
-    """The memory of one call.
+    """The memory of one call. Scalars share their guards, an array has its own.
 
-    Parameters
-    ----------
-    arguments : Sequence[Argument]
-        The arguments. Scalars share their guards, an array has its own.
-    guard : int
-        The least number of words of eight bytes around an array, such as the size of a column of the largest one.
-
-    Attributes
-    ----------
-    addresses : dict[str, int]
-        The address of each argument by name.
-    spans : dict[str, slice]
-        The place of each argument in a row, in halves of words.
+    A guard is as many words of eight bytes as wanted at least, such as the size of a column of the largest array.
     """
 
     def __init__(self, arguments: Sequence[Argument], guard: int = _LEAST_GUARD) -> None:
         self._arguments = {argument.name: argument for argument in arguments}
-        self.spans: dict[str, slice] = {}  # The halves of words that the values of each argument take.
+        self.spans: dict[str, slice] = {}  # The halves of words in a row that the values of each argument take.
         guard, place, is_behind_scalar = 2 * max(guard, _LEAST_GUARD), 0, False
         for argument in sorted(arguments, key=lambda argument: bool(argument.shape)):
             if argument.shape or not is_behind_scalar:
@@ -137,13 +125,7 @@ class SlotRows:
     def call(
         self, function: Callable[..., Any], values: Sequence[Any], describe_row: Callable[[int], str]
     ) -> list[Any]:
-        """Call the function once for each row, and return what it returned.
-
-        Raises
-        ------
-        ContractError
-            If a guard or an input changed; it begins with `describe_row` of the row.
-        """
+        """Call the function once for each row, and return what it returned; refuse a guard or an input that changed."""
         before = self._memory.copy()
         answers = self._slot.sweep(self._memory, function, values)
         if (write := self._slot.find_write(before, self._memory)) is not None:

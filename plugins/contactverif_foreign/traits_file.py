@@ -46,24 +46,7 @@ def parse_traits_text(text: str, place: str) -> Traits:
 
 
 def parse_traits(table: Any, place: str) -> Traits:
-    """Return the traits of a table.
-
-    Parameters
-    ----------
-    table : Any
-        The table, with names of traits as keys, in groups or not.
-    place : str
-        The place where the table stands, for errors.
-
-    Returns
-    -------
-    Traits
-        The traits; those that the table does not name promise nothing.
-
-    Raises
-    ------
-    MisuseError
-        If a key is no trait, or a value is none of those that the trait takes.
+    """Return the traits of a table at a place; those that it does not name promise nothing.
 
     Examples
     --------
