@@ -49,7 +49,7 @@ class ComparisonScreen:
         yield Text("")
         yield fold(f"{name} against {reference}: {same}", width, "bold", indent=0)
         yield from _table(name, reference, [*rows[:_MOST_ROWS], *methods[:_MOST_ROWS]])
-        if more := [cell.property_id for cell, _ in rows[_MOST_ROWS:]]:
+        if more := [cell.row.property_id for cell, _ in rows[_MOST_ROWS:]]:
             yield fold(f"{len(more)} more differ: {', '.join(more)}", width, indent=2)
         yield from self._iterations(name, width)
         yield from self._time(name, width)
@@ -89,7 +89,7 @@ class ComparisonScreen:
 def _differ(cell: Cell, reference: Cell) -> bool:
     """Return whether the verdicts differ. Where one is not asked there is no comparison."""
     unasked = {Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.OMITTED}
-    return cell.verdict is not reference.verdict and not {cell.result, reference.result} & unasked
+    return cell.row.verdict is not reference.row.verdict and not {cell.row.result, reference.row.result} & unasked
 
 
 def _is_worth_a_line(cell: Cell, reference: Cell) -> bool:
@@ -104,17 +104,17 @@ def _table(name: str, reference: str, pairs: Sequence[tuple[Cell, Cell]]) -> Ite
     """Yield a line for each property: both verdicts, and beside each its worst error over the tolerance."""
     if not pairs:
         return
-    first = max(len("property"), *(len(cell.property_id) for cell, _ in pairs))
-    words = [[cell.result for cell, _ in pairs], [other.result for _, other in pairs]]
+    first = max(len("property"), *(len(cell.row.property_id) for cell, _ in pairs))
+    words = [[cell.row.result for cell, _ in pairs], [other.row.result for _, other in pairs]]
     widths = [max(len(title), *map(len, column)) + 1 for title, column in zip((name, reference), words, strict=True)]
     yield line(
         f"  {'property':{first}} {name:{widths[0]}} {'error':>{_ERROR}} {reference:{widths[1]}} {'error':>{_ERROR}}",
         "bold",
     )
     for cell, other in pairs:
-        text = line(f"  {cell.property_id:{first}} ")
+        text = line(f"  {cell.row.property_id:{first}} ")
         for each, column in zip((cell, other), widths, strict=True):
-            text.append(f"{each.result:{column}}", STYLES.get(each.result, PLAIN_STYLE))
+            text.append(f"{each.row.result:{column}}", STYLES.get(each.row.result, PLAIN_STYLE))
             text.append(f"{number(each.worst):>{_ERROR}} ")
         text.rstrip()
         yield text

@@ -62,8 +62,8 @@ def results_table(comparison: Comparison) -> Table:
 def _result(cell: Cell | None, reference: Cell | None) -> Text:
     if cell is None:
         return Text("  –", style="dim")
-    mark = DIFFERS if reference is not None and cell.verdict is not reference.verdict else " "
-    return result_text(cell.result, f"{mark} ")
+    mark = DIFFERS if reference is not None and cell.row.verdict is not reference.row.verdict else " "
+    return result_text(cell.row.result, f"{mark} ")
 
 
 def errors_table(comparison: Comparison, *, with_worst: bool = True, with_counts: bool = True) -> Table:
@@ -73,13 +73,13 @@ def errors_table(comparison: Comparison, *, with_worst: bool = True, with_counts
     """
 
     def cells(cell: Cell) -> list[str]:
-        paired = comparison.paired.get((cell.formulation, cell.property_id))
+        paired = comparison.paired.get((cell.row.formulation, cell.row.property_id))
         beside = [""] * 4
         if paired is not None:
             beside = [number(paired.ratio), *map(str, (paired.better, paired.equal, paired.worse))]
         worst = f"{number(cell.closest.value)} {cell.closest.quantity.name}" if cell.closest is not None else ""
         numbers = [number(cell.median), number(cell.worst), *beside[: 4 if with_counts else 1]]
-        return [f"  {cell.formulation}", *numbers, *([worst] if with_worst else [])]
+        return [f"  {cell.row.formulation}", *numbers, *([worst] if with_worst else [])]
 
     title = f"error over tolerance, above 1 fails; ratio and numbers of cases beside {comparison.reference}"
     columns = ("median", "worst", "ratio", *(("better", "equal", "worse") if with_counts else ()))
@@ -88,7 +88,7 @@ def errors_table(comparison: Comparison, *, with_worst: bool = True, with_counts
         table.add_column("worst number", no_wrap=True, overflow="ellipsis")
     keys = [(name, property_id) for property_id in comparison.properties for name in comparison.formulations]
     measured = [comparison.cells[key] for key in keys if key in comparison.cells]
-    add_groups(table, [cell for cell in measured if not isnan(cell.worst)], lambda cell: cell.property_id, cells)
+    add_groups(table, [cell for cell in measured if not isnan(cell.worst)], lambda cell: cell.row.property_id, cells)
     return table
 
 
@@ -149,7 +149,7 @@ def last_line(comparison: Comparison) -> Text:
     """Say whether the candidates keep their promises; the reference is not on trial."""
     if comparison.promises_kept:
         return Text(f"Every promise of {', '.join(comparison.formulations[1:])} is kept.", style="green")
-    rows = [cell.row for cell in comparison.cells.values() if cell.formulation != comparison.reference]
+    rows = [cell.row for cell in comparison.cells.values() if cell.row.formulation != comparison.reference]
     return conclusion(rows, list(comparison.not_loaded))
 
 

@@ -67,8 +67,8 @@ def _names(run: Run, kind: str) -> Sequence[str]:
 
 def _failing(changes: Changes) -> dict[str, Counterexample]:
     """Return {id: counterexample} of the new report, for what got worse and fails."""
-    cells = [change.new for change in changes.changes if change.regressions]
-    worse = {(cell.formulation, cell.property_id) for cell in cells}
+    rows = [change.new.row for change in changes.changes if change.regressions]
+    worse = {(row.formulation, row.property_id) for row in rows}
     return {
         id_: example
         for id_, example in counterexamples(changes.new.run).items()
@@ -122,7 +122,7 @@ def _results(changes: Sequence[Change]) -> Table:
     def cells(change: Change) -> list[str | Text]:
         paired = change.paired
         style = "red" if change.regressions else "green" if change.better else ""
-        result = Text(_arrow(str(change.old.result), str(change.new.result)), style=style)
+        result = Text(_arrow(str(change.old.row.result), str(change.new.row.result)), style=style)
         counts = [paired.better, paired.equal, paired.worse] if paired is not None and paired.n else [""] * 3
         return [_name(change), result, *map(str, counts), f"{change.slower:.2f}" if isfinite(change.slower) else "–"]
 
@@ -166,11 +166,11 @@ def _stored_mesh(example: Counterexample, report: str) -> Text:
 
 
 def _formulation(change: Change) -> str:
-    return change.new.formulation
+    return change.new.row.formulation
 
 
 def _name(change: Change) -> str:
-    return f"  {change.new.property_id}{'' if change.paired else ' *'}"
+    return f"  {change.new.row.property_id}{'' if change.paired else ' *'}"
 
 
 def _errors(cell: Cell) -> tuple[str, str]:

@@ -182,7 +182,7 @@ def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
     assert comparison.unexpected == ()  # vts-me promised to pass, but it is the reference
     assert not comparison.promises_kept  # `mine` did not load
     comparison = Comparison.from_run(run, "vts-ppt")
-    assert [item.formulation for item in comparison.unexpected] == ["vts-me"]
+    assert [item.row.formulation for item in comparison.unexpected] == ["vts-me"]
     assert comparison.not_loaded == {"mine": "no module"}
     paired = comparison.paired["vts-me", "patch.flat.transmission"]
     assert (paired.better, paired.equal, paired.worse) == (0, 1, 2)
@@ -520,7 +520,7 @@ def test_other_cases_are_compared_as_distributions() -> None:
     ],
 )
 def test_distributions_on_other_cases_know_the_same_factor(before: float, after: float, regressed: bool) -> None:
-    old, new = cell(*[before] * 40), cell(*[after] * 40, verdict=cell(before).verdict)
+    old, new = cell(*[before] * 40), cell(*[after] * 40, verdict=cell(before).row.verdict)
     assert bool(compare_rows(old, new, same_seed=False).regressions) is regressed
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, freeze
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import DECIDED, Outcome, PropertyInfo, Verdict, checked_numbers
-from contactverif.contract.result import Result, Row
+from contactverif.contract.result import Row
 
 ORDER = "order of one Newton step"  # The quantity that measures the order of Newton's method.
 # A smaller mesh is drawn if it shows at least this share of the largest difference, in decades.
@@ -58,31 +58,6 @@ class Cell:
             kinds=freeze(np.array(kinds, dtype=np.float64).reshape(-1, 5), np.float64),
             seconds=float(np.median(seconds)) if facts else nan,
         )
-
-    @property
-    def formulation(self) -> str:
-        """The formulation as typed on the command line."""
-        return self.row.formulation
-
-    @property
-    def property_id(self) -> str:
-        """The property as typed on the command line."""
-        return self.row.property_id
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict over all cases."""
-        return self.row.verdict
-
-    @property
-    def result(self) -> Result:
-        """The word for the row."""
-        return self.row.result
-
-    @property
-    def unexpected(self) -> str:
-        """The reason why the row makes a run fail; empty if it does not."""
-        return self.row.unexpected
 
     @property
     def decided(self) -> BoolArray:

@@ -87,7 +87,7 @@ class Comparison:
     @property
     def unexpected(self) -> tuple[Cell, ...]:
         """The cells in which a candidate breaks a promise or was not judged; the reference is not on trial."""
-        return tuple(cell for (name, _), cell in self.cells.items() if name != self.reference and cell.unexpected)
+        return tuple(cell for (name, _), cell in self.cells.items() if name != self.reference and cell.row.unexpected)
 
     @property
     def promises_kept(self) -> bool:
@@ -151,8 +151,8 @@ def _iterations(cell: Cell, name: str, reference: FloatArray) -> Iterations:
     with np.errstate(invalid="ignore"):  # A comparison with NaN is False, as it should be.
         against = np.sign(counts[:n_both] - reference[:n_both])
     return Iterations(
-        formulation=cell.formulation,
-        property_id=cell.property_id,
+        formulation=cell.row.formulation,
+        property_id=cell.row.property_id,
         solution=name.partition(", ")[2],
         solved=int((~np.isnan(cell.details[name])).sum()),
         converged=len(converged),

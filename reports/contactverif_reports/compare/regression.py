@@ -67,7 +67,7 @@ class Change:
     @property
     def better(self) -> bool:
         """Return whether the row passes now, and did not before."""
-        return self.new.verdict is Verdict.PASS and self.old.verdict is not Verdict.PASS
+        return self.new.row.verdict is Verdict.PASS and self.old.row.verdict is not Verdict.PASS
 
     @property
     def slower(self) -> float:
@@ -181,12 +181,13 @@ def same_cases(old: Cell, new: Cell) -> bool:
 
 
 def _verdicts(old: Cell, new: Cell) -> Sequence[str]:
-    if new.verdict is not old.verdict and (old.verdict is Verdict.PASS or new.verdict is Verdict.CRASHED):
+    before, after = old.row.verdict, new.row.verdict
+    if after is not before and (before is Verdict.PASS or after is Verdict.CRASHED):
         reason = new.row.reason
         detail = f" ({shorten(reason, REASON_LENGTH, placeholder=' …')})" if reason else ""
-        return [f"{old.verdict} → {new.verdict}{detail}"]
-    if new.unexpected and not old.unexpected:
-        return [f"promises kept → {new.unexpected}"]
+        return [f"{before} → {after}{detail}"]
+    if new.row.unexpected and not old.row.unexpected:
+        return [f"promises kept → {new.row.unexpected}"]
     return []
 
 
@@ -194,7 +195,7 @@ def _on_the_same(old: Cell, new: Cell, paired: Paired) -> Sequence[str]:
     n = len(paired.decades)
     fails_now = paired.apart & (new.standing[:n] > 1)
     lines = []
-    if fails_now.any() and old.verdict is not Verdict.PASS:
+    if fails_now.any() and old.row.verdict is not Verdict.PASS:
         first = int(np.flatnonzero(fails_now)[0])
         lines.append(f"{int(fails_now.sum())} of {paired.n} cases passed and fail now, the first is case {first}")
     grew = [
@@ -275,7 +276,7 @@ def paired_iterations(old: Cell, new: Cell) -> Sequence[tuple[Iterations, Iterat
 
 
 def _line(change: Change, words: Sequence[str]) -> str:
-    return f"{change.new.formulation}, {change.new.property_id}: {'; '.join(words)}"
+    return f"{change.new.row.formulation}, {change.new.row.property_id}: {'; '.join(words)}"
 
 
 def _has_changed(old: Iterations, new: Iterations) -> bool:

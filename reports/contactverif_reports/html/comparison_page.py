@@ -45,7 +45,7 @@ def comparison_page(
         found=comparison,
         candidates=comparison.formulations[1:],
         wrong=comparison.unexpected,
-        differ=[id_ for id_ in comparison.properties if len({cell.verdict for cell in _cells(comparison, id_)}) > 1],
+        differ=[id_ for id_ in comparison.properties if _verdicts_differ(comparison, id_)],
         results=[(id_, _results(comparison, id_)) for id_ in comparison.properties],
         errors=[(id_, lines) for id_ in comparison.properties if (lines := _errors(comparison, id_, axis))],
         ticks=ticks(axis),
@@ -80,7 +80,7 @@ def _by_formulation(changes: Changes, axis: Axis) -> list[tuple[str, list[tuple[
     rows: dict[str, list[tuple[Change, Markup, Markup]]] = {}
     for change in changes.changes:
         line = (change, strip(change.old.margins, axis), strip(change.new.margins, axis))
-        rows.setdefault(change.new.formulation, []).append(line)
+        rows.setdefault(change.new.row.formulation, []).append(line)
     return list(rows.items())
 
 
@@ -88,6 +88,10 @@ def _cells(comparison: Comparison, id_: str) -> list[Cell]:
     """Return the cells of one property, the reference first."""
     keys = ((name, id_) for name in comparison.formulations)
     return [comparison.cells[key] for key in keys if key in comparison.cells]
+
+
+def _verdicts_differ(comparison: Comparison, id_: str) -> bool:
+    return len({cell.row.verdict for cell in _cells(comparison, id_)}) > 1
 
 
 def _results(comparison: Comparison, id_: str) -> list[dict[str, Any] | None]:
@@ -99,15 +103,15 @@ def _results(comparison: Comparison, id_: str) -> list[dict[str, Any] | None]:
         if cell is None:
             results.append(None)
             continue
-        differs = reference is not None and cell.verdict is not reference.verdict
-        results.append({"word": str(cell.result), "unexpected": cell.unexpected, "differs": differs})
+        differs = reference is not None and cell.row.verdict is not reference.row.verdict
+        results.append({"word": str(cell.row.result), "unexpected": cell.row.unexpected, "differs": differs})
     return results
 
 
 def _errors(comparison: Comparison, id_: str, axis: Axis) -> list[tuple[Cell, Any, Markup]]:
     """Return the lines of the table of errors of one property; none where nothing was measured."""
     return [
-        (cell, comparison.paired.get((cell.formulation, id_)), strip(cell.margins, axis))
+        (cell, comparison.paired.get((cell.row.formulation, id_)), strip(cell.margins, axis))
         for cell in _cells(comparison, id_)
         if not isnan(cell.worst)
     ]

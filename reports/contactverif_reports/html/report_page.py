@@ -63,7 +63,7 @@ class Section:
     @property
     def counts(self) -> str:
         """The numbers of properties with each result, in words."""
-        results = [line.cell.result for line in self.lines]
+        results = [line.cell.row.result for line in self.lines]
         return ", ".join(f"{results.count(result)} {result}" for result in Result if result in results)
 
 
@@ -139,7 +139,7 @@ def _lines(cells: Sequence[Cell], examples: Sequence[Example], axis: Axis) -> tu
     """Return the table of one formulation, a line for each property."""
     example_of = {example.counterexample.property_id: example.counterexample.id for example in examples}
     return tuple(
-        Line(cell, _PROMISES[cell.row.promise], strip(cell.margins, axis), example_of.get(cell.property_id, ""))
+        Line(cell, _PROMISES[cell.row.promise], strip(cell.margins, axis), example_of.get(cell.row.property_id, ""))
         for cell in cells
     )
 
