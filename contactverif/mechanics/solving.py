@@ -78,17 +78,17 @@ def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -
 
 
 def solve_by_engine(
-    scene: Scene, subject: EngineSubject, *, lowered: bool = True, linear: bool = False
+    scene: Scene, subject: EngineSubject, *, linear: bool = False
 ) -> tuple[Solution, EngineAnswer | None]:
     """Return the solution of a scene by an engine, with its restored answer; None if the scene cannot be posed to it.
 
-    The scene is turned where the engine takes no inclined axes. Bodies that nothing holds are `lowered`, as in
+    The scene is turned where the engine takes no inclined axes. Bodies that nothing holds are lowered, as in
     `Scene.pose`. Where its solution is linear in the loads, they are multiplied by the engine's `load_scale`.
     """
     traits = subject.engine_traits
     scale = traits.load_scale if linear else 1.0
     try:
-        pose = scene.pose(upright=not traits.inclined_supports, lowered=lowered, scale=scale)
+        pose = scene.pose(upright=not traits.inclined_supports, lowered=True, scale=scale)
     except MisuseError as error:
         return Solution.from_displacements(scene, np.zeros_like(scene.interface.nodes), str(error)), None
     answer = pose.restore(subject.solve(pose.arrays))

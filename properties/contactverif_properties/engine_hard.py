@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.engine_subject import SOLVE, EngineSubject
@@ -18,6 +17,7 @@ from contactverif.mechanics.solving import solve_by_engine
 from contactverif.problems import block_scenes
 from contactverif.problems.kinked_patch import kinked_patch, patch_of
 from contactverif.problems.uniform_stress import condition_tolerance, uniform_forces
+from contactverif_properties.hard_solved import check_unloaded
 from contactverif_properties.patch_kinked import kink_floor, kink_stress_error, kinked_cases
 from contactverif_properties.shared import solved_patch
 from contactverif_properties.shared.engine_patch import engine_tolerance
@@ -102,15 +102,9 @@ def engine_zero_load(case: Case, subject: Subject) -> Measurement:
     if solution.no_solution:
         return Measurement(undecided=solution.no_solution)
     q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
-    young = max(body.young for body in scene.bodies)
-    height = float(np.ptp(scene.bodies[0].nodes, axis=0).max())
-    stress = max(float(np.abs(part).max(initial=0.0)) for part in scene.stresses(q))
     moved = max(float(np.abs(scene.start).max()), float(np.abs(solution.displacements).max()))
-    shortest = case.shortest_segment
-    tolerance = 64 * UNIT_ROUNDOFF * case.largest_coordinate / shortest * (1 + case.penalty * shortest / young)
-    tolerance += (condition_tolerance(scene, case.penalty) + subject.engine_traits.accuracy) * moved / shortest
-    values = {NO_STRESS: stress / young, NO_FORCE: float(np.abs(solution.forces).max()) / (young * height)}
-    return Measurement(check_all(values, tolerance))
+    error = (condition_tolerance(scene, case.penalty) + subject.engine_traits.accuracy) * moved
+    return Measurement(check_unloaded((NO_STRESS, NO_FORCE), case, scene, q, solution.forces, error))
 
 
 KINK_TERMS = (

@@ -12,12 +12,12 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.engine_subject import EngineSubject
-from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
-from contactverif.mechanics.scene import has_bodies, scene_of
+from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems import block_scenes
 from contactverif.problems.blocks import pressure_of
@@ -225,6 +225,21 @@ NO_STRESS = Quantity(
 NO_FORCE = replace(NO_STRESS, name="force without a load")
 
 
+def check_unloaded(
+    quantities: tuple[Quantity, Quantity], case: Case, scene: Scene, q: FloatArray, forces: FloatArray, error: float
+) -> tuple[CheckedNumber, ...]:
+    """Judge the largest stress at the unknowns q (n_free,) over E of the stiffer body, and the largest force over E H.
+
+    `error` is by how much displacements may be wrong besides the rounding of coordinates, a length.
+    """
+    young, shortest = max(body.young for body in scene.bodies), case.shortest_segment
+    height = float(np.ptp(scene.bodies[0].nodes, axis=0).max())
+    stress = max(float(np.abs(part).max(initial=0.0)) for part in scene.stresses(q))
+    tolerance = 64 * UNIT_ROUNDOFF * case.largest_coordinate / shortest * (1 + case.penalty * shortest / young)
+    sizes = stress / young, float(np.abs(forces).max()) / (young * height)
+    return check_all(dict(zip(quantities, sizes, strict=True)), tolerance + error / shortest)
+
+
 @_define(
     id="hard.zero-load",
     quantities=(NO_STRESS, NO_FORCE),
@@ -256,11 +271,6 @@ def hard_zero_load(case: Case, subject: Subject) -> Measurement:
     q = u[: scene.n_free]
     end = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
     forces = FrozenState.at(formulation, end).forces
-    young = max(body.young for body in scene.bodies)
-    height = float(np.ptp(scene.bodies[0].nodes, axis=0).max())
-    stress = max(float(np.abs(part).max(initial=0.0)) for part in scene.stresses(q))
-    tolerance = 64 * UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
-    tolerance *= 1 + case.penalty * case.shortest_segment / young
-    tolerance += condition_tolerance(scene, case.penalty) * float(np.abs(scene.start).max()) / case.shortest_segment
-    values = {NO_STRESS: stress / young, NO_FORCE: float(np.abs(forces).max()) / (young * height)}
-    return Measurement(check_all(values, tolerance), details=end_details(trace))
+    error = condition_tolerance(scene, case.penalty) * float(np.abs(scene.start).max())
+    numbers = check_unloaded((NO_STRESS, NO_FORCE), case, scene, q, forces, error)
+    return Measurement(numbers, details=end_details(trace))
