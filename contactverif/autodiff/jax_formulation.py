@@ -80,10 +80,8 @@ def from_residual(residual: Element, *, pair: Pair, traits: Traits | None = None
         A pure function ``residual(x, reference, decisions, penalty)`` of JAX. It returns the forces on the nodes of one
         element, internal minus external, in the shape (n_nodes_of_element, dim) of ``x``. The arguments are those that
         `from_energy` describes.
-    pair : Callable
-        The function ``pair(interface, z)`` that decides who touches whom, see `from_energy`.
-    traits : Traits | None
-        The promises of the formulation; None promises nothing.
+    pair, traits : Callable, Traits | None
+        As for `from_energy`.
 
     Returns
     -------
@@ -93,7 +91,7 @@ def from_residual(residual: Element, *, pair: Pair, traits: Traits | None = None
     Raises
     ------
     MisuseError
-        If JAX is not installed, or the traits state that the formulation takes batches or other kinds of numbers.
+        As for `from_energy`.
 
     See Also
     --------

@@ -50,6 +50,11 @@ def collect_versions() -> dict[str, str]:
     return versions | {"python_version": platform.python_version()}
 
 
+def collect_repeatable_facts() -> dict[str, str]:
+    """Return the versions and the commit: only what a second run repeats on any machine."""
+    return {**collect_versions(), "commit": _commit()}
+
+
 @cache
 def machine() -> dict[str, str]:
     """Return what the last bits of a number depend on beside the versions; equal where the machine is the same."""

@@ -44,11 +44,14 @@ def measure_costs(
     return tuple(costs)
 
 
-def make_state(n_segments: int) -> Case:
-    """Return a flat interface of that many unit slave segments on three quarters as many, all of it in contact."""
-    n_master = max(1, 3 * n_segments // 4)
+def make_state(n_segments: int, ratio: float = 0.75, before: float = 0.5) -> Case:
+    """Return a flat interface of that many unit slave segments, on `ratio` times as many, all of it in contact.
+
+    The master is longer by 1, and begins by the length `before` the slave.
+    """
+    n_master = max(1, int(ratio * n_segments))
     slave_x = np.arange(n_segments + 1.0)
-    master_x = np.linspace(-0.5, n_segments + 0.5, n_master + 1)[::-1]
+    master_x = np.linspace(-before, n_segments + (1 - before), n_master + 1)[::-1]
     depth = (1 + slave_x % 3) / 64  # 1/64 to 3/64, so that no force is a repetition of its neighbour's.
     upper, lower = (np.column_stack([x, np.zeros_like(x)]) for x in (slave_x, master_x))
     interface = Interface.from_chains(upper, lower)

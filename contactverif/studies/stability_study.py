@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import Subject
-from contactverif.plugins.provenance import collect_provenance
+from contactverif.plugins.provenance import collect_repeatable_facts
 from contactverif.plugins.registry import load_properties
 from contactverif.run.run import run
 from contactverif.run.scheduler import Progress
@@ -26,8 +26,5 @@ def run_stability(
     result = run(subjects, load_properties(PROPERTIES), seed=0, progress=progress)
     names = [item.name if isinstance(item, Subject) else item.formulation for item in subjects]
     options = [word for output in outputs for word in ("--out", output)]
-    facts = collect_provenance(profile="", examples=0, seed=0)
-    same_everywhere = {name: value for name, value in facts.items() if name.endswith("_version") or name == "commit"}
-    return replace(
-        result, provenance=same_everywhere | {"command": shlex.join(["contactverif", "stability", *names, *options])}
-    )
+    command = shlex.join(["contactverif", "stability", *names, *options])
+    return replace(result, provenance=collect_repeatable_facts() | {"command": command})

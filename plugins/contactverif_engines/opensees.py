@@ -6,7 +6,6 @@ surface has a spring to each edge of the other one that it lies behind, whatever
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,13 +42,12 @@ class OpenSees:
         _add_bodies(ops, plane)
         _add_supports_and_loads(ops, plane)
         self._add_contact(ops, plane)
-        steps: list[int] = []
         tolerance = _CONVERGED * _size_of_displacements(scene) + _ROUNDED * float(np.abs(scene.nodes).max())
-        converged = _run(ops, tolerance, steps.append, _choose_handler(plane))
+        converged, n_steps = _run(ops, tolerance, _choose_handler(plane))
         count = range(1, len(scene.nodes) + 1)
         moves = np.array([[ops.nodeDisp(node, part) for part in (1, 2)] for node in count], np.float64)
         ops.wipe()
-        return EngineAnswer(moves, converged, steps[0], "" if converged else "analyze failed in one step")
+        return EngineAnswer(moves, converged, n_steps, "" if converged else "analyze failed in one step")
 
     def _add_contact(self, ops: Any, plane: PlaneScene) -> None:
         """Add an element for each pair of a slave's and a master's chain of edges."""
@@ -122,8 +120,8 @@ def _choose_handler(plane: PlaneScene) -> str:
     return "Lagrange" if many else "Transformation"
 
 
-def _run(ops: Any, tolerance: float, count_steps: Callable[[int], None], handler: str) -> bool:
-    """Solve a static step, pass on the number of its iterations, and return whether it converged."""
+def _run(ops: Any, tolerance: float, handler: str) -> tuple[bool, int]:
+    """Solve a static step, and return whether it converged, and the number of its iterations."""
     ops.constraints(handler)
     ops.numberer("RCM")
     ops.system("UmfPack")
@@ -132,5 +130,4 @@ def _run(ops: Any, tolerance: float, count_steps: Callable[[int], None], handler
     ops.integrator("LoadControl", 1.0)
     ops.analysis("Static")
     converged = ops.analyze(1) == 0
-    count_steps(int(ops.testIter()))
-    return bool(converged)
+    return bool(converged), int(ops.testIter())

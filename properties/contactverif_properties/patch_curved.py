@@ -19,7 +19,7 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import Solution
+from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.problem import FORCES
 from contactverif.problems.shrink_fit import FIT, SEGMENTS, FiniteFit, RingStudy, Role, shrink_fit
@@ -192,10 +192,8 @@ def count_bare(interface: Interface, forces: FloatArray) -> int:
 
     The forces are those on all nodes (n_nodes, 2).
     """
-    slave, n_slave = interface.slave, interface.n_slave_nodes
-    shares = np.zeros(n_slave)
-    for end in (0, 1):
-        np.add.at(shares, slave.segments[:, end], slave.lengths(interface.nodes))
+    n_slave = interface.n_slave_nodes
+    shares = shape_integrals(interface.slave, interface.nodes)[:n_slave]
     sizes = np.linalg.norm(forces[:n_slave], axis=1)
     return int((sizes < sizes.sum() / shares.sum() * shares / 10).sum())
 

@@ -10,12 +10,9 @@ from dataclasses import dataclass
 from functools import cache
 
 from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Property
-from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.plugins.registry import load_formulation, load_properties
+from contactverif.plugins.registry import the_formulation, the_property
 from contactverif.run.judge import judge_case
 
 
@@ -48,15 +45,10 @@ VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)
 
 def measure(property_id: str, case: Case, formulation: PaperFormulation) -> Measurement | None:
     """Return what a property measures of a formulation on a case."""
-    (question,) = load_properties([property_id])
-    assert isinstance(question, Property)
-    return judge_case(question, case, subject_of(formulation)).measurement
+    return judge_case(the_property(property_id), case, subject_of(formulation)).measurement
 
 
 @cache
 def subject_of(formulation: PaperFormulation) -> Subject:
     """Load the formulation."""
-    loaded = load_formulation(formulation.name)
-    if isinstance(loaded, NotLoaded):
-        raise MisuseError("formulation", f"{formulation.name}, not loaded: {loaded.reason}", "one that loads")
-    return loaded
+    return the_formulation(formulation.name)

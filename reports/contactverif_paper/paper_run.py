@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from functools import partial
 from typing import Any
 
-from contactverif.plugins.provenance import collect_provenance
+from contactverif.plugins.provenance import collect_repeatable_facts
 from contactverif.run.scheduler import Job, Scheduler
 from contactverif_paper.items import ITEMS
 from contactverif_paper.paper_item import Item, ItemResult, Paper, Progress
@@ -27,7 +27,7 @@ def compute(
     selection = _select(items, with_study=with_study)
     data = _compute_all(selection, report_progress, executor)
     results = [ItemResult(item, each, tuple(item.statements(each)), tuple(item.tables(each))) for item, each in data]
-    return Paper(tuple(results), _provenance())
+    return Paper(tuple(results), collect_repeatable_facts())
 
 
 def steps(*, with_study: bool = True, items: tuple[Item, ...] = ITEMS) -> int:
@@ -61,9 +61,3 @@ def _compute_all(
 def _data_of(compute_item: Callable[[Progress], Any]) -> Any:
     """Return the data of an item; a worker has nobody to report to."""
     return compute_item(lambda _: None)
-
-
-def _provenance() -> dict[str, str]:
-    """Return the versions and the commit: only what a second run repeats."""
-    facts = collect_provenance(profile="", examples=0, seed=0)
-    return {name: value for name, value in facts.items() if name.endswith("_version") or name == "commit"}

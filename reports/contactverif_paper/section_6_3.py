@@ -19,7 +19,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.studies.evaluation_cost import measure_costs
+from contactverif.studies.evaluation_cost import make_state, measure_costs
 from contactverif_paper.paper_columns import Column, Formulations, to_group
 from contactverif_paper.paper_formulations import STS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
@@ -82,7 +82,7 @@ def compute(report_progress: Progress) -> Section63:
     """Count and measure."""
     report_progress("Section 6.3, terms and cost")
     terms = [[count_terms(formulation, master) for master in MASTERS.values()] for formulation in FORMULATIONS]
-    cases = [long_interface(ratio) for ratio in MESH_RATIOS.values()]
+    cases = [make_state(_N_SEGMENTS, ratio, 0.4) for ratio in MESH_RATIOS.values()]
     entries = [[_entries(formulation, case) / _N_SEGMENTS for case in cases] for formulation in TIMED]
     costs = measure_costs([subject_of(formulation) for formulation in TIMED], cases)  # One case after the other.
     residual, tangent = (
@@ -102,17 +102,6 @@ def count_terms(formulation: PaperFormulation, master: tuple[tuple[float, float]
     n_nodes = len(x)
     blocks = np.einsum("ai,minj,bj->manb", frame, tangent.reshape(n_nodes, 2, n_nodes, 2), frame)
     return int((np.abs(blocks) > _VANISHES * np.abs(blocks).max()).sum())
-
-
-def long_interface(ratio: float) -> Case:
-    """Return a flat interface of unit slave segments with `ratio` master segments for each, all of it in contact."""
-    n_master = max(1, round(_N_SEGMENTS * ratio))
-    slave_x = np.arange(_N_SEGMENTS + 1.0)
-    master_x = np.linspace(-0.4, _N_SEGMENTS + 0.6, n_master + 1)[::-1]
-    upper, lower = (np.column_stack([x, np.zeros_like(x)]) for x in (slave_x, master_x))
-    interface = Interface.from_chains(upper, lower)
-    upper[:, 1] = -(1 + slave_x % 3) / 64
-    return Case(interface, np.vstack([upper, lower]).reshape(-1), penalty=PENALTY)
 
 
 def statements(section: Section63) -> Iterator[Statement]:
