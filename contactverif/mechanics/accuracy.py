@@ -30,9 +30,8 @@ from contactverif.mechanics.trace import End, Trace
 
 Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), or to numbers (n,).
 
-_PARTS_OF_EDGE = (
-    32  # A pressure may end inside a segment with a vertical tangent: so many parts leave 1e-3 of its error.
-)
+# A pressure may end inside a segment with a vertical tangent: so many parts leave 1e-3 of its error.
+_PARTS_OF_EDGE = 32
 GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 times a shape function.
 
 
