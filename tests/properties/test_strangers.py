@@ -1,5 +1,6 @@
 """No property accuses a stranger's formulation of breaking what it promises; `tox -e trust` asks many more cases."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,12 @@ MOST_UNDECIDED = 50
 QUESTIONS = [question for question in map(load_property, property_ids()) if not question.bodies]
 
 
+@cache
 def cases_of(question: Property) -> tuple[Any, ...]:
     listed = question.cases(None)
     if isinstance(listed, tuple):
         return listed[:: max(1, len(listed) // EXAMPLES)][:EXAMPLES]
     return draw_cases(listed, seed=f"strangers/{question.id}", examples=EXAMPLES).cases
-
-
-CASES = {question.id: cases_of(question) for question in QUESTIONS}
 
 
 @pytest.mark.parametrize("name", STRANGERS)
@@ -36,7 +35,7 @@ def test_a_right_formulation_of_a_stranger_is_not_accused_of_anything(name: str)
             continue
         if question.needs - subject.provides:
             continue
-        for case in CASES[question.id]:
+        for case in cases_of(question):
             outcome = judge_case(question, case, subject)
             assert not outcome.breach
             assert outcome.verdict in (Verdict.PASS, Verdict.UNDECIDED), f"{question.id}: {outcome.reason}"
