@@ -36,6 +36,6 @@ def test_verify_says_of_the_project_what_the_page_quotes(tmp_path: Path) -> None
         (project / "mine.so").unlink(missing_ok=True)
         source.write_text(content, encoding="utf-8")
         subprocess.run(["make"], cwd=project, check=True)
-        answer = call(*verify, "--examples", "10", folder=project)
+        answer = call(*verify, "--examples", "3", folder=project)
         assert answer.returncode == status, answer.stdout + answer.stderr
         assert set(plain_lines(quote)) <= set(plain_lines(answer.stdout)), answer.stdout
