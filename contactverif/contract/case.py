@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import clean, name_line
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import PLANE, Interface, Surface
 
 BODIES = "bodies_"  # The prefix of the parameters that hold the bodies of a scene.
 _PREFIX = "parameter_"
@@ -36,7 +37,7 @@ class Case:
         The state: current positions, a length each, flat, slave nodes first; behind them the multipliers, if any.
     penalty : float
         The distributed stiffness ε̂ > 0, force per length per length of penetration. A nodal formulation gets
-        ε̂ × the mean length of the slave segments.
+        ε̂ × the mean length of the slave segments, and in space ε̂ × the area of the slave over the number of its nodes.
     parameters : Mapping[str, FloatArray]
         Whatever else the property that made the case needs to know: arrays of floats by name.
     seed : int
@@ -118,9 +119,9 @@ class Case:
 
     @cached_property
     def shortest_segment(self) -> float:
-        """The length of the shortest current segment of both sides."""
+        """The length of the shortest current segment of both sides, or the least height of a face."""
         interface, positions = self.interface, self.positions
-        return float(min(interface.slave.lengths(positions).min(), interface.master.lengths(positions).min()))
+        return float(min(interface.slave.heights(positions).min(), interface.master.heights(positions).min()))
 
     @cached_property
     def resolution(self) -> float:
@@ -136,8 +137,9 @@ class Case:
 
     @property
     def slave_length(self) -> float:
-        """The current length of the slave surface; L in the tolerances."""
-        return float(self.interface.slave.lengths(self.positions).sum())
+        """The current length of the slave surface, in space the root of its area; L in the tolerances."""
+        measure = float(self.interface.slave.measures(self.positions).sum())
+        return measure if self.interface.dim == PLANE else sqrt(measure)
 
     @property
     def diameter(self) -> float:
@@ -146,7 +148,7 @@ class Case:
 
     @property
     def n_segments(self) -> int:
-        """The number of segments of both sides; N in the tolerances."""
+        """The number of segments or faces of both sides; N in the tolerances."""
         return len(self.interface.slave) + len(self.interface.master)
 
     @property
@@ -170,8 +172,8 @@ class Case:
         interface = self.interface
         arrays: dict[str, ArrayLike] = {
             "nodes": interface.nodes,
-            "slave_segments": interface.slave.segments,
-            "master_segments": interface.master.segments,
+            "slave_segments": interface.slave.faces,
+            "master_segments": interface.master.faces,
             "z": self.z,
             "penalty": self.penalty,
             "seed": self.seed,

@@ -18,7 +18,8 @@ residual
     The nodal forces, **internal minus external**: a slave node in contact is pushed along +normal by ``-residual``.
 penalty
     The distributed stiffness ε̂, force per length per length of penetration: pressure = ε̂ |gap|. A nodal formulation
-    (trait ``penalty="nodal"``) gets ε̂ × the mean length of the slave segments, force per length.
+    (trait ``penalty="nodal"``) gets ε̂ × the mean length of the slave segments, force per length; in space ε̂ ×
+    the area of the slave over the number of its nodes.
 area of competence
     The part of the slave surface for which a contact point stands, a length.
 xi
@@ -60,12 +61,18 @@ def _false() -> BoolArray:
     return np.zeros((), dtype=np.bool_)
 
 
+def _no_shape() -> FloatArray:
+    return np.zeros(())
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPoints:
     """The points at which a formulation looks for contact, and what it finds there.
 
     `Formulation.contact_points` returns them, for pictures and for properties that judge gaps and pressures. A number
-    that means nothing for a formulation is NaN; an integer is −1. A point with a pressure has a normal.
+    that means nothing for a formulation is NaN; an integer is −1. A point with a pressure has a normal. In space, where
+    `on_faces` makes the points, segments are faces, and shape functions say where a point lies; `c`, `xi`, `area_from`
+    and `area_to` are NaN.
 
     Attributes
     ----------
@@ -100,11 +107,18 @@ class ContactPoints:
         point have the roles exchanged: `slave_segment` is the number of the master segment that carries it,
         `master_segment` that of the slave segment opposite, and the normal points out of the slave body. One value
         stands for all points; False by default.
+    slave_shape, master_shape : FloatArray, shape (n_points, n_corners), optional
+        In space, the shape functions of the corners of the slave face at the point, and of those of the master face at
+        its foot. In the plane there are none, shape (n_points, 0).
 
     Raises
     ------
     MisuseError
         If an array has the wrong dtype, or not n_points rows.
+
+    See Also
+    --------
+    ContactPoints.on_faces : Make points of an interface in space.
     """
 
     slave_segment: IntArray
@@ -121,6 +135,8 @@ class ContactPoints:
     area_to: FloatArray
     weighted: BoolArray = field(default_factory=_false)
     on_master: BoolArray = field(default_factory=_false)
+    slave_shape: FloatArray = field(default_factory=_no_shape)
+    master_shape: FloatArray = field(default_factory=_no_shape)
 
     def __post_init__(self) -> None:
         n_points = len(np.atleast_1d(np.asarray(self.slave_segment)))
@@ -129,24 +145,49 @@ class ContactPoints:
             # Otherwise 0.7 would become segment 0.
             if raw.dtype != dtype and raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):
                 raise MisuseError(f"ContactPoints.{name}", f"dtype {raw.dtype}", dtype.name)
-            if raw.ndim == 0 and name in ("weighted", "on_master"):
-                raw = np.full(n_points, raw)
+            if raw.ndim == 0 and name in _FOR_ALL_POINTS:
+                raw = np.full((n_points, 0) if n_axes == 2 else n_points, raw)
             values: NDArray[Any] = freeze(raw, dtype.type)
             if values.ndim != n_axes or len(values) != n_points:
-                needed = f"({n_points}, dim)" if n_axes == 2 else f"({n_points},)"
+                second = "n_corners" if name.endswith("shape") else "dim"
+                needed = f"({n_points}, {second})" if n_axes == 2 else f"({n_points},)"
                 raise MisuseError(f"ContactPoints.{name}", f"shape {values.shape}", needed)
             object.__setattr__(self, name, values)
+
+    @classmethod
+    def on_faces(cls, **arrays: Any) -> ContactPoints:
+        """Return points of an interface in space.
+
+        Parameters
+        ----------
+        **arrays : Any
+            The attributes by name. `c`, `xi`, `area_from` and `area_to` may be left out.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from contactverif import ContactPoints
+        >>> third = np.full((1, 3), 1 / 3)
+        >>> places = {"slave_segment": np.array([0]), "slave_shape": third, "position": np.zeros((1, 3))}
+        >>> feet = {"master_segment": np.array([0]), "master_shape": third, "normal": np.array([[0.0, 0.0, 1.0]])}
+        >>> numbers = {"gap": np.zeros(1), "pressure": np.zeros(1), "weight": np.ones(1), "active": np.array([False])}
+        >>> ContactPoints.on_faces(**places, **feet, **numbers).c
+        array([nan])
+        """
+        unknown = np.full(np.shape(arrays["slave_segment"]), np.nan)
+        return cls(**(dict.fromkeys(("c", "xi", "area_from", "area_to"), unknown) | arrays))
 
     def select(self, selection: BoolArray | IntArray) -> ContactPoints:
         """Return some of the points, selected by mask (n_points,) or by number."""
         return ContactPoints(**{name: getattr(self, name)[selection] for name, *_ in _COLUMNS})
 
 
+_OF_TWO_AXES = ("position", "normal", "slave_shape", "master_shape")
+_FOR_ALL_POINTS = ("weighted", "on_master", "slave_shape", "master_shape")  # Fields of which one value is enough.
 _DTYPES = {"IntArray": np.dtype(np.int64), "BoolArray": np.dtype(np.bool_), "FloatArray": np.dtype(np.float64)}
 # The name of each field, its dtype and its number of axes.
 _COLUMNS = [
-    (entry.name, _DTYPES[str(entry.type)], 2 if entry.name in ("position", "normal") else 1)
-    for entry in fields(ContactPoints)
+    (entry.name, _DTYPES[str(entry.type)], 2 if entry.name in _OF_TWO_AXES else 1) for entry in fields(ContactPoints)
 ]
 
 

@@ -1,7 +1,8 @@
-"""The two facing meshes of a contact problem: how segments hang together, and where their nodes are.
+"""The two facing meshes of a contact problem: how segments or faces hang together, and where their nodes are.
 
 Whatever can be wrong with a mesh is found here, in the constructors, once; nobody checks it again. `Surface` knows how
-segments hang together and nothing of positions; `Interface` adds the reference positions.
+faces hang together and nothing of positions; `Interface` adds the reference positions. A segment of a plane interface
+is a face of two corners.
 """
 
 from __future__ import annotations
@@ -13,26 +14,41 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contactverif.contract.arrays import FloatArray, IntArray, as_array, freeze
+from contactverif.contract.chains import link_segments
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.faces import (
+    QUADRILATERAL,
+    TRIANGLE,
+    check_faces,
+    link_faces,
+    measure_faces,
+    measure_heights,
+)
+
+PLANE, SPACE = 2, 3  # Numbers of coordinates.
+SEGMENT = 2  # The number of corners of a segment.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """One side of the interface: chains of straight segments, each with the body on its left.
+    """One side of the interface: chains of straight segments in the plane, or triangles or quadrilaterals in space.
 
     On the way from the first to the second node of a segment the body is on the left and the other surface on the
-    right. A surface consists of any number of chains, open or closed. A node belongs to at most two segments.
+    right. A surface of segments consists of any number of chains, open or closed, and a node belongs to at most two
+    segments. The corners of a triangle or quadrilateral run counter-clockwise, seen from outside the body. All faces of
+    a surface are of one kind.
 
     Attributes
     ----------
-    segments : IntArray, shape (n_segments, 2)
-        The numbers of the first and the second node of each segment, in any order of the segments. This is the only
-        argument of the constructor; the other attributes follow from it.
-    neighbours : IntArray, shape (n_segments, 2)
-        The numbers of the previous and the next segment of the chain; −1 at a free end.
+    faces : IntArray, shape (n_faces, n_corners)
+        The numbers of the corners of each face, in any order of the faces: 2 corners are a segment, 3 a triangle, 4 a
+        quadrilateral. This is the only argument of the constructor; the other attributes follow from it.
+    neighbours : IntArray, shape (n_faces, n_corners)
+        The number of the face across each edge, of which edge i runs from corner i to the next one, −1 at the border.
+        Of segments, those of the previous and the next segment of the chain, −1 at a free end.
     chain_order : IntArray, shape (n_segments,)
         The numbers of the segments in the order of a walk along the chains: open chains from their free ends, then
-        closed chains.
+        closed chains. Empty in space.
     chain_starts : IntArray, shape (n_chains,)
         The places in `chain_order` at which the chains begin.
     nodes : IntArray, shape (n_nodes,)
@@ -42,7 +58,7 @@ class Surface:
     ------
     MisuseError
         If the segments form no chains: two of them begin at one node, two end at one node, or one begins and ends at
-        the same node.
+        the same node. In space, if an edge belongs to three faces, or two neighbours turn against each other.
 
     Examples
     --------
@@ -50,29 +66,48 @@ class Surface:
     >>> surface = Surface([[0, 1], [1, 2]])
     >>> surface.neighbours.tolist()
     [[-1, 1], [0, -1]]
+
+    Two triangles in space, which have the edge between the nodes 1 and 2 in common:
+
+    >>> Surface([[0, 1, 2], [2, 1, 3]]).neighbours.tolist()
+    [[-1, 1, -1], [0, -1, -1]]
     """
 
-    segments: IntArray
+    faces: IntArray
     neighbours: IntArray = field(init=False)
     chain_order: IntArray = field(init=False)
     chain_starts: IntArray = field(init=False)
     nodes: IntArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        raw = as_array("segments", self.segments)
-        if raw.ndim != 2 or raw.shape[1] != 2 or len(raw) == 0:
-            raise MisuseError("segments", f"an array of shape {raw.shape}", "shape (n_segments, 2), n_segments ≥ 1")
+        raw = as_array("segments", self.faces)
+        if raw.ndim != 2 or raw.shape[1] not in (SEGMENT, TRIANGLE, QUADRILATERAL) or len(raw) == 0:
+            needed = "shape (n_segments, 2), n_segments ≥ 1, or in space (n_faces, 3 or 4)"
+            raise MisuseError("segments", f"an array of shape {raw.shape}", needed)
         if not np.issubdtype(raw.dtype, np.integer):
             raise MisuseError("segments", f"dtype {raw.dtype}", "integer node numbers")
-        segments = freeze(raw, np.int64)
-        link = _link_small if segments.size <= _SMALL else _link
-        object.__setattr__(self, "segments", segments)
+        faces = freeze(raw, np.int64)
+        link = _link_small if faces.size <= _SMALL else _link
+        object.__setattr__(self, "faces", faces)
         names = ("neighbours", "chain_order", "chain_starts", "nodes")
-        for name, array in zip(names, link(segments.tobytes()), strict=True):
+        for name, array in zip(names, link(faces.tobytes(), faces.shape[1]), strict=True):
             object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
-        return len(self.segments)
+        return len(self.faces)
+
+    @property
+    def segments(self) -> IntArray:
+        """The faces of a surface in the plane, (n_segments, 2).
+
+        Raises
+        ------
+        MisuseError
+            If the surface has triangles or quadrilaterals.
+        """
+        if self.faces.shape[1] != SEGMENT:
+            raise MisuseError("segments", f"faces of {self.faces.shape[1]} corners", "`faces` of a surface in space")
+        return self.faces
 
     def lengths(self, nodes: FloatArray) -> FloatArray:
         """Return the lengths of the segments.
@@ -92,6 +127,37 @@ class Surface:
         lengths: FloatArray = np.sqrt((along * along).sum(axis=-1))
         return lengths
 
+    def measures(self, nodes: FloatArray) -> FloatArray:
+        """Return the lengths of segments, or the areas of faces; a quadrilateral is bilinear.
+
+        Parameters
+        ----------
+        nodes : FloatArray, shape (n_nodes, dim)
+            The positions of all nodes of the interface, reference or current.
+
+        Returns
+        -------
+        FloatArray, shape (n_faces,)
+            The lengths or areas, in the unit of the positions or its square.
+        """
+        return self.lengths(nodes) if self.faces.shape[1] == SEGMENT else measure_faces(nodes[self.faces])
+
+    def heights(self, nodes: FloatArray) -> FloatArray:
+        """Return the lengths of segments, or the least heights of faces.
+
+        Parameters
+        ----------
+        nodes : FloatArray, shape (n_nodes, dim)
+            The positions of all nodes of the interface, reference or current.
+
+        Returns
+        -------
+        FloatArray, shape (n_faces,)
+            The least distance of a corner from an edge of its face that does not end there, in the unit of the
+            positions.
+        """
+        return self.lengths(nodes) if self.faces.shape[1] == SEGMENT else measure_heights(nodes[self.faces])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Interface:
@@ -102,8 +168,9 @@ class Interface:
 
     Attributes
     ----------
-    nodes : FloatArray, shape (n_nodes, 2)
-        The reference positions of all nodes, a length each: slave nodes first, then master nodes.
+    nodes : FloatArray, shape (n_nodes, 2 or 3)
+        The reference positions of all nodes, a length each: slave nodes first, then master nodes. Surfaces of segments
+        lie in the plane, others in space.
     slave, master : Surface
         The two surfaces. Slave nodes have the numbers 0 … n_slave_nodes − 1, master nodes all numbers behind them; each
         node belongs to exactly one surface.
@@ -112,11 +179,13 @@ class Interface:
     ------
     MisuseError
         If a coordinate is NaN or infinite, a segment has no length, two nodes of one surface lie in one place, a node
-        belongs to both surfaces or to none, or the slave nodes are not the first.
+        belongs to both surfaces or to none, or the slave nodes are not the first. In space, if a face has no area, or a
+        quadrilateral is not convex.
 
     See Also
     --------
     Interface.from_chains : Make an interface from the points of one open chain a side.
+    Interface.from_faces : Make an interface from points and faces in space.
 
     Examples
     --------
@@ -139,6 +208,10 @@ class Interface:
             if not isinstance(surface, Surface):
                 raise MisuseError(name, f"a {type(surface).__name__}", "a Surface")
         nodes = _check_nodes(self.nodes)
+        for name, surface in (("slave", self.slave), ("master", self.master)):
+            if (surface.faces.shape[1] == SEGMENT) != (nodes.shape[1] == PLANE):
+                corners = f"faces of {surface.faces.shape[1]} corners and nodes with {nodes.shape[1]} coordinates"
+                raise MisuseError(name, corners, "segments in the plane, triangles or quadrilaterals in space")
         object.__setattr__(self, "nodes", nodes)
         used_slave, used_master = self.slave.nodes, self.master.nodes
         n_slave = len(used_slave)
@@ -186,6 +259,50 @@ class Interface:
         return cls(np.vstack(points), Surface(segments[: n_slave - 1]), Surface(segments[n_slave:]))
 
     @classmethod
+    def from_faces(
+        cls, slave: ArrayLike, slave_faces: ArrayLike, master: ArrayLike, master_faces: ArrayLike
+    ) -> Interface:
+        """Return the interface of two surfaces in space, each with node numbers of its own.
+
+        Parameters
+        ----------
+        slave : ArrayLike, shape (n_points, 3)
+            The points of the slave.
+        slave_faces : ArrayLike, shape (n_faces, 3 or 4)
+            The corners of each face, numbered from 0, counter-clockwise seen from outside the body.
+        master : ArrayLike, shape (n_points, 3)
+            The points of the master.
+        master_faces : ArrayLike, shape (n_faces, 3 or 4)
+            Its faces, likewise, with node numbers of their own.
+
+        Returns
+        -------
+        Interface
+            Its nodes are those of the slave, then those of the master.
+
+        Raises
+        ------
+        MisuseError
+            If the faces form no such surface.
+
+        Examples
+        --------
+        A triangle over a larger one:
+
+        >>> from contactverif import Interface
+        >>> upper, lower = [[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[-1, -1, 0], [3, -1, 0], [-1, 3, 0]]
+        >>> interface = Interface.from_faces(upper, [[0, 1, 2]], lower, [[0, 1, 2]])
+        >>> interface.dim, interface.master.faces.tolist(), interface.slave.measures(interface.nodes).tolist()
+        (3, [[3, 4, 5]], [0.5])
+        """
+        points = [as_array(name, side) for name, side in (("slave", slave), ("master", master))]
+        for name, side in zip(("slave", "master"), points, strict=True):
+            if side.ndim != 2 or side.shape[1] != 3:
+                raise MisuseError(name, f"an array of shape {side.shape}", "shape (n_points, 3)")
+        corners = as_array("master_faces", master_faces)
+        return cls(np.vstack(points), Surface(as_array("slave_faces", slave_faces)), Surface(corners + len(points[0])))
+
+    @classmethod
     def of_parts(cls, nodes: FloatArray, slave: Surface, master: Surface) -> Interface:
         """Return the interface of read-only parts of which somebody else has checked that they belong together."""
         interface = object.__new__(cls)
@@ -195,7 +312,7 @@ class Interface:
 
     @property
     def dim(self) -> int:
-        """The number of coordinates of a node: 2."""
+        """The number of coordinates of a node: 2 in the plane, 3 in space."""
         return int(self.nodes.shape[1])
 
     @property
@@ -219,77 +336,35 @@ class Interface:
         n_master = self.n_nodes - n_slave
         return Interface(
             np.vstack([self.nodes[n_slave:], self.nodes[:n_slave]]),
-            Surface(self.master.segments - n_slave),
-            Surface(self.slave.segments + n_master),
+            Surface(self.master.faces - n_slave),
+            Surface(self.slave.faces + n_master),
         )
 
     def at(self, nodes: ArrayLike) -> Interface:
-        """Return the interface with the same segments on other reference positions, shape (n_nodes, dim)."""
+        """Return the interface with the same faces on other reference positions, shape (n_nodes, dim)."""
         return Interface(as_array("nodes", nodes), self.slave, self.master)
 
 
-def _link(data: bytes) -> list[IntArray]:
-    """Check the segments (n_segments, 2) whose bytes are given; return neighbours, chain order and starts, nodes."""
-    segments = np.frombuffer(data, np.int64).reshape(-1, 2)
-    _check_chains(segments)
-    nodes, ends = np.unique(segments, return_inverse=True)
-    first, second = ends.reshape(segments.shape).T  # Node numbers without gaps.
-    starting, ending = (np.full(len(nodes), -1) for _ in range(2))
-    starting[first] = ending[second] = np.arange(len(segments))
-    neighbours = np.column_stack([ending[first], starting[second]])  # −1 at a free end.
-    order = _chain_order(neighbours)
-    starts = np.flatnonzero(np.append(True, neighbours[order[:-1], 1] != order[1:]))
-    return [freeze(array, np.int64) for array in (neighbours, order, starts, nodes)]
+def _link(data: bytes, n_corners: int) -> list[IntArray]:
+    """Check the faces (n_faces, n_corners) whose bytes are given; return neighbours, chain order and starts, nodes."""
+    faces = np.frombuffer(data, np.int64).reshape(-1, n_corners)
+    if n_corners == SEGMENT:
+        arrays = link_segments(faces)
+    else:
+        none = np.zeros(0, np.int64)
+        arrays = [link_faces(faces), none, none, np.unique(faces)]
+    return [freeze(array, np.int64) for array in arrays]
 
 
 _SMALL = 128  # Number of node numbers of a surface that is remembered: random meshes share few ways to hang together.
 _link_small = lru_cache(maxsize=1024)(_link)
 
 
-def _check_chains(segments: IntArray) -> None:
-    """Check that node numbers and connections are those of chains."""
-    if segments.min() < 0:
-        raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
-    loops = np.flatnonzero(segments[:, 0] == segments[:, 1])
-    if len(loops):
-        segment = loops[0]
-        node = segments[segment, 0]
-        raise MisuseError("segments", f"segment {segment} that begins and ends at node {node}", "two nodes")
-    for end, verb in ((0, "begin"), (1, "end")):
-        numbers = np.sort(segments[:, end])
-        if (numbers[1:] == numbers[:-1]).any():
-            numbers, counts = np.unique(numbers, return_counts=True)
-            node = numbers[np.argmax(counts)]
-            meeting = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
-            raise MisuseError(
-                "segments",
-                f"segments {meeting} that all {verb} at node {node}",
-                "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
-            )
-
-
-def _chain_order(neighbours: IntArray) -> IntArray:
-    """Return open chains first, each from its free end; then closed chains, each from its lowest segment."""
-    numbers = np.arange(len(neighbours))
-    if ((neighbours[:, 1] == numbers + 1) | (neighbours[:, 1] < 0)).all():
-        return numbers  # Open chains, numbered as they run.
-    following = neighbours[:, 1].tolist()
-    visited = [False] * len(following)
-    order = []
-    for start in [*np.flatnonzero(neighbours[:, 0] < 0).tolist(), *range(len(following))]:
-        segment = start
-        while segment >= 0 and not visited[segment]:
-            visited[segment] = True
-            order.append(segment)
-            segment = following[segment]
-    return np.array(order, dtype=np.int64)
-
-
 def _check_nodes(values: ArrayLike) -> FloatArray:
-    """Return reference positions (n_nodes, 2), checked and read-only."""
+    """Return reference positions (n_nodes, 2 or 3), checked and read-only."""
     raw = as_array("nodes", values)
-    if raw.ndim != 2 or raw.shape[1] != 2:
-        raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2)")
+    if raw.ndim != 2 or raw.shape[1] not in (PLANE, SPACE):
+        raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2), or (n_nodes, 3) in space")
     if raw.dtype.kind not in "fiu":
         raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
     nodes = freeze(raw, np.float64)
@@ -300,11 +375,13 @@ def _check_nodes(values: ArrayLike) -> FloatArray:
 
 
 def _check_positions(name: str, surface: Surface, nodes: FloatArray) -> None:
-    """Check that the segments of a surface have a length and its nodes a place of their own."""
+    """Check that the segments of a surface have a length, or its faces an area, and its nodes a place of their own."""
     used = surface.nodes
+    if surface.faces.shape[1] != SEGMENT:
+        check_faces(name, nodes[surface.faces])
     if len(set(map(tuple, nodes[used].tolist()))) == len(used):
         return
-    ends = nodes[surface.segments]
+    ends = nodes[surface.faces]
     zero = np.flatnonzero((ends[:, 0] == ends[:, 1]).all(axis=1))
     if len(zero):
         raise MisuseError(name, f"segment {zero[0]} of zero length", "two different end positions")

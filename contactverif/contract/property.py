@@ -19,6 +19,7 @@ from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.engine_subject import SOLVE, EngineSubject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import clean, refuse
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -29,7 +30,6 @@ LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says
 NONE_UNDECIDED = 3 / 2300
 # The reason of a case that is not asked of a formulation of open chains (`Abilities.chains`): no case to be judged.
 CLOSED_CHAIN = "a chain is closed, and the formulation takes open ones"
-PLANE = 2  # The number of coordinates of all interfaces.
 WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
 WITH_BARRIER = WITHOUT_BARRIER | {"barrier"}
 

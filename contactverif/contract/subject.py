@@ -23,7 +23,7 @@ from contactverif.contract.errors import ContractError, MisuseError, NonFiniteEr
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.foreign_text import describe_error, name_line, one_line, place_of_error
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 
@@ -131,14 +131,18 @@ class Subject:
         Returns
         -------
         float
-            The stiffness ε̂ itself; for a nodal formulation ε̂ × the mean length of the slave segments in the reference.
+            The stiffness ε̂ itself; for a nodal formulation ε̂ × the mean length of the slave segments in the reference,
+            and in space ε̂ × the slave's area over the number of its nodes.
         """
         return self._convert(case.interface, case.penalty)
 
     def _convert(self, interface: Interface, penalty: float) -> float:
         if self.traits.rules.penalty != "nodal":
             return penalty
-        return penalty * float(interface.slave.lengths(interface.nodes).mean())
+        measures = interface.slave.measures(interface.nodes)
+        if interface.dim == PLANE:
+            return penalty * float(measures.mean())
+        return penalty * float(measures.sum()) / interface.n_slave_nodes
 
     def for_interface(self, interface: Interface, penalty: float) -> CheckedFormulation:
         """Return the formulation with a distributed penalty ε̂ on the meshes of an interface."""

@@ -170,7 +170,10 @@ class Abilities:
     Attributes
     ----------
     dimensions : tuple[int, ...]
-        The numbers of coordinates. A formulation without 2 is asked nothing about plane interfaces.
+        The numbers of coordinates. A formulation without 2 is asked nothing about plane interfaces, and one without 3
+        nothing about interfaces in space.
+    faces : tuple[int, ...]
+        The numbers of corners of the faces in space that it takes: 3, triangles; 4, quadrilaterals; or both.
     batched : bool
         ``residual`` takes a batch of states, z (..., n_unknowns), in one call. Otherwise the harness loops.
     takes_complex : bool
@@ -184,6 +187,7 @@ class Abilities:
     """
 
     dimensions: tuple[int, ...] = (2,)
+    faces: tuple[int, ...] = (3,)
     batched: bool = False
     takes_complex: bool = False
     takes_longdouble: bool = False
@@ -194,6 +198,8 @@ class Abilities:
         _check_values(self, "abilities")
         if self.dimensions not in ((2,), (3,), (2, 3)):
             raise ContractError(f"Traits.abilities.dimensions: found {self.dimensions!r}; needed (2,), (3,) or (2, 3)")
+        if self.faces not in ((3,), (4,), (3, 4)):
+            raise ContractError(f"Traits.abilities.faces: found {self.faces!r}; needed (3,), (4,) or (3, 4)")
 
 
 @dataclass(frozen=True, slots=True)

@@ -188,7 +188,7 @@ class Host:
                 self._forgotten.append(self._number)
                 return self._number
         else:
-            meshes = item.nodes, item.slave.segments, item.master.segments
+            meshes = item.nodes, item.slave.faces, item.master.faces
             self._queue.append((ShareInterface(self._next_number(), *map(PackedArray.pack, meshes)), None))
         self._shelf[id(item)] = item, self._number
         if len(self._shelf) > _SHELF:

@@ -60,8 +60,7 @@ def parse_traits(table: Any, place: str) -> Traits:
     for name in values:
         if name not in Traits().by_name() or name in _FORBIDDEN:
             raise unknown_name_error(place, name, set(Traits().by_name()) - {*_FORBIDDEN})
-    if "dimensions" in values:
-        values["dimensions"] = tuple(values["dimensions"])
+    values |= {name: tuple(values[name]) for name in ("dimensions", "faces") if name in values}
     try:
         return Traits().revise(**values)
     except (ContractError, TypeError) as error:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contactverif import ContactPoints, ContractError, Interface, MisuseError, Pairing
-from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits, traits_behind
+from contactverif.contract.traits import Abilities, PatchPromises, Promises, Rules, Traits, traits_behind
 
 PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns
 
@@ -137,10 +137,22 @@ def test_points_lie_on_the_slave_and_are_no_means_unless_they_say_so() -> None:
     assert (second.weighted.tolist(), second.on_master.tolist(), second.c.shape) == ([True], [True], (1,))
 
 
+def test_points_on_faces_have_shape_functions_and_no_places_on_segments() -> None:
+    plane = points()
+    names = ("slave_segment", "master_segment", "position", "normal", "gap", "pressure", "weight", "active")
+    shapes = {"slave_shape": np.full((2, 3), 1 / 3), "master_shape": np.full((2, 4), 0.25)}
+    whole = ContactPoints.on_faces(**{name: getattr(plane, name) for name in names}, **shapes)
+    for name in ("c", "xi", "area_from", "area_to"):
+        assert np.isnan(getattr(whole, name)).tolist() == [True, True]
+    assert whole.select(np.array([1])).master_shape.tolist() == [[0.25] * 4]
+    assert plane.slave_shape.shape == plane.master_shape.shape == (2, 0)
+    with pytest.raises(MisuseError, match=r"ContactPoints.slave_shape: found shape \(1, 3\); needed \(2, n_corners\)"):
+        points(slave_shape=np.ones((1, 3)))
+
+
 def test_no_contact_points() -> None:
     none = {entry.name: [] for entry in fields(ContactPoints)} | {
-        "position": np.empty((0, 2)),
-        "normal": np.empty((0, 2)),
+        name: np.empty((0, 2)) for name in ("position", "normal", "slave_shape", "master_shape")
     }
     assert len(ContactPoints(**none).gap) == 0  # type: ignore[arg-type]
 
@@ -162,6 +174,15 @@ def test_no_contact_points() -> None:
 def test_broken_contact_points(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(MisuseError, match=message):
         points(**changed)
+
+
+def test_a_formulation_in_space_says_which_faces_it_takes() -> None:
+    assert Traits().abilities.faces == (3,)
+    assert Abilities(dimensions=(2, 3), faces=(3, 4)).faces == (3, 4)
+    with pytest.raises(
+        ContractError, match=r"Traits.abilities.faces: found \(4, 3\); needed \(3,\), \(4,\) or \(3, 4\)"
+    ):
+        Abilities(faces=(4, 3))
 
 
 def test_a_trait_is_revised_by_its_name_whatever_its_group() -> None:

@@ -103,7 +103,7 @@ def test_nodes_of_both_sides_may_coincide() -> None:
 
 SURFACES = {
     "flat list": ([0, 1], r"segments: found an array of shape \(2,\); needed shape \(n_segments, 2\)"),
-    "three nodes": ([[0, 1, 2]], r"segments: found an array of shape \(1, 3\)"),
+    "five nodes": ([[0, 1, 2, 3, 4]], r"segments: found an array of shape \(1, 5\)"),
     "empty": (np.empty((0, 2), dtype=int), r"segments: found an array of shape \(0, 2\); needed .* n_segments ≥ 1"),
     "ragged": ([[0, 1], [2]], "segments: found rows of different lengths; needed an array"),
     "floats": ([[0.0, 1.0]], "segments: found dtype float64; needed integer node numbers"),
@@ -130,7 +130,11 @@ INTERFACES: dict[str, tuple[Callable[[], Interface], str]] = {
     "infinity": (lambda: interface(moved_nodes(4, 0, -np.inf)), r"nodes: found node 4 at \(0.0, -inf\)"),
     "three coordinates": (
         lambda: interface(np.zeros((5, 3))),
-        r"nodes: found an array of shape \(5, 3\); needed shape",
+        "slave: found faces of 2 corners and nodes with 3 coordinates; needed segments in the plane",
+    ),
+    "four coordinates": (
+        lambda: interface(np.zeros((5, 4))),
+        r"nodes: found an array of shape \(5, 4\); needed shape",
     ),
     "flat": (lambda: interface(np.zeros(10)), r"nodes: found an array of shape \(10,\)"),
     "ragged": (lambda: Interface([[0, 0], [1]], surface((0, 1)), surface((2, 3))), "nodes: found rows of different"),  # type: ignore[arg-type]
