@@ -146,12 +146,12 @@ class ContactPoints:
             if raw.dtype != dtype and raw.size and not np.can_cast(raw.dtype, dtype, casting="safe"):
                 raise MisuseError(f"ContactPoints.{name}", f"dtype {raw.dtype}", dtype.name)
             if raw.ndim == 0 and name in _FOR_ALL_POINTS:
-                raw = np.full((n_points, 0) if n_axes == 2 else n_points, raw)
+                raw = np.full((n_points, 0)[:n_axes], raw)
             values: NDArray[Any] = freeze(raw, dtype.type)
             if values.ndim != n_axes or len(values) != n_points:
-                second = "n_corners" if name.endswith("shape") else "dim"
-                needed = f"({n_points}, {second})" if n_axes == 2 else f"({n_points},)"
-                raise MisuseError(f"ContactPoints.{name}", f"shape {values.shape}", needed)
+                raise MisuseError(
+                    f"ContactPoints.{name}", f"shape {values.shape}", _needed_shape(name, n_points, n_axes)
+                )
             object.__setattr__(self, name, values)
 
     @classmethod
@@ -180,6 +180,12 @@ class ContactPoints:
     def select(self, selection: BoolArray | IntArray) -> ContactPoints:
         """Return some of the points, selected by mask (n_points,) or by number."""
         return ContactPoints(**{name: getattr(self, name)[selection] for name, *_ in _COLUMNS})
+
+
+def _needed_shape(name: str, n_points: int, n_axes: int) -> str:
+    """Return the shape of a field, in words."""
+    second = "n_corners" if name.endswith("shape") else "dim"
+    return f"({n_points}, {second})" if n_axes == 2 else f"({n_points},)"
 
 
 _OF_TWO_AXES = ("position", "normal", "slave_shape", "master_shape")

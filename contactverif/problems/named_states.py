@@ -16,6 +16,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
+from contactverif.problems.surface_states import SURFACE_STATES
 
 _PENETRATION = 2.0**-4
 _LENGTHS: dict[str, tuple[Sequence[float], Sequence[float]]] = {
@@ -121,6 +122,7 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "offset-c": _offset_case_c,
     "moved": _moved_case_c,
     "sliding": _slide_over_vertices,
+    **SURFACE_STATES,
 }
 FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)
 NAMED: tuple[str, ...] = (*FLAT_NAMES, *_OTHERS)
