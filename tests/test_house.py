@@ -92,6 +92,7 @@ ROOMS = {
     # The three folders of extension points. The judge shares no code with the judged.
     "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
+    "contactverif_surfaces": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
     # An engine writes files and starts programs; its code is imported inside `solve`.
     "contactverif_engines": Room(
         ("contract",),

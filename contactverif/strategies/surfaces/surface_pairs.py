@@ -1,0 +1,83 @@
+"""Two grids of triangles, one over the other in one plane: a master that is larger and turned, or on the same domain.
+
+The slave lies over the square [0, 1]². A stretch makes needles of both: all coordinates across are multiplied by a
+power of two, which rounds none of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.interface import Interface, Surface
+from contactverif.strategies.panels import on_lattice
+from contactverif.strategies.surfaces.surface_grids import SurfaceGrid, surface_grids
+
+_SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+_STRETCHES = st.sampled_from([0] * 7 + [1, 2, 4, 6, 8, 12])  # Exponents of the aspect ratio.
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacePair:
+    """A slave grid and a master grid, at rest in the plane z = 0."""
+
+    slave: SurfaceGrid
+    master: SurfaceGrid
+    same_domain: bool  # The master covers the slave's square exactly; else [−1/2, 3/2]², turned about its middle.
+    degrees: int  # The turn of a larger master.
+    stretch: int  # Coordinates across are multiplied by 2^-stretch.
+    shuffle: int  # The numbering of nodes and faces; 0 for that of the grids.
+
+    def lay_out(self) -> tuple[Interface, FloatArray, FloatArray]:
+        """Return the interface, the plane coordinates (n_nodes, 2) of its nodes, and the corners of the slave's domain.
+
+        The slave's body is above, so that its faces are seen from below.
+        """
+        factors = np.array([1.0, 2.0**-self.stretch])
+        slave, master = self.slave.points(), self._master_points()
+        plane = np.vstack([slave, master]) * factors
+        faces = [self.slave.triangles()[:, ::-1], self.master.triangles() + len(slave)]
+        plane, faces = self._renumber(plane, faces, len(slave))
+        nodes = np.column_stack([plane, np.zeros(len(plane))])
+        return Interface(nodes, Surface(faces[0]), Surface(faces[1])), plane, _SQUARE * factors
+
+    def _master_points(self) -> FloatArray:
+        """Return the master's nodes (n, 2) before the stretch."""
+        points = self.master.points()
+        if self.same_domain:
+            return points
+        angle = np.deg2rad(self.degrees)
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        return on_lattice((2 * points - 1) @ turn + 0.5)
+
+    def _renumber(self, plane: FloatArray, faces: list[IntArray], n_slave: int) -> tuple[FloatArray, list[IntArray]]:
+        """Return places (n_nodes, 2) and faces of both sides in other numbers, as the shuffle says."""
+        if not self.shuffle:
+            return plane, faces
+        random = np.random.default_rng(self.shuffle)
+        order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(len(plane) - n_slave)])
+        number = np.argsort(order)  # The new number of each node.
+        return plane[order], [
+            np.array([_start(row, random) for row in random.permutation(number[side])]) for side in faces
+        ]
+
+
+def _start(face: IntArray, random: np.random.Generator) -> IntArray:
+    """Return the corners of a face from another one on."""
+    return np.roll(face, int(random.integers(len(face))))
+
+
+@cache
+def surface_pairs(
+    *, same_domain: bool | None = None, most: int = 6, stretched: bool = True
+) -> SearchStrategy[SurfacePair]:
+    """Return pairs of grids; unless `same_domain` says which, half of them share their domain and half do not."""
+    same = st.booleans().map(lambda larger: not larger) if same_domain is None else st.just(same_domain)
+    grids, shuffle = surface_grids(most=most), st.one_of(st.just(0), st.integers(0, 255))
+    stretches = _STRETCHES if stretched else st.just(0)
+    return st.builds(SurfacePair, grids, grids, same, st.integers(0, 359), stretches, shuffle)

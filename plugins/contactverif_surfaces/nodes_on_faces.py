@@ -1,0 +1,166 @@
+"""Node-to-surface contact: a spring at each slave node, along the normal of the master face that it stands on.
+
+The foot of a node is the point of a master face straight below it; of the faces that have one, the nearest counts. The
+force is split by the shape functions of the foot. Neither the same stiffness at each node nor that of the area around
+it transmits a uniform pressure between meshes that do not match.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy import sparse
+
+from contactverif.contract.arrays import Array, FloatArray, IntArray
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Interface
+from contactverif.contract.option_checks import check_penalty
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.traits import Traits
+from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pushes
+from contactverif_surfaces.face_pairs import positions_of
+from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
+from contactverif_surfaces.plane_shapes import cross_plane, evaluate_shapes
+from contactverif_surfaces.surface_traits import SURFACE_TRAITS
+
+PAST_BORDER = 1e-9  # A foot past the border of a face by this share of it still counts.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodesOnFaces:
+    """The formulation: a force −ε g, or −ε̂ g A with the area A of a node, at each slave node with a gap g < 0."""
+
+    traits: Traits
+    penalty: float  # Nodal stiffness ε, or distributed stiffness ε̂ with areas.
+    by_area: bool
+
+    def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
+        """Find the master face under each slave node, −1 for none, and the nodes in contact."""
+        slave = np.arange(interface.n_slave_nodes)
+        node, face = (part.reshape(-1) for part in np.meshgrid(slave, np.arange(len(interface.master)), indexing="ij"))
+        points = _feet(positions_of(np.array(z), _nodes_and_faces(interface, node, face)))
+        reached = points.slave_shape[:, 0].min(axis=1) >= -PAST_BORDER
+        distance = np.where(reached, np.abs(points.gap[:, 0]), np.inf).reshape(len(slave), -1)
+        home = np.where(np.isfinite(distance.min(axis=1)), distance.argmin(axis=1), -1)
+        gap = points.gap[:, 0].reshape(len(slave), -1)[slave, home]
+        return Pairing({"home": home, "active": (home >= 0) & (gap < 0)})
+
+    def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
+        """Compute the forces (..., n_unknowns)."""
+        active, nodes = self._in_contact(interface, pairing)
+        local = _forces(self.penalty, positions_of(z, nodes))
+        if self.by_area:
+            local = local * _node_areas(interface, z)[..., active, None]
+        return add_rows(local, unknowns_of(nodes), z.shape[-1])
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
+        """Compute the derivative of the residual: at fixed areas, and by the areas."""
+        active, nodes = self._in_contact(interface, pairing)
+        n, corners, places = interface.n_unknowns, positions_of(z, nodes), unknowns_of(nodes)
+        blocks = differentiate(partial(_forces, self.penalty), corners)
+        if not self.by_area:
+            return add_blocks(blocks, places, places, (n, n))
+        fixed = add_blocks(blocks * _node_areas(interface, z)[active, None, None], places, places, (n, n))
+        forces = _forces(self.penalty, corners)[..., None]
+        by_area = add_blocks(forces, places, active[:, None], (n, interface.n_slave_nodes))
+        faces = interface.slave.faces
+        slopes = differentiate(_corner_areas, positions_of(z, faces))
+        of_area = add_blocks(slopes, faces, unknowns_of(faces), (interface.n_slave_nodes, n))
+        return sparse.csr_array(fixed + by_area @ of_area)
+
+    def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
+        """Return the slave nodes with a foot, each on the first of its faces."""
+        nodes = np.flatnonzero(pairing["home"] >= 0)
+        home, active, faces = pairing["home"][nodes], pairing["active"][nodes], interface.slave.faces
+        points = _feet(positions_of(z, _nodes_and_faces(interface, nodes, home)))
+        holds = faces[None] == nodes[:, None, None]  # (n_nodes, n_faces, n_corners)
+        carrier = holds.any(axis=2).argmax(axis=1)
+        return ContactPoints.on_faces(
+            slave_segment=carrier,
+            slave_shape=holds[np.arange(len(nodes)), carrier].astype(np.float64),
+            master_segment=home,
+            master_shape=points.slave_shape[:, 0],
+            position=z.reshape(-1, 3)[nodes],
+            normal=points.normal,
+            gap=points.gap[:, 0],
+            pressure=np.where(active, -self.penalty * points.gap[:, 0], 0.0),
+            weight=_node_areas(interface, z)[nodes] if self.by_area else np.ones(len(nodes)),
+            active=active,
+        )
+
+    def _in_contact(self, interface: Interface, pairing: Pairing) -> tuple[IntArray, IntArray]:
+        """Return the slave nodes in contact, and for each the nodes of its master face, then itself."""
+        active = np.flatnonzero(pairing["active"])
+        return active, _nodes_and_faces(interface, active, pairing["home"][active])
+
+
+def _nodes_and_faces(interface: Interface, nodes: IntArray, faces: IntArray) -> IntArray:
+    """Return the corners of master faces (n,), and behind them a node (n,) for each, (n, n_master_corners + 1)."""
+    return np.concatenate([interface.master.faces[faces], nodes[:, None]], axis=1)
+
+
+def _feet(corners: Array) -> CellPoints:
+    """Return the feet of nodes on faces (..., n, n_corners + 1, 3), the node last.
+
+    The face takes the place of the slave in the view, so that its normal is that of the gap.
+    """
+    view = SlaveView.of_corners(corners[..., :-1, :], corners[..., -1:, :])
+    shape = evaluate_shapes(view.slave, view.master)  # (..., n, 1, n_corners)
+    gap = view.master_height - (shape * view.slave_height[..., None, :]).sum(axis=-1)
+    whole = np.ones_like(gap)
+    return CellPoints(shape, whole[..., None], whole, gap, view.normal)
+
+
+def _forces(penalty: float, corners: Array) -> Array:
+    """Return the residuals (..., n, (n_corners + 1) · 3) of springs with a stiffness, for a unit area."""
+    points = _feet(corners)
+    return flatten_pushes(*points.push(-penalty * points.gap))
+
+
+def _corner_areas(corners: Array) -> Array:
+    """Return the area (..., n_faces, n_corners) of each corner of faces (..., n_faces, n_corners, 3): equal shares."""
+    n_corners = corners.shape[-2]
+    plane = SlaveView.of_corners(corners, corners[..., :1, :]).slave
+    arms = plane[..., 1:, :] - plane[..., :1, :]
+    area = cross_plane(arms[..., :-1, :], arms[..., 1:, :]).sum(axis=-1) / 2
+    return np.repeat(area[..., None] / n_corners, n_corners, axis=-1)
+
+
+def _node_areas(interface: Interface, z: Array) -> Array:
+    """Return the areas (..., n_slave_nodes) around the slave nodes: an equal share of each face at a node."""
+    faces = interface.slave.faces
+    return add_rows(_corner_areas(positions_of(z, faces)), faces, interface.n_slave_nodes)
+
+
+def nts_3d(*, penalty: float) -> NodesOnFaces:
+    """Node to surface: a spring of the same stiffness at each slave node. It fails the patch test.
+
+    Parameters
+    ----------
+    penalty : float
+        Nodal stiffness ε > 0, force per length of penetration.
+    """
+    traits = _TRAITS.revise(penalty="nodal", area=None)
+    return NodesOnFaces(traits, check_penalty(penalty), by_area=False)
+
+
+def nts_ar_3d(*, penalty: float) -> NodesOnFaces:
+    """Node to surface with the area around each node, an equal share of each face there. It fails the patch test.
+
+    Parameters
+    ----------
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per area per length of penetration.
+    """
+    return NodesOnFaces(_TRAITS, check_penalty(penalty), by_area=True)
+
+
+_TRAITS = SURFACE_TRAITS.revise(
+    flat=False,
+    gap="closest point",
+    force_along="master normal",
+    witnesses={"patch": "crossed-diagonals", "symmetric": "tilted-faces"},
+    source="here, after Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Sections 4.1 and 4.2",
+)

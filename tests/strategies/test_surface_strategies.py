@@ -1,0 +1,75 @@
+"""Random interfaces in space are what they say: a covered slave, exact places, contact, and two squares at the end."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import Phase, find, settings
+from hypothesis.strategies import SearchStrategy
+
+from contactverif import Case
+from contactverif.contract.arrays import FloatArray
+from contactverif.oracle import uniform_surface_weights_exact
+from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
+
+STRATEGIES: list[Callable[[], SearchStrategy[Case]]] = [flat_surface_cases, surface_cases, smooth_surface_cases]  # type: ignore[list-item]
+
+
+def collect(strategy: Callable[[], SearchStrategy[Case]], count: int) -> tuple[Case, ...]:
+    return draw_cases(strategy(), seed="surfaces", examples=count).cases
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_the_first_case_is_a_square_on_a_square(strategy: Callable[[], SearchStrategy[Case]]) -> None:
+    first = collect(strategy, 1)[0]
+    assert (len(first.interface.slave), len(first.interface.master)) == (2, 2)
+    assert first.interface.dim == 3
+
+
+def test_it_shrinks_to_few_faces() -> None:
+    fast = settings(max_examples=200, derandomize=True, database=None, phases=[Phase.generate, Phase.shrink])
+    case = find(flat_surface_cases(), lambda case: len(case.interface.master) >= 4, settings=fast)  # type: ignore[arg-type]
+    assert len(case.interface.slave) + len(case.interface.master) <= 6
+    assert case.parameter("penetration") <= 0.25
+    assert (case.penalty, case.seed) == (1, 0)
+
+
+def areas(case: Case, faces: np.ndarray) -> FloatArray:
+    plane = case.parameters["plane"][faces]
+    first, second = plane[:, 1] - plane[:, 0], plane[:, 2] - plane[:, 0]
+    turns: FloatArray = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return turns
+
+
+def test_a_flat_master_covers_its_slave_and_faces_it() -> None:
+    larger = []
+    for case in collect(flat_surface_cases, 100):  # type: ignore[arg-type]
+        interface, n_slave = case.interface, case.interface.n_slave_nodes
+        assert (areas(case, interface.slave.faces) < 0).all()
+        assert (areas(case, interface.master.faces) > 0).all()
+        weights = uniform_surface_weights_exact(interface, case.parameters["plane"], case.parameters["domain"])
+        assert sum(weights[:n_slave]) == sum(weights[n_slave:])
+        heights = case.positions @ case.parameters["normal"]
+        gap = heights[:n_slave].mean() - heights[n_slave:].mean()
+        assert gap == pytest.approx(-case.parameter("penetration"), rel=1e-6)
+        larger.append(np.ptp(interface.nodes[n_slave:, 0]) > 1.5 * np.ptp(interface.nodes[:n_slave, 0]))
+    assert 0.2 < np.mean(larger) < 0.8
+
+
+@pytest.mark.parametrize("strategy", [surface_cases, smooth_surface_cases])
+def test_nearly_all_states_are_in_contact(strategy: Callable[[], SearchStrategy[Case]]) -> None:
+    """The slave turns about the middle of its square, which lies below the master."""
+    from contactverif_surfaces import sts_3d
+
+    forces = []
+    for case in collect(strategy, 60):
+        springs = sts_3d(penalty=1.0)
+        forces.append(np.abs(springs.residual(case.interface, springs.pair(case.interface, case.z), case.z)).sum())
+    assert np.mean(np.array(forces) > 0) >= 0.95
+
+
+def test_there_are_none_on_an_interface_of_the_user() -> None:
+    case = collect(flat_surface_cases, 1)[0]  # type: ignore[arg-type]
+    assert flat_surface_cases(case.interface) is None
+    assert surface_cases(case.interface) is None
