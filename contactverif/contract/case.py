@@ -136,10 +136,14 @@ class Case:
         return min(self.shortest_segment, gap, activation - gap)
 
     @property
+    def slave_measure(self) -> float:
+        """The current length of the slave surface, in space its area: what turns a pressure into a force."""
+        return float(self.interface.slave.measures(self.positions).sum())
+
+    @property
     def slave_length(self) -> float:
         """The current length of the slave surface, in space the root of its area; L in the tolerances."""
-        measure = float(self.interface.slave.measures(self.positions).sum())
-        return measure if self.interface.dim == PLANE else sqrt(measure)
+        return self.slave_measure if self.interface.dim == PLANE else sqrt(self.slave_measure)
 
     @property
     def diameter(self) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
+from functools import cache
 from importlib import import_module
 from inspect import getdoc
 from math import isfinite
@@ -120,6 +121,7 @@ class OtherAttributes(TypedDict, total=False):
     bodies: bool
     engines: bool
     exact: Callable[[Case], FloatArray] | None
+    cases_in_space: Callable[[Any], Any] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +132,9 @@ class Property(PropertyInfo):
     ----------
     cases : Callable[[Any], Any]
         The cases, a `Cases`.
+    cases_in_space : Callable[[Any], Any] | None
+        The cases on interfaces in space, a `Cases` with a stored name of its own; None if the question is about plane
+        interfaces alone.
     measure : Callable[[Case, Subject], Measurement]
         Measures one case; it raises what the plugin raises.
     promise : Callable[[Traits], bool | None]
@@ -165,6 +170,7 @@ class Property(PropertyInfo):
     engines: bool = False
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""
+    cases_in_space: Callable[[Any], Any] | None = None
 
     @classmethod
     def define(
@@ -194,6 +200,15 @@ class Property(PropertyInfo):
         """The plain data alone."""
         return PropertyInfo(**{part.name: getattr(self, part.name) for part in fields(PropertyInfo)})
 
+    def for_traits(self, traits: Traits) -> Property:
+        """Return the property with the cases that a formulation of these traits takes: in the plane, or in space.
+
+        A formulation that takes both is asked in the plane.
+        """
+        if PLANE in traits.abilities.dimensions or self.cases_in_space in (None, self.cases):
+            return self
+        return _in_space(self)
+
     def refusal_of(self, subject: Subject) -> str:
         """Return why the property is not asked of a formulation or an engine, or an empty string."""
         if isinstance(subject, EngineSubject) and not self.engines:
@@ -205,7 +220,10 @@ class Property(PropertyInfo):
     def refusal(self, traits: Traits) -> str:
         """Return why the property is not asked of a formulation of these traits, or an empty string."""
         if PLANE not in traits.abilities.dimensions:
-            return "the interfaces are plane, and the formulation takes none of them"
+            if self.cases_in_space is None:
+                return "the interfaces are plane, and the formulation takes none of them"
+            if traits.rules.enforcement == "barrier":
+                return "the states in space penetrate, where a barrier is not defined"
         if traits.rules.enforcement in self.asks:
             if traits.rules.enforcement == "barrier" and traits.rules.activation is None:
                 return "the barrier does not state the trait `activation`, so no gap is known"
@@ -223,6 +241,13 @@ class Property(PropertyInfo):
         values = {part.name: getattr(self, part.name) for part in fields(self)}
         changes = {name: value for name, value in values.items() if value is not getattr(at_home, name)}
         return _find_defined, (module, name, changes)
+
+
+@cache
+def _in_space(question: Property) -> Property:
+    """Return a property with its cases in space, the same object at each call."""
+    assert question.cases_in_space is not None
+    return replace(question, cases=question.cases_in_space)
 
 
 def _find_defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:

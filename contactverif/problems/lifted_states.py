@@ -16,7 +16,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import ACTIVATION, LEAST_GAP, Case
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.property import CLOSED_CHAIN
 from contactverif.contract.traits import Traits
 
@@ -38,6 +38,8 @@ def activation_distance(interface: Interface, traits: Traits) -> float:
 
 def fit_to_traits(case: Case, traits: Traits) -> tuple[Case, str]:
     """Return a state as a formulation with these traits takes it, and why it takes none, or an empty string."""
+    if case.interface.dim != PLANE:
+        return case, ""
     if traits.abilities.chains == "open" and any(map(_is_closed, (case.interface.slave, case.interface.master))):
         return case, CLOSED_CHAIN
     if traits.rules.enforcement != "barrier" or ACTIVATION in case.parameters:

@@ -141,17 +141,19 @@ def _open_rows(
     """Return the rows as a run of today would begin them."""
     subject_of = {subject.name: subject for subject in subjects}
     question_of = {question.id: question for question in questions}
-    source_of = {question.id: sampling.source(question) for question in questions}
+    pairs = [(question_of[row.property_id], subject_of[row.formulation]) for row in run.rows]
+    variants = [question.for_traits(subject.traits) for question, subject in pairs]
+    source_of = {question: sampling.source(question) for question in dict.fromkeys(variants)}
     return [
         open_row(
             subject_of[row.formulation],
-            question_of[row.property_id],
-            source_of[row.property_id],
+            question,
+            source_of[question],
             row.known,
             sampling,
             row.reason.removeprefix(OMITTED) if row.omitted else "",
         )
-        for row in run.rows
+        for row, question in zip(run.rows, variants, strict=True)
     ]
 
 

@@ -21,6 +21,7 @@ from contactverif.contract.errors import ContractError, NonFiniteError, PluginEr
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
 from contactverif.contract.foreign_text import describe_error, place_of_error
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import (
     CLOSED_CHAIN,
     Outcome,
@@ -37,6 +38,7 @@ from contactverif.problems.named_states import named_case
 from contactverif.sampling.blas_threads import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
+IN_SPACE = "crossed-diagonals"  # The same in space.
 # The state of the first answers. Its lengths of 3.2 and 2.8 are rounded: on A1 single precision makes no error.
 FIRST = "c-prime"
 RAISED = "the property raised "
@@ -179,16 +181,18 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     """
     if isinstance(subject, EngineSubject):
         return FirstCall()  # It has no forces to ask for.
-    first_case, refused = fit_to_traits(named_case(FIRST), subject.traits)
+    in_plane = PLANE in subject.traits.abilities.dimensions
+    first_case, refused = fit_to_traits(named_case(FIRST if in_plane else IN_SPACE), subject.traits)
     if refused:
         return FirstCall()  # A barrier whose activation is unknown is not defined in these states.
     try:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, first_case, parts)
-            opposite, seconds = _pulls_in_time(subject)
+            names = STATES if in_plane else (IN_SPACE,)
+            opposite, seconds = _pulls_in_time(subject, names[0])
             if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
-                seconds = min(seconds, _pulls_in_time(subject)[1])
-            opposite = opposite and all(_pulls(subject, name) for name in STATES[1:])
+                seconds = min(seconds, _pulls_in_time(subject, names[0])[1])
+            opposite = opposite and all(_pulls(subject, name) for name in names[1:])
             if "contact_points" in parts:
                 _call_contact_points(subject, first.case)
     except ContractError:
@@ -203,10 +207,10 @@ def _call_contact_points(subject: Subject, case: Case) -> None:
         formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
 
 
-def _pulls_in_time(subject: Subject) -> tuple[bool, float]:
-    """Return whether the forces pull on the first of `STATES`, and the seconds that it took."""
+def _pulls_in_time(subject: Subject, state: str) -> tuple[bool, float]:
+    """Return whether the forces pull on a state with a name, and the seconds that it took."""
     start = perf_counter()
-    pulls = _pulls(subject, STATES[0])
+    pulls = _pulls(subject, state)
     return pulls, perf_counter() - start
 
 
@@ -228,6 +232,10 @@ def _push(subject: Subject, case: Case) -> float:
     pressure = case.penalty * case.parameter("penetration")
     state = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure))
     residual = formulation.residual(interface, formulation.pair(interface, state.z), state.z)
-    x, y = case.parameters["direction"]
-    slave = -residual[: interface.n_unknowns].reshape(-1, 2)[: interface.n_slave_nodes]
-    return float((slave @ np.array([-y, x])).sum())
+    if interface.dim == PLANE:
+        x, y = case.parameters["direction"]
+        normal = np.array([-y, x])
+    else:
+        normal = case.parameters["normal"]
+    slave = -residual[: interface.n_unknowns].reshape(interface.nodes.shape)[: interface.n_slave_nodes]
+    return float((slave @ normal).sum())

@@ -446,6 +446,7 @@ def gap_of_rows(result: Run, names: Iterable[str], property_ids: Iterable[str]) 
 
 
 def _gap_of(row: Row, subject: Subject, question: Property, sampling: Sampling) -> str:
+    question = question.for_traits(subject.traits)
     source = sampling.source(question)
     if question.refusal_of(subject) or question.needs - subject.provides or source is None:
         without_cases = row.verdict in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED)

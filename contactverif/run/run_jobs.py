@@ -19,6 +19,7 @@ from operator import attrgetter
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
@@ -83,8 +84,13 @@ class RunJobs:
         self._rows: dict[tuple[str, str], OpenRow | Row] = {}
         # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
         self._groups: dict[tuple[str, bool], list[Property]] = {}
+        # The property that each formulation is asked: with cases in the plane, or in space.
+        self._variants: dict[tuple[str, str], Property] = {}
         for question in sorted(questions, key=_turn):
-            self._groups.setdefault(sampling.group(question), []).append(question)
+            variants = {(subject.name, question.id): question.for_traits(subject.traits) for subject in subjects}
+            self._variants |= variants
+            for variant in dict.fromkeys(variants.values()):
+                self._groups.setdefault(sampling.group(variant), []).append(variant)
         self._meter = RunMeter(subjects, questions, sampling)
         self._opposite_signs: set[str] = set()
         self._diagnoses: dict[str, str] = {}
@@ -204,6 +210,7 @@ class RunJobs:
                 self._stopped.get(subject.name, ""),
             )
             for subject, question in product(self._subjects, questions)
+            if question is self._variants[subject.name, question.id]
         }
         self._rows |= rows
         del self._groups[group]
@@ -218,7 +225,12 @@ class RunJobs:
         questions = chain.from_iterable(self._groups.values())
         for question, subject in product(questions, self._subjects):
             case = self._journal.earlier_failures.get((subject.name, question.id))
-            if case is None or subject.name in self._stopped or question.promise(subject.traits) is False:
+            if (
+                case is None
+                or question is not self._variants[subject.name, question.id]
+                or subject.name in self._stopped
+                or question.promise(subject.traits) is False
+            ):
                 continue
             before = Progress(subject.name, question.id, "asking again", 0, 1)
             self._report(before)
@@ -375,7 +387,8 @@ class RunJobs:
             name, property_id = row.subject.name, row.question.id
             self._report(Progress(name, property_id, "diagnosis", 0, 1))
             others = [wrong.property_id for wrong in wrong_rows(each.row for each in self._rows_of(row.subject))]
-            yield Job(diagnose, (row.subject, property_id, others), partial(self._add_diagnosis, name))
+            if PLANE in row.subject.traits.abilities.dimensions:  # The rules look at plane states.
+                yield Job(diagnose, (row.subject, property_id, others), partial(self._add_diagnosis, name))
             if self._shrink == "one" and (goal := row.goal()) is not None:
                 yield from self._shrink_row(row, goal)
 

@@ -29,7 +29,8 @@ class RunMeter:
         self._planned: dict[tuple[str, str], int] = {}
         self._cases, self._seconds = Counter[tuple[bool, bool]](), defaultdict[tuple[bool, bool], float](float)
         self._started: float | None = None
-        for subject, question in product(subjects, questions):
+        for subject, plain in product(subjects, questions):
+            question = plain.for_traits(subject.traits)
             if sampling.interface is not None and sampling.source(question) is None:
                 continue  # It has no cases on this mesh.
             is_list = sampling.interface is None and getattr(question.cases, "is_list", False)

@@ -148,7 +148,8 @@ def look_at_journal(
 ) -> None:
     """Judge a share of the outcomes without proof of a journal again; where one differs, none of its row counts."""
     samples, counts = [], {}
-    for subject, question in product(subjects, questions):
+    for subject, plain in product(subjects, questions):
+        question = plain.for_traits(subject.traits)
         if numbers := journal.unproven(subject.name, question.id):
             row = open_row(subject, question, sampling.source(question), "", sampling)
             if isinstance(row, OpenRow):

@@ -110,31 +110,55 @@ def unit_vectors(vectors: Array) -> Array:
 
 
 def gauss_points(view: SlaveView, codes: IntArray, n_points: int) -> CellPoints:
-    """Return the Gauss points of the triangles that each cell consists of, `n_points` on a triangle."""
+    """Return the Gauss points of each cell, `n_points` on each triangle between its middle and two corners.
+
+    Triangles around a corner would do as well where all of a cell is in contact. Where a part is open, their points
+    would depend on which corner is the first, and so on the numbers of the nodes.
+    """
     places, weights = GAUSS[n_points]
-    triangles, areas = _fan(view.cell_corners(codes))
+    corners = view.cell_corners(codes)
+    following = np.roll(corners, -1, axis=-2)
+    middle = np.broadcast_to(_middle(corners, following), corners.shape)
+    triangles = np.stack([middle, corners, following], axis=-2)
     points = np.einsum("qc,...tcd->...tqd", places, triangles)
     count = points.shape[-3] * n_points
-    flat = points.reshape(*points.shape[:-3], count, 2)
-    return view.points_at(flat, (areas[..., None] * weights).reshape(*areas.shape[:-1], count))
+    area = _areas(triangles)[..., None] * weights
+    return view.points_at(points.reshape(*points.shape[:-3], count, 2), area.reshape(*area.shape[:-2], count))
 
 
 def centre_points(view: SlaveView, codes: IntArray) -> CellPoints:
     """Return one point for each cell: its centroid, with the area of the cell."""
-    triangles, areas = _fan(view.cell_corners(codes))
-    start = triangles[..., :1, 0, :]
-    moments = areas[..., None] * ((triangles[..., 1, :] - start) + (triangles[..., 2, :] - start)) / 3
+    centre, area = _centroid(view.cell_corners(codes))
+    return view.points_at(centre, area[..., None])
+
+
+def _middle(corners: Array, following: Array) -> Array:
+    """Return a point in the middle of each cell (..., n_cells, 1, 2), the mean of its edges by their squared lengths.
+
+    It lies inside however thin the cell is, and corners that are listed twice do not count. The centroid of a cell
+    without area would be a quotient of two roundoffs.
+    """
+    weights = ((following - corners) ** 2).sum(axis=-1)[..., None]
+    total = weights.sum(axis=-2, keepdims=True)
+    middle: Array = (weights * (corners + following)).sum(axis=-2, keepdims=True) / np.where(total == 0, 1.0, 2 * total)
+    return np.where(total == 0, corners[..., :1, :], middle)
+
+
+def _centroid(corners: Array) -> tuple[Array, Array]:
+    """Return the centroids (..., n_cells, 1, 2) and the areas (..., n_cells) of cells (..., n_cells, n_corners, 2)."""
+    start = corners[..., :1, :]
+    first = np.broadcast_to(start, corners[..., 1:-1, :].shape)
+    areas = _areas(np.stack([first, corners[..., 1:-1, :], corners[..., 2:, :]], axis=-2))
+    moments = areas[..., None] * ((corners[..., 1:-1, :] - start) + (corners[..., 2:, :] - start)) / 3
     area = areas.sum(axis=-1)
     whole = np.where(np.abs(area.real) > _NO_AREA, area, 1.0)
-    return view.points_at(start + moments.sum(axis=-2, keepdims=True) / whole[..., None, None], area[..., None])
+    return start + moments.sum(axis=-2, keepdims=True) / whole[..., None, None], area
 
 
-def _fan(corners: Array) -> tuple[Array, Array]:
-    """Return the triangles (..., n_triangles, 3, 2) between the first corner and the other ones, and their areas."""
-    first = np.broadcast_to(corners[..., :1, :], corners[..., 1:-1, :].shape)
-    triangles = np.stack([first, corners[..., 1:-1, :], corners[..., 2:, :]], axis=-2)
-    edges = triangles[..., 1:, :] - triangles[..., :1, :]
-    return triangles, cross_plane(edges[..., 0, :], edges[..., 1, :]) / 2
+def _areas(triangles: Array) -> Array:
+    """Return the areas (...,) of triangles (..., 3, 2), positive if their corners run counter-clockwise."""
+    first = triangles[..., 0, :]
+    return cross_plane(triangles[..., 1, :] - first, triangles[..., 2, :] - first) / 2
 
 
 def _dot(arms: Array, axis: Array) -> Array:

@@ -228,6 +228,6 @@ def vts_ppt_3d(*, penalty: float) -> FaceQuarters:
     """
     source = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, the outlook"
     # A part that overhangs the master presses the slave with all its area, and the master with what is covered.
-    witnesses = {"symmetric": "tilted-faces", "balance": "tilted-faces"}
+    witnesses = {**SURFACE_TRAITS.evidence.witnesses, "balance": "tilted-faces"}
     traits = SURFACE_TRAITS.revise(conserves_force=False, conserves_moment=False, witnesses=witnesses, source=source)
     return FaceQuarters(traits, check_penalty(penalty))

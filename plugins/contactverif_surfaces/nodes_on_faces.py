@@ -142,7 +142,8 @@ def nts_3d(*, penalty: float) -> NodesOnFaces:
     penalty : float
         Nodal stiffness ε > 0, force per length of penetration.
     """
-    traits = _TRAITS.revise(penalty="nodal", area=None)
+    # The force is the derivative of ε g²/2, since the foot lies straight below the node.
+    traits = _TRAITS.revise(penalty="nodal", area=None, symmetric=True)
     return NodesOnFaces(traits, check_penalty(penalty), by_area=False)
 
 
@@ -161,6 +162,6 @@ _TRAITS = SURFACE_TRAITS.revise(
     flat=False,
     gap="closest point",
     force_along="master normal",
-    witnesses={"patch": "crossed-diagonals", "symmetric": "tilted-faces"},
+    witnesses={**SURFACE_TRAITS.evidence.witnesses, "patch": "crossed-diagonals"},
     source="here, after Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Sections 4.1 and 4.2",
 )

@@ -11,9 +11,10 @@ SURFACE_TRAITS = Traits(
         symmetric=False,
         conserves_force=True,
         conserves_moment=True,
+        unbiased=False,
         translation_stable=True,
     ),
     rules=Rules(gap="cells", force_along="slave normal", penalty="distributed", area="current"),
     abilities=Abilities(dimensions=(3,), faces=(3,), batched=True, takes_complex=True),
-    evidence=Evidence(witnesses={"symmetric": "tilted-faces"}),
+    evidence=Evidence(witnesses={"symmetric": "tilted-faces", "swap": "tilted-faces"}),
 )

@@ -10,15 +10,18 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
+from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import any_cases, freeze_state, random_directions
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import excuse_barrier, find_kink, measure_jump
+from contactverif_properties.shared.worst_force import COMPONENTS
 
 FORCE_IMBALANCE = roundoff.stated_gap_quantity("force imbalance")
 MOMENT_IMBALANCE = roundoff.stated_gap_quantity("moment imbalance")
@@ -32,7 +35,13 @@ WORK = Quantity(
 )
 
 
-_define = partial(Property.define, family="balance", cases=Cases.random(any_cases), asks=WITH_BARRIER)
+_define = partial(
+    Property.define,
+    family="balance",
+    cases=Cases.random(any_cases),
+    cases_in_space=Cases.random(surface_cases),
+    asks=WITH_BARRIER,
+)
 
 
 @_define(id="balance.force", quantities=(FORCE_IMBALANCE,), promise=lambda traits: traits.promises.conserves_force)
@@ -59,7 +68,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
         return measurement
     slave = -state.forces[: state.case.interface.n_slave_nodes].sum(axis=0)
     names = ("force on the master", "minus that on the slave")
-    place = "all nodes of a side together, x and y"
+    place = f"all nodes of a side together, {COMPONENTS[case.interface.dim]}"
     return replace(measurement, finding=Finding(place, tuple(-total - slave), tuple(-slave), "N", *names))
 
 
@@ -79,7 +88,10 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
     """
     state = freeze_state(case, subject)
     arms, forces = state.case.positions - state.case.positions.mean(axis=0), state.forces
-    moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
+    if case.interface.dim == PLANE:
+        moment = abs(float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()))
+    else:
+        moment = float(np.linalg.norm(np.cross(arms, forces).sum(axis=0)))
     return _judge(MOMENT_IMBALANCE, moment, case.diameter, state, subject.traits)
 
 
@@ -98,6 +110,7 @@ def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState,
     family="invariants",
     quantities=(ASYMMETRY, WORK),
     cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
     promise=lambda traits: traits.promises.symmetric,
     asks=WITH_BARRIER,
 )

@@ -11,11 +11,13 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
+from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import any_cases, ask_forces_and_tangents, freeze_state
 from contactverif_properties.shared.applicability import refuse_unstated_penalty
@@ -40,11 +42,11 @@ def refuse_unknown_unit(traits: Traits) -> str:
     return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"
 
 
-def penalty_power(traits: Traits) -> float:
-    """Return the power of a length in the penalty."""
+def penalty_power(traits: Traits, dim: int = PLANE) -> float:
+    """Return the power of a length in the penalty, so that forces grow with lengths and the tangent stays."""
     if traits.rules.enforcement == "barrier":
         return traits.rules.penalty_power or 0.0
-    return -1.0 if traits.rules.penalty == "distributed" else 0.0
+    return float(1 - dim) if traits.rules.penalty == "distributed" else 0.0
 
 
 _define = partial(Property.define, family="invariants", promise=lambda traits: True, asks=WITH_BARRIER)
@@ -54,6 +56,7 @@ _define = partial(Property.define, family="invariants", promise=lambda traits: T
     id="scaling",
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=Cases.random(any_cases),
+    cases_in_space=Cases.random(surface_cases),
     applicable=refuse_unknown_unit,
 )
 def scaling(case: Case, subject: Subject) -> Measurement:
@@ -74,7 +77,7 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
     """
-    interface, random = case.interface, np.random.default_rng(case.seed)
+    interface, random, dim = case.interface, np.random.default_rng(case.seed), case.interface.dim
     factor, n = 2.0 ** int(random.integers(-LARGEST_EXPONENT, LARGEST_EXPONENT + 1)), interface.n_unknowns
     distributed = subject.traits.rules.penalty == "distributed"
     state = freeze_state(case, subject)
@@ -82,31 +85,48 @@ def scaling(case: Case, subject: Subject) -> Measurement:
     z_there = np.concatenate([z[:n] * factor, z[n:] * (1.0 if distributed else factor)])
     case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
-    there = FrozenState.at(subject.with_penalty(penalty * factor ** penalty_power(subject.traits)), case_there)
+    there = FrozenState.at(
+        subject.with_penalty(penalty * factor ** penalty_power(subject.traits, interface.dim)), case_there
+    )
     (forces,), tangents = ask_forces_and_tangents(state)
     (forces_there,), tangents_there = ask_forces_and_tangents(there)
     forces, forces_there = forces[:n], forces_there[:n]
     changes = [Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
     if tangents:
         tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
-        changes.append(Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max())))
+        changes.append(
+            Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max()), dim=dim)
+        )
     tolerance = roundoff.segment_tolerance(case, forces, roundoff.rounding_distance(case, subject.traits))
     return Measurement(*judge_changes(changes, tolerance, [state]), idle=not forces.any())
 
 
 def turn_state(case: Case) -> tuple[Case, FloatArray]:
-    """Return a case with the nodes at Qx + c, and the rotation Q (2, 2); both are random by the seed of the case."""
+    """Return a case with the nodes at Qx + c, and the rotation Q (dim, dim), both random by the seed of the case."""
     random = np.random.default_rng(case.seed)
-    angle = random.uniform(-np.pi, np.pi)
-    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    positions = case.positions @ rotation.T + random.uniform(-1, 1, 2) * case.diameter
+    rotation = _draw_rotation(random, case.interface.dim)
+    positions = case.positions @ rotation.T + random.uniform(-1, 1, case.interface.dim) * case.diameter
     return replace(case, z=np.concatenate([positions.reshape(-1), case.multipliers])), rotation
+
+
+def _draw_rotation(random: np.random.Generator, dim: int) -> FloatArray:
+    """Return a rotation (dim, dim): by a random angle in the plane, and of a random quaternion in space."""
+    if dim == PLANE:
+        angle = random.uniform(-np.pi, np.pi)
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    quaternion = random.normal(size=4)
+    a, *axis = quaternion / np.linalg.norm(quaternion)
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: FloatArray = np.eye(3) + 2 * a * cross + 2 * cross @ cross
+    return rotation
 
 
 @_define(
     id="objectivity",
     quantities=(TURNED_FORCES, TURNED_TANGENT),
     cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
     applicable=lambda traits: (
         "normals are those of the reference configuration" if traits.abilities.motions == "small" else ""
     ),
@@ -147,7 +167,8 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     if tangents:
         tangent, tangent_there = tangents
         change = tangent_there - turn @ tangent @ turn.T
-        changes.append(Change("tangent", TURNED_TANGENT, change, float(np.abs(tangent).max())))
+        size = float(np.abs(tangent).max())
+        changes.append(Change("tangent", TURNED_TANGENT, change, size, dim=case.interface.dim))
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
     numbers, undecided = judge_changes(changes, tolerance, [state, there], largest)
     return Measurement(numbers, undecided, idle=not forces[:n].any())

@@ -11,16 +11,16 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import Measurement
 from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases
 from contactverif.strategies.straight import cases_over_a_body
+from contactverif.strategies.surfaces import smooth_surface_cases
 from contactverif_properties.shared.same_answer import TIE, Carry, compare, same_answer_quantities
 
-MIRROR = np.diag([-1.0, 1.0])
 IN_MIRROR = same_answer_quantities("in the mirror image")
 WITH_ROLES_EXCHANGED = same_answer_quantities("with roles exchanged")
 IN_OTHER_NUMBERS = same_answer_quantities("in other numbers")
@@ -33,21 +33,21 @@ BESIDE_OTHERS = same_answer_quantities("beside another body")
 def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> tuple[Case, Carry]:
     """Return a case with other numbers.
 
-    The new number of each node is `nodes` (n_nodes,), slave nodes before those of the master. The segments (n_segments,
-    2) of both sides have the old numbers of nodes.
+    The new number of each node is `nodes` (n_nodes,), slave nodes before those of the master. The segments or faces
+    (n_faces, n_corners) of both sides have the old numbers of nodes.
     """
     interface, old = case.interface, np.argsort(nodes)
     renumbered = Interface(interface.nodes[old], Surface(nodes[slave]), Surface(nodes[master]))
-    return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes)
+    return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes, np.eye(interface.dim))
 
 
 def mirror_case(case: Case) -> tuple[Case, Carry]:
     """Return the mirror image in the y-axis; segments run the other way, so that the body stays on the left."""
     interface = case.interface
-    sides = (Surface(side.segments[:, ::-1]) for side in (interface.slave, interface.master))
+    sides = (Surface(side.faces[:, ::-1]) for side in (interface.slave, interface.master))
     image = Interface(reflect(interface.nodes), *sides)
     return replace(case, interface=image, z=reflect(case.positions).reshape(-1)), Carry(
-        np.arange(len(image.nodes)), MIRROR
+        np.arange(len(image.nodes)), np.diag(_mirror_signs(interface.dim))
     )
 
 
@@ -56,18 +56,28 @@ def exchange_roles(case: Case) -> tuple[Case, Carry]:
     interface = case.interface
     n_slave, n_master = interface.n_slave_nodes, interface.n_nodes - interface.n_slave_nodes
     nodes = np.concatenate([n_master + np.arange(n_slave), np.arange(n_master)])
-    return renumber(case, nodes, interface.master.segments, interface.slave.segments)
+    return renumber(case, nodes, interface.master.faces, interface.slave.faces)
 
 
 def reflect(points: FloatArray) -> FloatArray:
-    """Return the points (n, 2), mirrored; no zero becomes −0."""
-    return points * [-1.0, 1.0] + 0.0
+    """Return the points (n, dim), mirrored; no zero becomes −0."""
+    return points * _mirror_signs(points.shape[1]) + 0.0
+
+
+def _mirror_signs(dim: int) -> FloatArray:
+    """Return the factors of the coordinates in the mirror: x changes its sign."""
+    return np.array([-1.0, *[1.0] * (dim - 1)])
 
 
 _define = partial(Property.define, family="invariants", promise=lambda traits: True, asks=WITH_BARRIER)
 
 
-@_define(id="mirror", quantities=IN_MIRROR, cases=Cases.random(smooth_cases))
+@_define(
+    id="mirror",
+    quantities=IN_MIRROR,
+    cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
+)
 def mirror(case: Case, subject: Subject) -> Measurement:
     """The mirror image of a state has the mirror image of its forces and of its tangent.
 
@@ -92,6 +102,7 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     id="swap",
     quantities=WITH_ROLES_EXCHANGED,
     cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
     promise=lambda traits: traits.promises.unbiased,
 )
 def swap(case: Case, subject: Subject) -> Measurement:
@@ -123,12 +134,19 @@ def renumbering_cases(
     return {ANY: smooth_cases(), CLOSED: closed_cases()} if interface is None else smooth_cases(interface)
 
 
-@_define(id="renumbering", quantities=IN_OTHER_NUMBERS, cases=Cases.by_kind(renumbering_cases), kinds=(ANY, CLOSED))
+@_define(
+    id="renumbering",
+    quantities=IN_OTHER_NUMBERS,
+    cases=Cases.by_kind(renumbering_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
+    kinds=(ANY, CLOSED),
+)
 def renumbering(case: Case, subject: Subject) -> Measurement:
     """Other numbers of nodes and segments, or another seam of a closed chain, change nothing.
 
     **Question.** Nodes and segments of a random state get other numbers. On closed rings the numbers go round, so that
-    the seam, where the last segment meets the first, is elsewhere. Are the forces on each node the old ones?
+    the seam, where the last segment meets the first, is elsewhere. In space each face begins at another one of its
+    corners, too. Are the forces on each node the old ones?
 
     **Why it matters.** A mesh generator numbers as it likes. A formulation that takes the next number for the next
     segment is right on one mesh and wrong on the same mesh from another program, or at the one seam of a ring.
@@ -152,13 +170,22 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
 
     n_slave = interface.n_slave_nodes
     nodes = np.concatenate([order(n_slave), n_slave + order(interface.n_nodes - n_slave)])
-    slave, master = interface.slave.segments, interface.master.segments
+    slave, master = interface.slave.faces, interface.master.faces
+    if interface.dim != PLANE:  # Which corner of a face is the first has no meaning.
+        slave, master = (_roll_corners(faces, random) for faces in (slave, master))
     renumbered = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
     measurement = compare(IN_OTHER_NUMBERS, subject, case, *renumbered)
     if measurement.undecided != TIE:
         return measurement
     # The numbers of segments may decide a tie. Those of nodes still must not matter.
     return compare(IN_OTHER_NUMBERS, subject, case, *renumber(case, nodes, slave, master))
+
+
+def _roll_corners(faces: IntArray, random: np.random.Generator) -> IntArray:
+    """Return faces (n_faces, n_corners) that begin at another one of their corners each."""
+    n_faces, n_corners = faces.shape
+    places = (np.arange(n_corners) + random.integers(n_corners, size=(n_faces, 1))) % n_corners
+    return np.take_along_axis(faces, places, axis=1)
 
 
 @random_source("contactverif_properties.remote.remote_cases")

@@ -23,6 +23,7 @@ from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
+from contactverif.strategies.surfaces import flat_surface_cases
 from contactverif_properties.shared import uniform_pressure
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
@@ -49,6 +50,7 @@ _define = partial(Property.define, family="patch")
     id="patch.flat.transmission",
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
+    cases_in_space=Cases.random(flat_surface_cases),
     promise=lambda traits: traits.promises.patch.flat,
     exact=uniform_pressure.forces_of_penetration,
     asks=WITH_BARRIER,
@@ -62,7 +64,8 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** This is the patch test on the interface alone. A formulation that fails it puts a pressure onto
     the bodies that is not there. Finer meshes do not help, because the error is made anew at every node.
 
-    **How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces.
+    **How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces,
+    and in space the largest |F − F_exact| over the largest exact force on a node.
     The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap
     is a difference of coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation,
     because the state is turned and moved, and stored as it is rounded; `stability.local` asks on states that are exact.
@@ -91,6 +94,7 @@ def refuse_unknown_total(traits: Traits) -> str:
     id="patch.flat.resultant",
     quantities=(TOTAL,),
     cases=Cases.random(flat_cases),
+    cases_in_space=Cases.random(flat_surface_cases),
     promise=lambda traits: None if refuse_unknown_total(traits) else True,
     applicable=refuse_unknown_total,
     usual_undecided=WITHOUT_TOLERANCE,
@@ -120,7 +124,7 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
     exact = uniform_pressure.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.rules.area == "reference":
-        exact = exact * stretch
+        exact = exact * stretch ** (interface.dim - 1)
     total = uniform_pressure.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
     error = float(np.linalg.norm(total - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)

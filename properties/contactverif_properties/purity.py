@@ -15,6 +15,7 @@ from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
 from contactverif.problems.lifted_states import fit_to_traits
 from contactverif.problems.named_states import named_case
+from contactverif.strategies.surfaces import surface_cases
 from contactverif_properties.shared import interleaved_calls
 from contactverif_properties.shared.any_state import any_cases, prepare_state
 from contactverif_properties.shared.roundoff import ratio
@@ -69,6 +70,7 @@ FIRST_TANGENT = Quantity(
     family="invariants",
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),
+    cases_in_space=Cases.random(surface_cases),
     promise=lambda traits: True,
     asks=WITH_BARRIER,
 )
@@ -185,7 +187,7 @@ def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) ->
         case 1:
             stays = np.arange(n_nodes) >= n_slave
     moves = np.ones(state.z.size, bool)
-    moves[: 2 * n_nodes] = np.repeat(~stays, 2)
+    moves[: state.interface.n_unknowns] = np.repeat(~stays, state.interface.dim)
     return np.where(moves, distant, state.z)
 
 
@@ -272,7 +274,7 @@ def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> 
     """
     way = float(np.abs(near - case.z).max())
     slope = float(np.abs(forces[1] - forces[0]).max()) / way if way > 0 else 0.0
-    stiffness = max(case.penalty * case.slave_length, slope)  # The slope counts where the law is stiffer than ε̂.
+    stiffness = max(case.penalty * case.slave_measure, slope)  # The slope counts where the law is stiffer than ε̂.
     largest = np.abs(forces).max(axis=-1)
     # Each state has its own size: where one of the two just touches, its forces say nothing about those of the other.
     moved = case.largest_coordinate * (stiffness + largest / case.resolution) + case.n_segments * largest
@@ -295,4 +297,4 @@ def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_
 
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
     """Return all bits of an interface."""
-    return interface.nodes.tobytes(), interface.slave.segments.tobytes(), interface.master.segments.tobytes()
+    return interface.nodes.tobytes(), interface.slave.faces.tobytes(), interface.master.faces.tobytes()

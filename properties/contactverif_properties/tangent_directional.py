@@ -18,6 +18,7 @@ from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import WITH_BARRIER, Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
+from contactverif.strategies.surfaces import smooth_surface_cases
 from contactverif_properties.shared.any_state import freeze_state, random_directions
 from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import differences_by_complex_step, groups_of
@@ -58,6 +59,7 @@ COMPLEX = Quantity(
     family="tangent",
     quantities=(CENTRAL, TAYLOR, COMPLEX),
     cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
     asks=WITH_BARRIER,
@@ -349,16 +351,18 @@ def defect_directions(directions: FloatArray, defects: FloatArray) -> FloatArray
 def _regions(case: Case) -> list[IntArray]:
     """Return the unknowns of each chain, and those of all multipliers."""
     nodes = [chain for side in (case.interface.slave, case.interface.master) for chain in _chains(side)]
-    regions = [np.sort(np.concatenate([2 * chain, 2 * chain + 1])) for chain in nodes]
+    dim = case.interface.dim
+    regions = [(dim * np.sort(chain)[:, None] + np.arange(dim)).reshape(-1) for chain in nodes]
     if case.n_multipliers:
         regions.append(np.arange(case.interface.n_unknowns, case.z.size))
     return regions
 
 
 def _chains(surface: Surface) -> list[IntArray]:
-    """Return the nodes of each chain of a surface."""
-    n_nodes = int(surface.segments.max()) + 1
-    links = csr_array((np.ones(len(surface)), tuple(surface.segments.T)), shape=(n_nodes, n_nodes))
+    """Return the nodes of each chain of a surface, or of each part of it that hangs together."""
+    n_nodes, corners = int(surface.faces.max()) + 1, surface.faces.T
+    edges = np.concatenate([corners[[k, k + 1]] for k in range(len(corners) - 1)], axis=1)
+    links = csr_array((np.ones(edges.shape[1]), tuple(edges)), shape=(n_nodes, n_nodes))
     _, label = csgraph.connected_components(links, directed=False)
     nodes = surface.nodes
     return [nodes[label[nodes] == number] for number in np.unique(label[nodes])]

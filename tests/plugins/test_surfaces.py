@@ -105,7 +105,8 @@ def test_a_batch_is_answered_as_state_by_state_and_pairings_hold_integers(name: 
     pairing.check_bounds(interface)
     batch = np.stack([case.z, case.z + 2.0**-20])
     together = formulation.residual(interface, pairing, batch)
-    assert np.array_equal(together[1], formulation.residual(interface, pairing, batch[1]))
+    alone = formulation.residual(interface, pairing, batch[1])
+    assert together[1] == pytest.approx(alone, abs=1e-14 * np.abs(alone).max())  # A batch may add in another order.
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -24,6 +24,7 @@ _SLOPES = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])
 _WARPS = st.lists(st.integers(-4, 4), min_size=1, max_size=9)  # Moves across in sixteenths of the least height.
 
 
+@random_source("contactverif.strategies.surfaces.tilted_surfaces.surface_cases")
 def surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return tilted and warped states, of which half have surfaces on the same domain, with all its ties."""
     return _tilted_states(surface_pairs(), smooth=False) if interface is None else None

@@ -45,7 +45,7 @@ def prepare_state(case: Case, subject: Subject) -> tuple[CheckedFormulation, Cas
 
 
 def move_state(case: Case, shift: FloatArray) -> Case:
-    """Return the case with state and reference moved by a vector (2,), a length each.
+    """Return the case with state and reference moved by a vector (dim,), a length each.
 
     The move is exact where every coordinate and its sum with the vector have at most 53 bits; the caller sees to that.
     """

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import PLANE, Interface
 from contactverif_properties.shared.frozen_state import FrozenState
 
 STEPS = (8.0, 1.0, 0.125)  # Steps over the one at which truncation and roundoff are equal.
@@ -30,11 +31,12 @@ COMPLEX_STEP = 2.0**-100  # The imaginary step over ℓ; its square vanishes.
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """The nodes and multipliers of a problem: a node has two unknowns, a multiplier has one."""
+    """The nodes and multipliers of a problem: a node has an unknown for each axis, a multiplier has one."""
 
     n_slave: int  # The numbers of slave nodes, of all nodes and of multipliers.
     n_nodes: int
     n_multipliers: int
+    dim: int = PLANE  # The number of unknowns of a node.
 
     @property
     def count(self) -> int:
@@ -44,18 +46,21 @@ class Groups:
     @property
     def size(self) -> int:
         """The number of unknowns."""
-        return 2 * self.n_nodes + self.n_multipliers
+        return self.dim * self.n_nodes + self.n_multipliers
 
     @property
     def of_unknowns(self) -> IntArray:
         """The node or multiplier (size,) that each unknown belongs to."""
-        return np.concatenate([np.arange(2 * self.n_nodes) // 2, self.n_nodes + np.arange(self.n_multipliers)])
+        return np.concatenate(
+            [np.repeat(np.arange(self.n_nodes), self.dim), self.n_nodes + np.arange(self.n_multipliers)]
+        )
 
     def largest(self, matrix: FloatArray) -> FloatArray:
         """Return the largest absolute entry of each block (count, count) of a matrix (size, size)."""
-        entries, behind = np.abs(matrix), 2 * self.n_nodes
-        rows = np.concatenate([np.maximum(entries[:behind:2], entries[1:behind:2]), entries[behind:]])
-        columns = np.maximum(rows[:, :behind:2], rows[:, 1:behind:2])
+        entries, dim, behind = np.abs(matrix), self.dim, self.dim * self.n_nodes
+        largest = np.maximum.reduce([entries[axis:behind:dim] for axis in range(dim)])
+        rows = np.concatenate([largest, entries[behind:]])
+        columns = np.maximum.reduce([rows[:, axis:behind:dim] for axis in range(dim)])
         return np.concatenate([columns, rows[:, behind:]], axis=1)
 
     def surroundings(self, blocks: FloatArray) -> FloatArray:
@@ -74,15 +79,15 @@ class Groups:
 
     def describe(self, unknown: int) -> str:
         """Return the kind and number of an unknown in words: "y of slave node 3"."""
-        if unknown >= 2 * self.n_nodes:
-            return f"multiplier {unknown - 2 * self.n_nodes}"
-        node, axis = divmod(unknown, 2)
-        return f"{'xy'[axis]} of {'slave' if node < self.n_slave else 'master'} node {node}"
+        if unknown >= self.dim * self.n_nodes:
+            return f"multiplier {unknown - self.dim * self.n_nodes}"
+        node, axis = divmod(unknown, self.dim)
+        return f"{'xyz'[axis]} of {'slave' if node < self.n_slave else 'master'} node {node}"
 
 
 def groups_of(case: Case) -> Groups:
     """Return the nodes and multipliers of a case."""
-    return Groups(case.interface.n_slave_nodes, case.interface.n_nodes, case.n_multipliers)
+    return Groups(case.interface.n_slave_nodes, case.interface.n_nodes, case.n_multipliers, case.interface.dim)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +126,7 @@ def plan_moves(case: Case, pattern: BoolArray) -> Moves:
         owner = np.full(groups.count, -1)
         for group in colour:
             owner[contacts.indices[contacts.indptr[group] : contacts.indptr[group + 1]]] = group
-        for axis in (0, 1):
+        for axis in range(groups.dim):
             moved = colour if axis == 0 else [group for group in colour if group < groups.n_nodes]
             columns = np.array([_unknown(groups, group, axis) for group in moved])
             if len(columns):
@@ -134,14 +139,16 @@ def plan_moves(case: Case, pattern: BoolArray) -> Moves:
 
 def _unknown(groups: Groups, group: IntArray | int, axis: int) -> IntArray:
     """Return the unknown of a node along an axis, or the one of a multiplier."""
-    return np.where(np.less(group, groups.n_nodes), np.multiply(group, 2) + axis, np.add(group, groups.n_nodes))
+    behind = (groups.dim - 1) * groups.n_nodes
+    return np.where(np.less(group, groups.n_nodes), np.multiply(group, groups.dim) + axis, np.add(group, behind))
 
 
 def _find_contacts(interface: Interface, groups: Groups, pattern: BoolArray) -> sparse.csr_array:
     """Return which nodes and multipliers (count, count) feel each other, as a symmetric matrix."""
     rows, columns = (groups.of_unknowns[index] for index in np.nonzero(pattern))
-    ends = [surface.segments.T for surface in (interface.slave, interface.master)]
-    first, second = np.concatenate(ends, axis=1)
+    corners = [surface.faces.T for surface in (interface.slave, interface.master)]
+    pairs = [side[[first, second]] for side in corners for first, second in combinations(range(len(side)), 2)]
+    first, second = np.concatenate(pairs, axis=1)
     itself = np.arange(groups.count)
     i = np.concatenate([rows, columns, first, second, itself])
     j = np.concatenate([columns, rows, second, first, itself])

@@ -53,8 +53,8 @@ class FrozenState:
 
     @property
     def forces(self) -> FloatArray:
-        """The position rows of the residual, (n_nodes, 2): the forces that pull the nodes back."""
-        return self.residual[: self.case.interface.n_unknowns].reshape(-1, 2)
+        """The position rows of the residual, (n_nodes, dim): the forces that pull the nodes back."""
+        return self.residual[: self.case.interface.n_unknowns].reshape(self.case.interface.nodes.shape)
 
     @cached_property
     def tangent(self) -> FloatArray:

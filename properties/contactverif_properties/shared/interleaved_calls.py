@@ -138,7 +138,7 @@ def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, Fl
     """
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     number = np.concatenate([np.arange(n_slave)[::-1], np.arange(n_slave, interface.n_nodes)[::-1]])
-    slave, master = (Surface(number[surface.segments]) for surface in (interface.slave, interface.master))
+    slave, master = (Surface(number[surface.faces]) for surface in (interface.slave, interface.master))
     other = Interface(2 * interface.nodes[number], slave, master)
     multipliers = np.resize(case.multipliers, formulation.n_multipliers(other))
     return other, np.concatenate([case.positions[number].reshape(-1), multipliers])

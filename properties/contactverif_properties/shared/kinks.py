@@ -19,6 +19,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import ACTIVATION, Case
+from contactverif.contract.interface import PLANE
 from contactverif.oracle import kink_margin
 from contactverif.problems.lifted_states import activation_margin
 from contactverif_properties.shared.any_state import random_directions
@@ -180,11 +181,11 @@ def excuse_barrier(state: FrozenState, longest: float, step: float, error: float
 def find_kink(state: FrozenState, reach: float, direction: FloatArray | None = None) -> str:
     """Return why a decision may change if each coordinate moves by `reach` at most, a length, or an empty string.
 
-    Where the formulation has no contact points, one-sided differences along a direction (n_unknowns,) are looked at. It
-    is random by the seed of the case, unless it is given.
+    Where the formulation has no contact points, or in space, one-sided differences along a direction (n_unknowns,) are
+    looked at. It is random by the seed of the case, unless it is given.
     """
     case = state.case
-    if state.has_points:
+    if state.has_points and case.interface.dim == PLANE:
         margin = min(
             kink_margin(
                 each.interface,

@@ -29,8 +29,8 @@ class Pass:
 
     @property
     def positions(self) -> FloatArray:
-        """The current positions (n_nodes, 2)."""
-        return self.z.reshape(-1, 2)
+        """The current positions (n_nodes, dim)."""
+        return self.z.reshape(self.interface.nodes.shape)
 
 
 def split_passes(case: Case, points: ContactPoints) -> Iterator[Pass]:

@@ -32,8 +32,8 @@ COORDINATE_ROUNDING = 64 * UNIT_ROUNDOFF  # A motion rounds each coordinate a fe
 
 
 def sum_slave_forces(case: Case, forces: Array) -> float:
-    """Return Σ|R| over the entries of the slave nodes of a residual, (n_unknowns, …) or (n_nodes, 2)."""
-    return float(np.abs(forces.reshape(-1)[: 2 * case.interface.n_slave_nodes]).sum())
+    """Return Σ|R| over the entries of the slave nodes of a residual, (n_unknowns, …) or (n_nodes, dim)."""
+    return float(np.abs(forces.reshape(-1)[: case.interface.dim * case.interface.n_slave_nodes]).sum())
 
 
 def sum_larger_forces(case: Case, forces: Array) -> float:
@@ -45,13 +45,15 @@ def sum_larger_forces(case: Case, forces: Array) -> float:
 def mean_penetration(case: Case, forces: Array) -> float:
     """Return the uniform penetration, a length, that would need the same Σ|R| over the slave: Σ|R| / (ε̂ L).
 
+    In space the area takes the place of the length L.
+
     Where half passes push the master alone, Σ|R| is that of the master. A barrier has no such penetration; its forces
     change over the gap, or over what is left of it to the activation distance.
     """
     if ACTIVATION in case.parameters:
         return case.resolution
     whole = sum_slave_forces(case, forces) or sum_larger_forces(case, forces)
-    return whole / (case.penalty * case.slave_length)
+    return whole / (case.penalty * case.slave_measure)
 
 
 def rounding_distance(case: Case, traits: Traits) -> float:

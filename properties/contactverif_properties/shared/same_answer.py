@@ -14,6 +14,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.oracle import default_points, nearest_segments
@@ -34,7 +35,7 @@ class Carry:
     """The way in which the first of two states becomes the second."""
 
     nodes: IntArray  # (n_nodes,) The number, in the second state, of each node of the first.
-    # (2, 2) What becomes of vectors: a force f becomes matrix · f.
+    # (dim, dim) What becomes of vectors: a force f becomes matrix · f.
     matrix: FloatArray = field(default_factory=lambda: np.eye(2))
 
 
@@ -47,7 +48,7 @@ def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
 
 
 def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tuple[FrozenState, FloatArray, FloatArray]:
-    """Return a state with uniform multipliers if there are any, its forces (n_nodes, 2) and tangent.
+    """Return a state with uniform multipliers if there are any, its forces (n_nodes, dim) and tangent.
 
     The tangent has the rows and columns of positions, and none where the plugin has no tangent.
     """
@@ -56,7 +57,7 @@ def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tup
         formulation = subject.with_penalty(1.0)
     state = FrozenState.with_multiplier(formulation, case, multiplier)
     (forces,), tangents = ask_forces_and_tangents(state)
-    return state, forces[:n].reshape(-1, 2), tangents[0][:n, :n] if tangents else np.empty((0, 0))
+    return state, forces[:n].reshape(case.interface.nodes.shape), tangents[0][:n, :n] if tangents else np.empty((0, 0))
 
 
 class Change(NamedTuple):
@@ -68,15 +69,16 @@ class Change(NamedTuple):
     size: float  # The size that the largest change counts over, in the unit of the change.
     # (n_nodes,) The number, in the second state, of each node of the change; None where both have the same numbers.
     nodes: IntArray | None = None
+    dim: int = PLANE  # The number of unknowns of a node.
 
     def worst_columns(self, number: int) -> IntArray:
         """Return the columns of the node, or the multiplier, with the largest change, in the first state or second."""
         n_columns = self.change.shape[-1]
-        node = int(np.abs(self.change).argmax()) % n_columns // 2
+        node = int(np.abs(self.change).argmax()) % n_columns // self.dim
         if self.nodes is None or number == 0:
-            return np.array([2 * node, min(2 * node + 1, n_columns - 1)])
-        other = 2 * int(self.nodes[node])
-        return np.array([other, other + 1])
+            columns: IntArray = np.minimum(self.dim * node + np.arange(self.dim), n_columns - 1)
+            return columns
+        return self.dim * int(self.nodes[node]) + np.arange(self.dim)
 
 
 def judge_changes(
@@ -122,11 +124,12 @@ def compare(
     size = max(roundoff.sum_larger_forces(case, forces), roundoff.sum_larger_forces(other, forces_there))
     changes = [Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
     if tangent.size:
-        places = (2 * carry.nodes[:, None] + [0, 1]).reshape(-1)
+        dim = case.interface.dim
+        places = (dim * carry.nodes[:, None] + np.arange(dim)).reshape(-1)
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
         change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
         size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
-        changes.append(Change("tangent", quantities[1], change, size, carry.nodes))
+        changes.append(Change("tangent", quantities[1], change, size, carry.nodes, dim))
     distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
     tolerance = roundoff.segment_tolerance(case, forces, distance)
     numbers, undecided = judge_changes(changes, tolerance, [first, second] if explain else [])
@@ -148,6 +151,8 @@ def _find_tie(state: FrozenState) -> str:
     A point in the normal cone of a re-entrant vertex is equally near to both segments there, wherever it is. By the
     rule "the nearest segment" alone, a formulation may take the one with the lower number.
     """
+    if state.case.interface.dim != PLANE:
+        return ""
     if state.has_points:
         passes = [(each.interface, each.z, each.points.position[each.points.active]) for each in state.passes]
     else:

@@ -9,11 +9,12 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.scene import Scene
-from contactverif.oracle import uniform_pressure_weights
+from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import gap_tolerance
@@ -21,7 +22,9 @@ from contactverif_properties.shared.worst_force import worst_force
 
 
 def normal_of(case: Case) -> FloatArray:
-    """Return the unit normal (2,) out of the master of a flat case: to the left of the way the slave runs."""
+    """Return the unit normal (dim,) out of the master of a flat case: in the plane, to the left of the slave's way."""
+    if case.interface.dim != PLANE:
+        return case.parameters["normal"]
     along = case.parameters["direction"]
     return np.array([-along[1], along[0]])
 
@@ -42,22 +45,26 @@ def gap_error(case: Case, penetration: float, size: float) -> float:
 
 
 def push_apart(case: Case, weights: FloatArray, pressure: float) -> FloatArray:
-    """Return the forces (n_nodes, 2) of a pressure over weights (n_nodes,), which push the two bodies apart."""
+    """Return the forces (n_nodes, dim) of a pressure over weights (n_nodes,), which push the two bodies apart."""
     sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
     return pressure * (sides * weights)[:, None] * normal_of(case)
 
 
 def consistent_forces(case: Case, pressure: float) -> FloatArray:
-    """Return the forces (n_nodes, 2) by which a uniform pressure pushes the nodes of a flat case, exactly.
+    """Return the forces (n_nodes, dim) by which a uniform pressure pushes the nodes of a flat case, exactly.
 
     They are p ∫N_i over the part of the line that both surfaces cover, in rationals. The parameters `along` (n_nodes,)
-    and `direction` (2,) say where the nodes lie on the line.
+    and `direction` (2,) say where the nodes lie on the line. In space `plane` (n_nodes, 2) says where they lie, and
+    `domain` is what both surfaces cover.
     """
+    if case.interface.dim != PLANE:
+        plane, domain = case.parameters["plane"], case.parameters["domain"]
+        return push_apart(case, uniform_surface_weights(case.interface, plane, domain), pressure)
     return push_apart(case, uniform_pressure_weights(case.interface, case.parameters["along"]), pressure)
 
 
 def forces_of_penetration(case: Case) -> FloatArray:
-    """Return the consistent forces (n_nodes, 2) of the pressure ε̂ |g| of a flat case with a uniform penetration."""
+    """Return the consistent forces (n_nodes, dim) of the pressure ε̂ |g| of a flat case with a uniform penetration."""
     return consistent_forces(case, case.penalty * case.parameter("penetration"))
 
 
@@ -69,14 +76,14 @@ def uniform_state(case: Case, subject: Subject, pressure: float | None = None) -
 
 
 def pushing_forces(state: FrozenState) -> FloatArray:
-    """Return the forces (n_nodes, 2) that push the nodes; if there are multipliers, those of the multipliers alone."""
+    """Return the forces (n_nodes, dim) that push the nodes; of multipliers, if there are any, theirs alone."""
     if state.case.n_multipliers:
-        return -(unit_forces(state) @ state.case.multipliers).reshape(-1, 2)
+        return -(unit_forces(state) @ state.case.multipliers).reshape(state.case.interface.nodes.shape)
     return -state.forces
 
 
 def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[FloatArray, float]:
-    """Return the forces (n_nodes, 2) of a state that penetrates uniformly, to be compared with the exact ones.
+    """Return the forces (n_nodes, dim) of a state that penetrates uniformly, to be compared with the exact ones.
 
     With multipliers only the distribution of the forces can be right or wrong, and not their size. Uniform multipliers
     count if they are pressures, scaled to the exact total. If they are nodal forces, those count that come nearest to
@@ -94,12 +101,12 @@ def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[Floa
         multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
         mean = float(np.abs(multipliers).mean())
         largest = float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
-        return (transfer @ multipliers).reshape(-1, 2), largest
-    return _scale_to_total((transfer @ state.case.multipliers).reshape(-1, 2), exact, n), 1.0
+        return (transfer @ multipliers).reshape(exact.shape), largest
+    return _scale_to_total((transfer @ state.case.multipliers).reshape(exact.shape), exact, n), 1.0
 
 
 def _scale_to_total(forces: FloatArray, exact: FloatArray, n_slave: int) -> FloatArray:
-    """Return forces (n_nodes, 2) times the factor with which those on the slave press as the exact ones do."""
+    """Return forces (n_nodes, dim) times the factor with which those on the slave press as the exact ones do."""
     total, exact_total = forces[:n_slave].sum(axis=0), exact[:n_slave].sum(axis=0)
     projection = float(total @ exact_total)
     return forces * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0)
@@ -108,10 +115,14 @@ def _scale_to_total(forces: FloatArray, exact: FloatArray, n_slave: int) -> Floa
 def measure_transmission(quantity: Quantity, case: Case, subject: Subject) -> Measurement:
     """Measure the largest |F − F_exact| of a uniform penetration over the force on the slave.
 
+    In space it counts over the largest exact force on a node, which is the larger share of meshes with more nodes.
     The tolerance is `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
     """
     exact = forces_of_penetration(case)
-    size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
+    if case.interface.dim == PLANE:
+        size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
+    else:
+        size = float(np.linalg.norm(exact, axis=1).max())
     forces, largest = forces_of_gap(case, subject, exact)
     error = float(np.linalg.norm(forces - exact, axis=1).max())
     number = quantity.check(error / size, gap_tolerance(case, case.parameter("penetration")) * largest)

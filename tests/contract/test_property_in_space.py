@@ -1,0 +1,79 @@
+"""A property has cases by dimension: one without cases in space is not asked there, and plane ones stay."""
+
+import pickle
+from dataclasses import replace
+
+import pytest
+from subjects import load_property, load_subject
+
+from contactverif import Property, Traits, Verdict, load_properties
+from contactverif.contract.cases import name_of_source
+from contactverif.run.run import run
+
+IN_SPACE = Traits().revise(dimensions=(3,))
+
+
+def loaded_properties() -> list[Property]:
+    return [question for question in load_properties() if isinstance(question, Property)]
+
+
+@pytest.mark.parametrize("dimensions", [(2,), (2, 3)])
+def test_a_plane_formulation_gets_the_property_itself(dimensions: tuple[int, ...]) -> None:
+    traits = Traits().revise(dimensions=dimensions)
+    assert all(question.for_traits(traits) is question for question in loaded_properties())
+
+
+def test_a_formulation_in_space_gets_the_same_question_with_other_cases() -> None:
+    question = load_property("balance.force")
+    there = question.for_traits(IN_SPACE)
+    assert there is question.for_traits(IN_SPACE)
+    assert there is there.for_traits(IN_SPACE)
+    assert there.cases is question.cases_in_space
+    assert (there.id, there.measure, there.info.quantities) == (question.id, question.measure, question.info.quantities)
+    copy = pickle.loads(pickle.dumps(there))
+    assert name_of_source(copy.cases) == name_of_source(there.cases) != name_of_source(question.cases)
+
+
+def test_cases_in_space_have_stored_names_of_their_own() -> None:
+    plane = {name_of_source(question.cases) for question in loaded_properties()}
+    space = {name_of_source(question.cases_in_space) for question in loaded_properties() if question.cases_in_space}
+    assert "" not in space
+    assert not plane & space
+
+
+def test_a_question_about_the_plane_alone_is_not_applicable_in_space() -> None:
+    question = load_property("hard.c")
+    assert question.cases_in_space is None
+    assert question.for_traits(IN_SPACE) is question
+    assert "plane" in question.refusal(IN_SPACE)
+    barrier = IN_SPACE.revise(enforcement="barrier", activation=0.1)
+    assert "barrier" in load_property("balance.force").refusal(barrier)
+
+
+def test_a_run_asks_each_formulation_in_its_own_dimension() -> None:
+    subjects = [load_subject("sts"), load_subject("nts-3d")]
+    questions = [load_property(name) for name in ("balance.force", "hard.c", "patch.flat.transmission")]
+    result = run(subjects, questions, examples=4, seed=3, shrink="none")
+    rows = {(row.formulation, row.property_id): row for row in result.rows}
+    assert len(rows) == 6
+    assert rows["nts-3d", "hard.c"].verdict is Verdict.NOT_APPLICABLE
+    assert rows["nts-3d", "patch.flat.transmission"].verdict is Verdict.FAIL
+    for name, dim in (("sts", 2), ("nts-3d", 3)):
+        assert {outcome.case.interface.dim for outcome in rows[name, "balance.force"].outcomes} == {dim}
+    alone = run(subjects[:1], questions, examples=4, seed=3, shrink="none")
+    for row in alone.rows:
+        beside = rows["sts", row.property_id]
+        assert [each.measurement.values for each in row.outcomes if each.measurement] == [
+            each.measurement.values for each in beside.outcomes if each.measurement
+        ]
+
+
+def test_a_flat_failure_in_space_shrinks_to_squares() -> None:
+    (row,) = run([load_subject("nts-3d")], [load_property("patch.flat.transmission")], examples=10, seed=1).rows
+    assert row.witness is not None
+    assert row.witness.verdict is Verdict.FAIL
+    wrong = replace(load_property("patch.flat.transmission"), promise=lambda traits: True)
+    (row,) = run([load_subject("nts-3d")], [wrong], examples=10, seed=1, shrink="all").rows
+    assert row.shrunk is not None
+    interface = row.shrunk.case.interface
+    assert len(interface.slave) + len(interface.master) <= 6

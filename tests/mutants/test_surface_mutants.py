@@ -1,0 +1,58 @@
+"""Each property in space has a mutant that it catches, and no right formulation is accused of what it promises."""
+
+from functools import cache
+
+import pytest
+from mutate import Mutant
+from subjects import load_property, load_subject
+from wrong_surfaces import MUTANTS, RIGHT
+
+from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
+from contactverif.sampling.draw import Sampling, draw_cases
+
+EXAMPLES = 60
+SPACE = load_subject("sts-3d").traits
+
+
+@cache
+def properties_in_space() -> dict[str, Property]:
+    loaded = [question for question in load_properties() if isinstance(question, Property)]
+    return {question.id: question.for_traits(SPACE) for question in loaded if question.cases_in_space is not None}
+
+
+@cache
+def cases(property_id: str) -> tuple[Case, ...]:
+    question = load_property(property_id).for_traits(SPACE)
+    key = Sampling(examples=EXAMPLES, seed=0).key(question)
+    return draw_cases(question.cases(None), seed=key, examples=EXAMPLES).cases
+
+
+def first_accusation(question: Property, subject: Subject, examples: int) -> str:
+    """Return why a formulation is accused of what it promises, with the number of the case, or an empty string."""
+    if question.refusal_of(subject) or question.promise(subject.traits) is not True:
+        return ""
+    for number, case in enumerate(cases(question.id)[:examples]):
+        outcome = judge_case(question, Case.from_arrays(case.to_arrays()), subject)
+        if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) or outcome.breach:
+            return f"case {number}: {outcome.reason}"
+    return ""
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+def test_the_mutant_is_caught_by_the_property_that_is_meant_to(mutant: Mutant) -> None:
+    question = properties_in_space()[mutant.caught_by]
+    accusation = first_accusation(question, Subject(mutant.name, mutant.make), EXAMPLES)
+    assert accusation, f"survives {mutant.caught_by}"
+    print(f"\n{accusation}")
+
+
+def test_every_property_in_space_has_its_mutant() -> None:
+    assert {mutant.caught_by for mutant in MUTANTS} == set(properties_in_space())
+    assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS)
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_no_right_formulation_is_accused(name: str) -> None:
+    subject = load_subject(name)
+    for question in properties_in_space().values():
+        assert not first_accusation(question, subject, 4), question.id
