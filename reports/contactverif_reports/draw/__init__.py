@@ -35,9 +35,9 @@ def draw_case(
         The file to write; an older one is replaced.
     title : str
         The title above the picture; it is wrapped.
-    forces, exact : FloatArray (n_nodes, 2) or (n_unknowns,) | None
+    forces, exact : FloatArray (n_nodes, dim) or (n_unknowns,) | None
         Nodal forces of the formulation and exact ones, as they act on the nodes (minus the residual). They are drawn
-        as arrows of one scale.
+        as arrows of one scale; in space faces are shaded by their difference.
     """
     from contactverif_reports.draw.case_figure import SUFFIXES, make_case_figure, save  # importing matplotlib is slow
 

@@ -13,10 +13,12 @@ from matplotlib.figure import Figure
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE
 from contactverif_reports.draw.case_geometry import Course, Gaps, segment_lengths
 from contactverif_reports.draw.lengths import format_number, one_digit, unit_of
 from contactverif_reports.draw.plain_labels import save_plainly
 from contactverif_reports.draw.strokes import MASTER, SLAVE, draw_arrows, draw_surface
+from contactverif_reports.draw.surface_figure import make_surface_figure
 from contactverif_reports.files import whole
 
 SUFFIXES = (".png", ".svg")
@@ -31,7 +33,12 @@ _SHORT = 0.04  # The length of a segment that is shorter is written below the ti
 def make_case_figure(
     case: Case, *, title: str = "", forces: FloatArray | None, exact: FloatArray | None, width: float = 7.5
 ) -> Figure:
-    """Return the figure of a case: both surfaces, the hatched bodies and the forces, as `draw_case` does."""
+    """Return the figure of a case: both surfaces, the hatched bodies and the forces, as `draw_case` does.
+
+    In space it is both surfaces from above, shaded by the error of the forces.
+    """
+    if case.interface.dim != PLANE:
+        return make_surface_figure(case, title=title, forces=forces, exact=exact, width=width)
     course, gaps = Course.from_case(case), Gaps.from_case(case)
     with_forces = forces is not None or exact is not None
     lengths = segment_lengths(case)

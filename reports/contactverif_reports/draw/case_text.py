@@ -7,10 +7,12 @@ import textwrap
 import numpy as np
 
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE
 from contactverif_reports.draw.case_geometry import Course, Gaps, segment_lengths
 from contactverif_reports.draw.lengths import format_number, unit_of
 from contactverif_reports.draw.raster import draw_raster
 from contactverif_reports.draw.strips import MASTER_NODE, SLAVE_NODE, draw_strips
+from contactverif_reports.draw.surface_text import surfaces_as_text
 
 _LISTED = 8  # The positions of at most so many nodes a side are listed.
 
@@ -19,7 +21,7 @@ def as_text(case: Case, width: int = 72) -> str:
     """Draw a case as text.
 
     A flat interface is two lines with their nodes to scale and the lengths between them. Any other is a small picture
-    and, up to eight nodes a side, a table of current positions.
+    and, up to eight nodes a side, a table of current positions. In space there are tables of nodes and faces.
 
     Parameters
     ----------
@@ -29,6 +31,8 @@ def as_text(case: Case, width: int = 72) -> str:
         The largest number of columns, at least 60.
     """
     width = max(width, 60)
+    if case.interface.dim != PLANE:
+        return surfaces_as_text(case, width)
     course, gaps = Course.from_case(case), Gaps.from_case(case)
     unit, unit_name = unit_of(np.concatenate(segment_lengths(case)))
     if course.nearly_flat:

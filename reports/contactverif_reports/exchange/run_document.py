@@ -156,8 +156,8 @@ def _example(example: Counterexample) -> Example:
         finding="" if finding is None else str(finding),
         nodes=case.interface.nodes.tolist(),
         positions=case.positions.tolist(),
-        slave=case.interface.slave.segments.tolist(),
-        master=case.interface.master.segments.tolist(),
+        slave=case.interface.slave.faces.tolist(),
+        master=case.interface.master.faces.tolist(),
         penalty=case.penalty,
         drawing=as_text(case),
     )

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import BODIES, Case
 from contactverif.contract.counterexample import Counterexample, counterexamples, named_failures, typeable
+from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group, Variable
@@ -35,6 +37,10 @@ _ARRAYS = {  # {array: (dimensions, long name, unit)}
     "name": ((), "name of the case, empty if it has none", ""),
     "kind": ((), "kind of situation of the case, empty if it has none", ""),
 }
+_FACES = {  # {array: (dimensions, long name)} in space.
+    "slave_segments": (("slave_face", "slave_corner"), "corners of each slave face"),
+    "master_segments": (("master_face", "master_corner"), "corners of each master face"),
+}
 
 
 def counterexample_groups(run: Run) -> dict[str, Group]:
@@ -53,30 +59,9 @@ def counterexample_groups(run: Run) -> dict[str, Group]:
 
 
 def _mesh(example: Counterexample) -> Group:
-    """Return the case as a UGRID-1.0 topology of dimension 1, with the outcome on it."""
-    case, interface, info = example.case, example.case.interface, example.row.info
-    edges = np.vstack([interface.slave.segments, interface.master.segments])
-    sides = [0] * len(interface.slave) + [1] * len(interface.master)
-    table = {
-        "mesh": numbers([], np.int32(0), "topology of the two surfaces", "1"),
-        "edge_nodes": numbers(["edge", "two"], edges, "first and second node of each segment, body on the left", "1"),
-        "side": codes(["edge"], sides, schema.SIDES, "surface of each segment"),
-        "node_x": numbers(["node"], interface.nodes[:, 0], "reference position, x", schema.LENGTH),
-        "node_y": numbers(["node"], interface.nodes[:, 1], "reference position, y", schema.LENGTH),
-        "current_x": numbers(["node"], case.positions[:, 0], "current position, x", schema.LENGTH),
-        "current_y": numbers(["node"], case.positions[:, 1], "current position, y", schema.LENGTH),
-    }
-    table["mesh"].attrs.update(
-        cf_role="mesh_topology",
-        topology_dimension=np.int32(1),
-        node_coordinates="node_x node_y",
-        edge_node_connectivity="edge_nodes",
-        edge_dimension="edge",
-    )
-    table["edge_nodes"].attrs.update(cf_role="edge_node_connectivity", start_index=np.int64(0))
-    table["side"].attrs.update(mesh="mesh", location="edge")
-    for current in ("current_x", "current_y"):
-        table[current].attrs.update(mesh="mesh", location="node", coordinates="node_x node_y")
+    """Return the case as a UGRID-1.0 topology, of edges in the plane and of faces in space, with the outcome on it."""
+    case, info = example.case, example.row.info
+    table = _topology(case)
     names = SharedNames.from_outcomes(info, [example.outcome])
     names = replace(names, parameters=(), kinds=())  # They are among the arrays.
     table |= coordinates(info, names)
@@ -95,6 +80,55 @@ def _mesh(example: Counterexample) -> Group:
     return Group(table, {key: schema.text(value) for key, value in attributes.items()})
 
 
+def _topology(case: Case) -> dict[str, Variable]:
+    """Return the mesh of a case with the reference and the current positions of its nodes."""
+    interface = case.interface
+    axes, in_plane = "xyz"[: interface.dim], interface.dim == PLANE
+    cell = "edge" if in_plane else "face"
+    table = {
+        "mesh": numbers([], np.int32(0), "topology of the two surfaces", "1"),
+        f"{cell}_nodes": numbers([cell, "two" if in_plane else "corner"], *_connectivity(interface)),
+        "side": codes(
+            [cell],
+            [0] * len(interface.slave) + [1] * len(interface.master),
+            schema.SIDES,
+            f"surface of each {'segment' if in_plane else 'face'}",
+        ),
+    }
+    for name, words_of_name, places in (
+        ("node", "reference", interface.nodes),
+        ("current", "current", case.positions),
+    ):
+        for number, axis in enumerate(axes):
+            long_name = f"{words_of_name} position, {axis}"
+            table[f"{name}_{axis}"] = numbers(["node"], places[:, number], long_name, schema.LENGTH)
+    coordinates_of_nodes = " ".join(f"node_{axis}" for axis in axes)
+    table["mesh"].attrs.update(
+        {
+            "cf_role": "mesh_topology",
+            "topology_dimension": np.int32(interface.dim - 1),
+            "node_coordinates": coordinates_of_nodes,
+            f"{cell}_node_connectivity": f"{cell}_nodes",
+            f"{cell}_dimension": cell,
+        }
+    )
+    table[f"{cell}_nodes"].attrs.update(cf_role=f"{cell}_node_connectivity", start_index=np.int64(0))
+    table["side"].attrs.update(mesh="mesh", location=cell)
+    for axis in axes:
+        table[f"current_{axis}"].attrs.update(mesh="mesh", location="node", coordinates=coordinates_of_nodes)
+    return table
+
+
+def _connectivity(interface: Interface) -> tuple[IntArray, str, str]:
+    """Return the nodes of all segments or faces, slave first, −1 behind those of fewer corners; their name and unit."""
+    sides = [surface.faces for surface in (interface.slave, interface.master)]
+    most = max(faces.shape[1] for faces in sides)
+    nodes = np.vstack([np.pad(faces, ((0, 0), (0, most - faces.shape[1])), constant_values=-1) for faces in sides])
+    if interface.dim == PLANE:
+        return nodes, "first and second node of each segment, body on the left", "1"
+    return nodes, "corners of each face, counter-clockwise seen from outside its body, then −1", "1"
+
+
 def case_group(case: Case) -> Group:
     """Return `Case.to_arrays()`; the attribute `case_array` of each variable names the array."""
     arrays = case.to_arrays()
@@ -111,6 +145,8 @@ def _array(safe: str, name: str, values: NDArray[Any]) -> Variable:
     axes, meaning = tuple(f"{safe}_axis_{axis}" for axis in range(values.ndim)), f"parameter of the case: {parameter}"
     of_parameter = axes, schema.text(meaning), schema.PARAMETER_UNITS.get(parameter, schema.UNKNOWN)
     dims, long_name, units = _ARRAYS.get(name, of_parameter)
+    if name in _FACES and values.shape[1] != 2:
+        dims, long_name = _FACES[name]
     if values.dtype.kind in "OU":  # Words, and integers beyond 64 bits.
         return words(dims, values.astype(np.str_).tolist(), long_name)
     return numbers(dims, values, long_name, units)

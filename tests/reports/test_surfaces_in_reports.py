@@ -1,0 +1,95 @@
+"""A counterexample in space is listed, drawn and stored so that a person can rebuild it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from subjects import load_property, load_subject, same_case
+
+from contactverif import Run, judge_case, named_case
+from contactverif.api.drawing import make_drawing
+from contactverif.contract.counterexample import counterexamples
+from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.surfaces import flat_surface_cases
+from contactverif_reports.draw import as_text, draw_case
+from contactverif_reports.draw.surface_figure import view_from_above, widen
+from contactverif_reports.exchange.run_document import document_of
+from contactverif_reports.netcdf.read import case_ids, read_case, read_run
+from contactverif_reports.netcdf.write import write
+
+CROSSED = named_case("crossed-diagonals")
+
+
+def test_the_text_lists_nodes_and_faces() -> None:
+    lines = as_text(CROSSED).splitlines()
+    assert lines[0] == "crossed-diagonals: 2 slave on 2 master triangles, in space"
+    assert "  faces   0: 2 1 0   1: 3 2 0" in lines
+    assert "  faces   0: 4 5 7   1: 5 6 7" in lines
+    assert any(line.split() == ["6", "1", "1", "0"] for line in lines)
+    assert any("penetration 1/16 everywhere" in line for line in lines)
+
+
+def test_a_mesh_of_many_faces_is_not_listed() -> None:
+    large = max(draw_cases(flat_surface_cases(), seed="text", examples=20).cases, key=lambda case: case.n_segments)
+    text = as_text(large)
+    assert "too many to be listed" in text
+    assert len(text.splitlines()) < 40
+
+
+def test_the_view_from_above_keeps_lengths_in_the_plane() -> None:
+    for case in draw_cases(flat_surface_cases(), seed="view", examples=5).cases:
+        places, n_slave = view_from_above(case), case.interface.n_slave_nodes
+        plane = case.parameters["plane"]
+        for part in (slice(n_slave), slice(n_slave, None)):
+            lengths, expected = (np.linalg.norm(np.diff(points[part], axis=0), axis=1) for points in (places, plane))
+            assert lengths == pytest.approx(expected, rel=1e-6, abs=1e-9 * case.largest_coordinate)
+
+
+def test_needles_are_drawn_wider() -> None:
+    square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    assert widen(square) == (pytest.approx(square), 1.0)
+    places, factor = widen(square @ np.array([[0.6, 0.8], [-0.008, 0.006]]))
+    assert factor == 50
+    assert np.ptp(places, axis=0) == pytest.approx([1.0, 0.5])
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_a_failure_is_drawn(tmp_path: Path, suffix: str) -> None:
+    subject, question = load_subject("nts-ar-3d"), load_property("patch.flat.transmission")
+    path = tmp_path / f"case{suffix}"
+    make_drawing(subject, question, judge_case(question, CROSSED, subject)).write(path)
+    assert path.stat().st_size > 5000
+    draw_case(CROSSED, tmp_path / f"bare{suffix}")
+    if suffix == ".svg":
+        text = path.read_text(encoding="utf-8")
+        assert "in space" in text
+        assert "error of the nodal forces, up to" in text
+
+
+@pytest.fixture(scope="module")
+def failing_run() -> Run:
+    return run([load_subject("nts-3d")], [load_property("patch.flat.transmission")], examples=4, seed=1, shrink="all")
+
+
+def test_a_report_stores_faces_and_gives_the_cases_back(tmp_path: Path, failing_run: Run) -> None:
+    path = tmp_path / "report.nc"
+    write(failing_run, path)
+    (id_,) = case_ids(path)
+    example = next(iter(counterexamples(failing_run).values()))
+    assert same_case(read_case(path, id_).case, example.case)
+    (row,), (again,) = failing_run.rows, read_run(path).rows
+    assert (again.verdict, again.reason) == (row.verdict, row.reason)
+    mesh = xr.open_datatree(path)[f"counterexamples/{id_}"]
+    assert mesh["mesh"].attrs["topology_dimension"] == 2
+    assert mesh["mesh"].attrs["node_coordinates"] == "node_x node_y node_z"
+    assert mesh["face_nodes"].shape == (example.case.n_segments, 3)
+    assert np.array_equal(mesh["current_z"], example.case.positions[:, 2])
+
+
+def test_the_document_of_a_run_lists_faces(failing_run: Run) -> None:
+    (row,) = document_of(failing_run).rows
+    assert row.counterexample is not None
+    assert all(len(face) == 3 for face in row.counterexample.master)
+    assert "in space" in row.counterexample.drawing
