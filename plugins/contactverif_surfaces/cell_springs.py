@@ -117,7 +117,8 @@ def sts_3d(*, penalty: float) -> CellSprings:
     Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; on faces: here.
     """
     source = "Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; on faces: here"
-    return CellSprings(SURFACE_TRAITS.revise(faces=(3, 4), source=source), check_penalty(penalty), _by_corners)
+    traits = SURFACE_TRAITS.revise(faces=(3, 4), integrates_linear_gap=True, source=source)
+    return CellSprings(traits, check_penalty(penalty), _by_corners)
 
 
 def _by_corners(view: SlaveView, codes: IntArray) -> CellPoints:

@@ -15,11 +15,12 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies.straight import bent_end_cases, steep_cases, tilted_cases
+from contactverif.strategies.surfaces import tilted_plane_cases
 from contactverif_properties.shared import linear_gaps, roundoff
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
 from contactverif_properties.shared.same_answer import Carry, compare, same_answer_quantities
-from contactverif_properties.shared.worst_force import worst_force
+from contactverif_properties.shared.worst_force import distance_from_line, worst_force
 
 OFF_NORMAL = roundoff.stated_gap_quantity("part of the force off the normal")
 TOTAL = roundoff.stated_gap_quantity("error of the total force")
@@ -53,6 +54,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
     family="patch",
     quantities=(OFF_NORMAL, TOTAL),
     cases=Cases.by_kind(resultant_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
     applicable=refuse_unknown_direction,
@@ -61,7 +63,8 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
 
     **Question.** A straight slave is tilted against a flat master by 3° to 89°, and penetrates it with all its length.
-    Is the force on the slave ε̂ ∫ |g| ds, along the normal that the traits name?
+    In space it is a plane, tilted by up to 19°. Is the force on the slave ε̂ ∫ |g| ds, along the normal that the traits
+    name?
 
     **Why it matters.** Flat patch tests never tilt a surface. A pressure that falls with the tilt, for example with its
     cosine squared, passes all of them, and is wrong on every curved part.
@@ -85,7 +88,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     if not total.any() and _may_overlook(case, traits):
         return Measurement()
     normal = linear_gaps.directions(case)[0 if traits.rules.force_along == "master normal" else 1]
-    push, across = float(total @ normal), abs(float(total[0] * normal[1] - total[1] * normal[0]))
+    push, across = float(total @ normal), distance_from_line(total, normal)
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     values = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}
     errors = {OFF_NORMAL: across}
@@ -121,6 +124,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
     family="patch",
     quantities=(NODAL,),
     cases=Cases.random(tilted_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
     applicable=refuse_unknown_integral,
 )

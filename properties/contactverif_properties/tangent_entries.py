@@ -19,6 +19,7 @@ from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
 from contactverif.problems.long_states import long_states
 from contactverif.strategies import smooth_cases
+from contactverif.strategies.surfaces import smooth_surface_cases
 from contactverif_properties.shared.applicability import promise_exact_tangent
 from contactverif_properties.shared.block_derivatives import STEPS, differences_on_both_sides, single_moves, step
 from contactverif_properties.shared.kinks import excuse_barrier
@@ -45,7 +46,7 @@ _define = partial(
 )
 
 
-@_define(id="tangent.sparsity", cases=Cases.random(smooth_cases))
+@_define(id="tangent.sparsity", cases=Cases.random(smooth_cases), cases_in_space=Cases.random(smooth_surface_cases))
 def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.
 

@@ -18,7 +18,9 @@ from contactverif_surfaces.cell_points import CellPoints, SlaveView, centre_poin
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT, TANGENT, OBJECTIVITY = "balance.force", "balance.moment", "tangent.directional", "objectivity"
 SCALING, RENUMBERING, MIRROR, PURITY = "scaling", "renumbering", "mirror", "purity"
-STS, CELL, QUARTERS = (getattr(contactverif_surfaces, name) for name in ("sts_3d", "vts_cell_3d", "vts_ppt_3d"))
+STS, CELL, QUARTERS, MORTAR = (
+    getattr(contactverif_surfaces, name) for name in ("sts_3d", "vts_cell_3d", "vts_ppt_3d", "mortar_3d")
+)
 Rule = Callable[[SlaveView, Any], CellPoints]
 
 
@@ -198,6 +200,24 @@ def _loses_blocks(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     return tangent.tocsr()
 
 
+def _soften_tilt(points: CellPoints, view: SlaveView) -> CellPoints:
+    """Multiply areas by the cosine of the tilt between both faces."""
+    first, second = view.master[..., 1, :] - view.master[..., 0, :], view.master[..., 2, :] - view.master[..., 0, :]
+    rises = view.master_height[..., 1:3] - view.master_height[..., :1]
+    plane = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    by_x = (rises[..., 0] * second[..., 1] - rises[..., 1] * first[..., 1]) / plane
+    by_y = (rises[..., 1] * first[..., 0] - rises[..., 0] * second[..., 0]) / plane
+    cosine = 1 / np.sqrt(1 + by_x**2 + by_y**2)
+    return replace(points, weight=points.weight * cosine[..., None])
+
+
+def _drop_entries(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    tangent = right(interface, pairing, z).tocoo()
+    large = np.abs(tangent.data) >= 1e-3 * np.abs(tangent.data).max(initial=0.0)
+    rows, columns = tangent.coords
+    return type(tangent)((tangent.data[large], (rows[large], columns[large])), shape=tangent.shape).tocsr()
+
+
 def _add_area(points: CellPoints, view: SlaveView) -> CellPoints:
     return replace(points, weight=points.weight * (1 + 1e-9))
 
@@ -212,7 +232,7 @@ def _skips_faces(right: Any, interface: Any, z: Any) -> Any:
 MUTANTS = (
     Mutant("whole slave face for a part of it", TRANSMISSION, changes_points(_whole_face)),
     Mutant("clip that loses a corner", TRANSMISSION, by_rule(_lose_corner)),
-    Mutant("heights of the master in the order of the clip", RENUMBERING, changes_points(_reverse_gap)),
+    Mutant("heights of the master in the order of the clip", "patch.tilted.nodal", changes_points(_reverse_gap)),
     Mutant("shape functions of the master one corner on", TRANSMISSION, changes_points(_roll_master)),
     Mutant("force at the middle of the master face", TRANSMISSION, changes_points(_push_middle)),
     Mutant("area too large by 1e-9", RESULTANT, changes_points(_add_area)),
@@ -239,6 +259,15 @@ MUTANTS = (
     Mutant("points near the first corner weigh more", RENUMBERING, changes_points(_first_corner_gap)),
     Mutant("triangles around the first corner, in the mirror", MIRROR, by_rule(_first_corner_fan)),
     Mutant("pairing kept from the first call, on faces", PURITY, _keeps_first_pairing),
+    Mutant("one point a cell said to integrate a linear gap", "patch.tilted.nodal",
+           says(CELL, integrates_linear_gap=True)),
+    Mutant("pressure that falls with the tilt", "patch.tilted.resultant", changes_points(_soften_tilt)),
+    Mutant("force said to be along the master's normal", "patch.tilted.resultant",
+           says(STS, force_along="master normal")),
+    Mutant("master block of the tangent left out, entry by entry", "tangent.sparsity",
+           lambda *, penalty: wrap(penalty, STS, tangent=_loses_blocks)),
+    Mutant("entries of the tangent below 1e-3 dropped", "tangent.sparsity",
+           lambda *, penalty: wrap(penalty, MORTAR, tangent=_drop_entries)),
     Mutant("cells said to be symmetric", "symmetric", says(STS, symmetric=True)),
     Mutant("cells said to be unbiased", "swap", says(CELL, unbiased=True)),
     Mutant("quarters said to balance past the border", FORCE, says(QUARTERS, conserves_force=True)),

@@ -1,6 +1,7 @@
 """Random interfaces in space are what they say: a covered slave, exact places, contact, and two squares at the end."""
 
 from collections.abc import Callable
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from contactverif import Case
 from contactverif.contract.arrays import FloatArray
 from contactverif.oracle import uniform_surface_weights_exact
 from contactverif.sampling.draw import draw_cases
-from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
+from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases, tilted_plane_cases
 
 STRATEGIES: list[Callable[[], SearchStrategy[Case]]] = [flat_surface_cases, surface_cases, smooth_surface_cases]  # type: ignore[list-item]
 
@@ -67,6 +68,20 @@ def test_nearly_all_states_are_in_contact(strategy: Callable[[], SearchStrategy[
         springs = sts_3d(penalty=1.0)
         forces.append(np.abs(springs.residual(case.interface, springs.pair(case.interface, case.z), case.z)).sum())
     assert np.mean(np.array(forces) > 0) >= 0.95
+
+
+def test_a_tilted_plane_stays_a_plane_below_the_master_bit_by_bit() -> None:
+    for case in collect(tilted_plane_cases, 60):  # type: ignore[arg-type]
+        interface, places = case.interface, [tuple(map(Fraction, place)) for place in case.positions.tolist()]
+        for surface in (interface.slave, interface.master):
+            a, b, c = (places[node] for node in surface.faces[0].tolist())
+            first, second = (tuple(x - y for x, y in zip(end, a, strict=True)) for end in (b, c))
+            normal = [first[i - 2] * second[i - 1] - first[i - 1] * second[i - 2] for i in range(3)]
+            heights = [sum(n * (x - y) for n, x, y in zip(normal, place, a, strict=True)) for place in places]
+            assert not any(heights[node] for node in surface.nodes)
+            others = set(range(interface.n_nodes)) - set(surface.nodes.tolist())
+            if surface is interface.master:  # The normal is out of the master: the slave lies below.
+                assert all(heights[node] < 0 for node in others)
 
 
 def test_there_are_none_on_an_interface_of_the_user() -> None:

@@ -33,7 +33,7 @@ def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, 
     """Return a force beside the one that is right: one number of each if they lie on one line."""
     line = right if right.any() else force
     direction = line / np.linalg.norm(line)
-    aside = _distance_from_line(force, direction)
+    aside = distance_from_line(force, direction)
     if not aside <= _ASIDE * float(np.abs(np.stack([force, right])).max()):
         return Finding(f"{place}, {COMPONENTS[len(force)]}", tuple(force), tuple(right), "N", *names)
     along, size = float(force @ direction), float(right @ direction)
@@ -41,7 +41,7 @@ def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, 
     return Finding(place, (along,), (size,), "N", *names, ratio)
 
 
-def _distance_from_line(force: FloatArray, direction: FloatArray) -> float:
+def distance_from_line(force: FloatArray, direction: FloatArray) -> float:
     """Return the part of a force (dim,) across a unit vector (dim,)."""
     if len(force) == PLANE:
         return abs(float(force[0] * direction[1] - force[1] * direction[0]))
