@@ -19,6 +19,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.engine_subject import SOLVE, EngineSubject
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.foreign_text import clean, refuse
 from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
@@ -222,6 +223,8 @@ class Property(PropertyInfo):
         if PLANE not in traits.abilities.dimensions:
             if self.cases_in_space is None:
                 return "the interfaces are plane, and the formulation takes none of them"
+            if TRIANGLE not in traits.abilities.faces:
+                return "the interfaces in space are of triangles, and the formulation takes none of them"
             if traits.rules.enforcement == "barrier":
                 return "the states in space penetrate, where a barrier is not defined"
         if traits.rules.enforcement in self.asks:

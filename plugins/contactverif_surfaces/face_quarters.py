@@ -95,6 +95,7 @@ class FaceQuarters:
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells of the parts, the master face under each centre (`home`), and the parts in contact."""
         slave, x = interface.slave.faces, np.array(z).reshape(-1, 3)
+        x = x - x[0]  # The middle of an edge is rounded at its distance from the origin.
         corners = np.einsum("pci,fij->fpcj", PARTS[slave.shape[1]], x[slave]).reshape(-1, slave.shape[1], 3)
         numbers = np.arange(corners.shape[0] * corners.shape[1]).reshape(corners.shape[:2])
         faces, codes = find_face_cells(
@@ -193,7 +194,7 @@ def _pressure(penalty: float, corners: Array, shares: FloatArray) -> Array:
 
 def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
     """Return the residuals (..., n, n_master_corners · 3) of a unit pressure on the master faces of cells."""
-    n_slave = shares.shape[-1]
+    n_slave, corners = shares.shape[-1], corners - corners[..., :1, :]
     part = np.einsum("npk,...nkd->...npd", shares, corners[..., :n_slave, :])
     points = gauss_points(SlaveView.of_corners(part, corners[..., n_slave:, :]), codes, N_POINTS[n_slave])
     _, master = points.push(points.weight)

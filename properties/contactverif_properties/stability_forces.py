@@ -19,6 +19,7 @@ from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.stability_states import stability_states
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
+from contactverif.strategies.surfaces import translated_surface_cases
 from contactverif.strategies.translations import translated_cases
 from contactverif_properties.shared.any_state import ask_forces_and_tangents, freeze_state, move_state
 from contactverif_properties.shared.applicability import knows_total
@@ -52,6 +53,7 @@ SWEPT_ROUNDINGS = forces_quantity("error of a force in roundings")
     family="stability",
     quantities=(FORCES, TANGENT, SEARCH),
     cases=Cases.random(translated_cases),
+    cases_in_space=Cases.random(translated_surface_cases),
     promise=lambda traits: traits.promises.translation_stable,
 )
 def stability_translation(case: Case, subject: Subject) -> Measurement:

@@ -218,6 +218,11 @@ def _drop_entries(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     return type(tangent)((tangent.data[large], (rows[large], columns[large])), shape=tangent.shape).tocsr()
 
 
+def _convert_unit(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Convert positions to another unit and back, which rounds them at their distance from the origin."""
+    return right(interface, pairing, z / 3 * 3)
+
+
 def _add_area(points: CellPoints, view: SlaveView) -> CellPoints:
     return replace(points, weight=points.weight * (1 + 1e-9))
 
@@ -268,6 +273,8 @@ MUTANTS = (
            lambda *, penalty: wrap(penalty, STS, tangent=_loses_blocks)),
     Mutant("entries of the tangent below 1e-3 dropped", "tangent.sparsity",
            lambda *, penalty: wrap(penalty, MORTAR, tangent=_drop_entries)),
+    Mutant("positions in another unit, forth and back", "stability.translation",
+           lambda *, penalty: wrap(penalty, STS, residual=_convert_unit)),
     Mutant("cells said to be symmetric", "symmetric", says(STS, symmetric=True)),
     Mutant("cells said to be unbiased", "swap", says(CELL, unbiased=True)),
     Mutant("quarters said to balance past the border", FORCE, says(QUARTERS, conserves_force=True)),

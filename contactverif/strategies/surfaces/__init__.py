@@ -4,7 +4,17 @@ All shrink to one square on one square, each cut in two, without any motion.
 """
 
 from contactverif.strategies.surfaces.plane_slaves import tilted_plane_cases
-from contactverif.strategies.surfaces.tilted_surfaces import smooth_surface_cases, surface_cases
+from contactverif.strategies.surfaces.tilted_surfaces import (
+    smooth_surface_cases,
+    surface_cases,
+    translated_surface_cases,
+)
 from contactverif.strategies.surfaces.uniform_surfaces import flat_surface_cases
 
-__all__ = ["flat_surface_cases", "smooth_surface_cases", "surface_cases", "tilted_plane_cases"]
+__all__ = [
+    "flat_surface_cases",
+    "smooth_surface_cases",
+    "surface_cases",
+    "tilted_plane_cases",
+    "translated_surface_cases",
+]

@@ -7,7 +7,9 @@ in contact, whatever its slope. Nodes of both sides move up and down besides.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
@@ -15,12 +17,15 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.strategies.parts import OFFSETS, depth_units, penalties, repeat_cyclically, seeds
-from contactverif.strategies.surfaces.space_motions import space_motions
+from contactverif.strategies.parts import OFFSETS, depth_units, on_own_meshes, penalties, repeat_cyclically, seeds
+from contactverif.strategies.surfaces.space_motions import SpaceMotion, space_motions
 from contactverif.strategies.surfaces.surface_pairs import SurfacePair, surface_pairs
+from contactverif.strategies.translations import FINENESS, FURTHEST
 
 _QUARTERS = st.integers(1, 8)  # The depth of the middle in quarters of a unit of the least height.
 _SLOPES = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])
+_FINENESS = FINENESS + 1  # One bit more: far away all 53 are full, so that the middle of an edge is rounded.
+_PLACES = st.integers(-(2**FURTHEST) + 2**6, 2**FURTHEST - 2**6)
 _WARPS = st.lists(st.integers(-4, 4), min_size=1, max_size=9)  # Moves across in sixteenths of the least height.
 
 
@@ -37,12 +42,33 @@ def smooth_surface_cases(interface: Interface | None = None) -> SearchStrategy[C
     return _tilted_states(pairs, smooth=True) if interface is None else None
 
 
+@random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
+@on_own_meshes
+def translated_surface_cases(draw: DrawFn) -> Case:
+    """Return turned states near the origin that a translation by the parameter "shift" (3,) moves exactly.
+
+    State and reference are rounded to multiples of 2^-33, and the translation goes up to 2^20.
+    """
+    pair = surface_pairs(same_domain=False, stretched=False, most=3)
+    case = draw(_tilted_states(pair, smooth=True, motions=space_motions(furthest=0, exponents=0)))
+    shift = np.array([draw(_PLACES), draw(_PLACES), draw(_PLACES)], dtype=np.float64)
+    nodes, z = (
+        np.ldexp(np.round(np.ldexp(values, _FINENESS)), -_FINENESS) for values in (case.interface.nodes, case.z)
+    )
+    return replace(case, interface=case.interface.at(nodes), z=z, parameters={"shift": shift})
+
+
 @st.composite
-def _tilted_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair], smooth: bool) -> Case:
+def _tilted_states(
+    draw: DrawFn,
+    pairs: SearchStrategy[SurfacePair],
+    smooth: bool,
+    motions: SearchStrategy[SpaceMotion] | None = None,
+) -> Case:
     pair = draw(pairs)
     quarters, unit = draw(_QUARTERS), draw(depth_units())
     slopes, warps = (draw(_SLOPES), draw(_SLOPES)), (draw(_WARPS), draw(_WARPS))
-    motion, penalty, seed = draw(space_motions()), draw(penalties()), draw(seeds())
+    motion, penalty, seed = draw(space_motions() if motions is None else motions), draw(penalties()), draw(seeds())
     offsets = draw(OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
     interface, _, domain = pair.lay_out()
     least = float(min(side.heights(interface.nodes).min() for side in (interface.slave, interface.master)))

@@ -23,11 +23,14 @@ Rules for the next editor:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations
 
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.shared.frozen_state import FrozenState
@@ -72,11 +75,12 @@ class Conditioning:
     # (n_nodes + n_multipliers,) The largest force max_c |R_c| for a node; the largest constraint row for a constraint
     # row.
     floor: FloatArray
+    dim: int = PLANE  # The number of entries of a residual that a node has.
 
     def worst_row(self, error: Array) -> WorstRow:
         """Return the row of an error of the residual (n_unknowns + n_multipliers,) that is the most roundings."""
-        n_nodes = len(error) - len(self.reach)  # The error has two entries a node, the reach has one.
-        sizes = _row_sizes(error, n_nodes)
+        n_nodes = (len(error) - len(self.reach)) // (self.dim - 1)  # The error has dim entries a node, the reach one.
+        sizes = _row_sizes(error, n_nodes, self.dim)
         counts = np.array([ratio(size, UNIT_ROUNDOFF * reach) for size, reach in zip(sizes, self.reach, strict=True)])
         row = int(np.argmax(counts))
         floor = float(self.floor[row])
@@ -112,11 +116,11 @@ def measure_conditioning(state: FrozenState, forces: Array) -> Conditioning:
 
 def conditioning_of(case: Case, derivative: FloatArray, forces: Array) -> Conditioning:
     """Return what `measure_conditioning` does, from the `difference_quotient` (n, n) and the residual (n,)."""
-    n_nodes = case.interface.n_nodes
+    n_nodes, dim = case.interface.n_nodes, case.interface.dim
     inputs = np.concatenate([_distances(case), np.abs(case.multipliers)])
-    sizes = _row_sizes(forces, n_nodes)
+    sizes = _row_sizes(forces, n_nodes, dim)
     floor = np.repeat([sizes[:n_nodes].max(), sizes[n_nodes:].max(initial=0.0)], [n_nodes, case.n_multipliers])
-    return Conditioning(_block_norms(derivative, n_nodes) @ inputs + floor, floor)
+    return Conditioning(_block_norms(derivative, n_nodes, dim) @ inputs + floor, floor, dim)
 
 
 def difference_quotient(state: FrozenState) -> FloatArray:
@@ -169,22 +173,26 @@ def _distances(case: Case) -> FloatArray:
     positions, interface = case.positions, case.interface
     distances: FloatArray = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
     for surface in (interface.slave, interface.master):
-        for end in (0, 1):
-            np.maximum.at(distances, surface.segments[:, end], surface.lengths(positions))
+        corners = positions[surface.faces]
+        for start, end in combinations(range(corners.shape[1]), 2):
+            along = corners[:, end] - corners[:, start]
+            lengths = np.sqrt((along * along).sum(axis=-1))
+            for corner in (start, end):
+                np.maximum.at(distances, surface.faces[:, corner], lengths)
     return distances
 
 
-def _row_sizes(rows: Array, n_nodes: int) -> FloatArray:
+def _row_sizes(rows: Array, n_nodes: int, dim: int) -> FloatArray:
     """Return |R_a| of each node and |row| of each constraint row, (n_nodes + n_multipliers,)."""
-    forces = np.hypot(*np.asarray(rows[: 2 * n_nodes], dtype=np.float64).reshape(n_nodes, 2).T)
-    return np.concatenate([forces, np.abs(rows[2 * n_nodes :]).astype(np.float64)])
+    forces = np.hypot.reduce(np.asarray(rows[: dim * n_nodes], dtype=np.float64).reshape(n_nodes, dim), axis=1)
+    return np.concatenate([forces, np.abs(rows[dim * n_nodes :]).astype(np.float64)])
 
 
-def _block_norms(matrix: FloatArray, n_nodes: int) -> FloatArray:
+def _block_norms(matrix: FloatArray, n_nodes: int, dim: int) -> FloatArray:
     """Return the Frobenius norms of the blocks of a matrix, (n_nodes + n_multipliers,) in rows and in columns."""
-    n = 2 * n_nodes
-    rows = np.vstack([np.hypot(matrix[0:n:2], matrix[1:n:2]), matrix[n:]])
-    return np.hstack([np.hypot(rows[:, 0:n:2], rows[:, 1:n:2]), np.abs(rows[:, n:])])
+    n = dim * n_nodes
+    rows = np.vstack([reduce(np.hypot, [matrix[axis:n:dim] for axis in range(dim)]), matrix[n:]])
+    return np.hstack([reduce(np.hypot, [rows[:, axis:n:dim] for axis in range(dim)]), np.abs(rows[:, n:])])
 
 
 def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error: Array, *, idle: bool) -> Measurement:
@@ -194,8 +202,9 @@ def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error
     largest force.
     """
     worst = conditioning.worst_row(error)
-    n = 2 * (len(error) - len(conditioning.reach))
-    largest = float(np.linalg.norm(np.asarray(error[:n], dtype=np.float64).reshape(-1, 2), axis=1).max())
+    dim = conditioning.dim
+    n = dim * ((len(error) - len(conditioning.reach)) // (dim - 1))
+    largest = float(np.linalg.norm(np.asarray(error[:n], dtype=np.float64).reshape(-1, dim), axis=1).max())
     details = {
         ERROR: worst.error,
         CONDITION: worst.condition,
