@@ -35,7 +35,7 @@ def make_surface_figure(
     interface = case.interface
     for axes, surface, name in zip(panels, (interface.slave, interface.master), ("slave", "master"), strict=True):
         _draw_faces(axes, surface, places, errors)
-        axes.set_title(name, fontsize=9)
+        axes.set_title(f"{name}, seen from outside its body", fontsize=9)
         axes.set_aspect("equal", adjustable="box")
         axes.set_axis_off()
     for axes, other in zip(panels, (interface.master, interface.slave), strict=True):
