@@ -12,6 +12,8 @@ from itertools import combinations, product
 
 from contactverif import load_formulation
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE
+from contactverif.contract.subject import Subject
 
 COUNTS = range(1, 6)  # The numbers of points on a slave segment.
 # Options that change no bit of an answer.
@@ -80,7 +82,13 @@ def all_variants(most_options: int = 1) -> list[str]:
     inner = [name for name in FACTORIES if name not in wrappers]
     alone = [text for name in inner for text in variants(name, most_options)]
     outer_names = [text for name in wrappers for text in variants(name, most_options)]
-    return alone + [f"{outer}/{name}" for outer in outer_names for name in inner]
+    return alone + [f"{outer}/{name}" for outer in outer_names for name in inner if is_plane(name)]
+
+
+def is_plane(name: str) -> bool:
+    """Return whether a formulation takes interfaces in the plane; wrappers are asked with these alone."""
+    subject = load_formulation(name)
+    return not isinstance(subject, Subject) or PLANE in subject.traits.abilities.dimensions
 
 
 def is_pair(name: str) -> bool:
