@@ -14,7 +14,7 @@ from subjects import load_subject
 from contactverif import Interface, evaluate_both
 from contactverif.plugins.registry import standalone_names
 
-NAMES = (*standalone_names(), "two-pass/nts-ar")
+NAMES = (*(name for name in standalone_names() if not name.endswith("-3d")), "two-pass/nts-ar")
 N_SLAVE = 300
 
 
