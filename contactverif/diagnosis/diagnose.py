@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactverif.contract.errors import ContractError
-from contactverif.contract.interface import PLANE
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.scale_patterns import diagnose_scale
@@ -25,8 +24,6 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
     For a property of tangents the tangent is looked at, for one of purity what calls change, else the forces. Where one
     of the other properties that fail is of forces, these come first: a tangent of wrong forces fits nothing.
     """
-    if PLANE not in subject.traits.abilities.dimensions:  # The rules look at plane states.
-        return ""
     try:
         with np.errstate(all="ignore"):
             if property_id.startswith(OF_MEMORY):  # Other patterns mean nothing then.

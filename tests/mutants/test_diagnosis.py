@@ -67,7 +67,7 @@ def test_nothing_is_said_of_a_right_formulation_of_a_stranger(name: str) -> None
     assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
 
 
-@pytest.mark.parametrize("name", standalone_names())
+@pytest.mark.parametrize("name", [name for name in standalone_names() if not name.endswith("-3d")])  # A run asks none.
 def test_nothing_is_said_of_an_included_formulation(name: str) -> None:
     subject = load_subject(name)
     assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
