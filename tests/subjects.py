@@ -6,6 +6,7 @@ from typing import Any
 
 from contactverif import Case, Outcome, Property, Subject, Verdict, judge_case, load_formulation, load_properties
 from contactverif.contract.measurement import Measurement
+from contactverif.plugins.registry import standalone_names
 
 
 @cache
@@ -14,6 +15,12 @@ def load_subject(name: str) -> Subject:
     subject = load_formulation(name)
     assert isinstance(subject, Subject), subject
     return subject
+
+
+@cache
+def plane_names() -> tuple[str, ...]:
+    """Return the names of the installed formulations that take plane interfaces."""
+    return tuple(name for name in standalone_names() if load_subject(name).traits.abilities.in_plane)
 
 
 @cache

@@ -21,7 +21,6 @@ from contactverif.contract.engine_subject import SOLVE, EngineSubject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.foreign_text import clean, refuse
-from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -206,7 +205,7 @@ class Property(PropertyInfo):
 
         A formulation that takes both is asked in the plane.
         """
-        if PLANE in traits.abilities.dimensions or self.cases_in_space in (None, self.cases):
+        if traits.abilities.in_plane or self.cases_in_space in (None, self.cases):
             return self
         return _in_space(self)
 
@@ -220,7 +219,7 @@ class Property(PropertyInfo):
 
     def refusal(self, traits: Traits) -> str:
         """Return why the property is not asked of a formulation of these traits, or an empty string."""
-        if PLANE not in traits.abilities.dimensions:
+        if not traits.abilities.in_plane:
             if self.cases_in_space is None:
                 return "the interfaces are plane, and the formulation takes none of them"
             if TRIANGLE not in traits.abilities.faces:

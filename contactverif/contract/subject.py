@@ -201,6 +201,10 @@ class CheckedFormulation:
         return self._counts[id(interface)][1]
 
     def _count_multipliers(self, interface: Interface) -> int:
+        dimensions = self._traits.abilities.dimensions
+        if interface.dim not in dimensions:
+            needed = f"{' or '.join(map(str, dimensions))}, which the formulation takes"
+            raise MisuseError("interface", f"nodes with {interface.dim} coordinates", needed)
         count = self._call_n_multipliers(interface)
         if (count > 0) is not (self._traits.rules.enforcement == "multiplier"):
             needed = '"multiplier"' if count else "n_multipliers(interface) ≥ 1"

@@ -201,6 +201,11 @@ class Abilities:
         if self.faces not in ((3,), (4,), (3, 4)):
             raise ContractError(f"Traits.abilities.faces: found {self.faces!r}; needed (3,), (4,) or (3, 4)")
 
+    @property
+    def in_plane(self) -> bool:
+        """Return whether a formulation takes plane interfaces, and is asked about these."""
+        return 2 in self.dimensions
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence:

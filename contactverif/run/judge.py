@@ -181,7 +181,7 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     """
     if isinstance(subject, EngineSubject):
         return FirstCall()  # It has no forces to ask for.
-    in_plane = PLANE in subject.traits.abilities.dimensions
+    in_plane = subject.traits.abilities.in_plane
     first_case, refused = fit_to_traits(named_case(FIRST if in_plane else IN_SPACE), subject.traits)
     if refused:
         return FirstCall()  # A barrier whose activation is unknown is not defined in these states.

@@ -348,7 +348,7 @@ def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -
         return matches[0]
     try:
         if not question.bodies:
-            return named_case(name)
+            return _taken_by(subject, named_case(name))
         # The catalogue imports bodies and Newton's method, so it is imported only where it is needed.
         from contactverif.problems.catalogue import load_scene_case
 
@@ -356,6 +356,14 @@ def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -
     except MisuseError as error:
         listed_names = f"a case of {question.id} ({'; '.join(case.name for case in listed)}), or " if listed else ""
         raise MisuseError(f"witness of {question.id}", error.found, f"{listed_names}{error.needed}") from None
+
+
+def _taken_by(subject: Subject, case: Case) -> Case:
+    """Return a case whose interface has as many coordinates as the formulation takes."""
+    if case.interface.dim not in subject.traits.abilities.dimensions:
+        words = f"{case.name!r}, whose interface has {case.interface.dim} coordinates"
+        raise MisuseError("name", words, f"one that {subject.name} takes by its trait dimensions")
+    return case
 
 
 @dataclass(frozen=True, slots=True)

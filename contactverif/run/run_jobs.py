@@ -19,7 +19,6 @@ from operator import attrgetter
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
@@ -387,7 +386,7 @@ class RunJobs:
             name, property_id = row.subject.name, row.question.id
             self._report(Progress(name, property_id, "diagnosis", 0, 1))
             others = [wrong.property_id for wrong in wrong_rows(each.row for each in self._rows_of(row.subject))]
-            if PLANE in row.subject.traits.abilities.dimensions:  # The rules look at plane states.
+            if row.subject.traits.abilities.in_plane:  # The rules look at plane states.
                 yield Job(diagnose, (row.subject, property_id, others), partial(self._add_diagnosis, name))
             if self._shrink == "one" and (goal := row.goal()) is not None:
                 yield from self._shrink_row(row, goal)

@@ -99,7 +99,7 @@ class TwoPass:
             for each in self._passes(interface)
         )
         second = replace(second, on_master=~second.on_master)
-        names = [entry.name for entry in fields(ContactPoints)]
+        names = [entry.name for entry in fields(ContactPoints) if getattr(first, entry.name) is not None]
         return ContactPoints(**{name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names})
 
     def _passes(self, interface: Interface) -> tuple[Pass, Pass]:
@@ -160,7 +160,7 @@ def _traits(inner: Traits) -> Traits:
         witnesses |= dict.fromkeys(("accuracy.wavy", "accuracy.wavy-curved"), "upper slave, 10 E/h")
         witnesses["accuracy.hertz"] = "parabola-layer"
     if inner.rules.enforcement == "penalty" and inner.promises.patch.flat is not None:
-        passes, witnesses["patch"] = False, "a1"
+        passes, witnesses["patch"] = False, "a1" if inner.abilities.in_plane else "crossed-diagonals"
         kinked = False if inner.promises.patch.kinked is False else None
         witnesses["patch.kinked"] = "edge of 53°, lower slave"
     elif inner.rules.enforcement == "multiplier":

@@ -58,6 +58,13 @@ class FacePairs:
         return positions_of(z, self.nodes)
 
 
+def first_faces(faces: IntArray, nodes: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the first of the faces at each node (n,), and the shape functions of its corners there (n, n_corners)."""
+    holds = faces[None] == nodes[:, None, None]  # (n_nodes, n_faces, n_corners)
+    first = holds.any(axis=2).argmax(axis=1)
+    return first, holds[np.arange(len(nodes)), first].astype(np.float64)
+
+
 def positions_of(z: Array, nodes: IntArray) -> Array:
     """Return the positions (..., n, k, 3) of nodes (n, k) at states z (..., n_unknowns)."""
     positions: Array = z.reshape(*z.shape[:-1], -1, 3)[..., nodes, :]

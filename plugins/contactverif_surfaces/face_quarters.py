@@ -24,11 +24,10 @@ from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pus
 from contactverif_surfaces.face_pairs import positions_of
 from contactverif_surfaces.face_search import find_face_cells
 from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
-from contactverif_surfaces.plane_shapes import TRIANGLE, cross_plane, evaluate_shapes
+from contactverif_surfaces.plane_shapes import PAST_BORDER, TRIANGLE, cross_plane, evaluate_shapes
 from contactverif_surfaces.surface_traits import SURFACE_TRAITS
 
 N_PARTS = 4
-PAST_BORDER = 1e-9  # A centre that lies past the border of a face by this share of it still has its foot there.
 N_POINTS = {3: 3, 4: 6}  # Gauss points on each triangle of a cell, by the number of corners of a master face.
 
 

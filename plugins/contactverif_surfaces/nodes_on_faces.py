@@ -20,12 +20,10 @@ from contactverif.contract.option_checks import check_penalty
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pushes
-from contactverif_surfaces.face_pairs import positions_of
+from contactverif_surfaces.face_pairs import first_faces, positions_of
 from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
-from contactverif_surfaces.plane_shapes import cross_plane, evaluate_shapes
+from contactverif_surfaces.plane_shapes import PAST_BORDER, cross_plane, evaluate_shapes
 from contactverif_surfaces.surface_traits import SURFACE_TRAITS
-
-PAST_BORDER = 1e-9  # A foot past the border of a face by this share of it still counts.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,11 +73,10 @@ class NodesOnFaces:
         nodes = np.flatnonzero(pairing["home"] >= 0)
         home, active, faces = pairing["home"][nodes], pairing["active"][nodes], interface.slave.faces
         points = _feet(positions_of(z, _nodes_and_faces(interface, nodes, home)))
-        holds = faces[None] == nodes[:, None, None]  # (n_nodes, n_faces, n_corners)
-        carrier = holds.any(axis=2).argmax(axis=1)
+        carrier, shape = first_faces(faces, nodes)
         return ContactPoints.on_faces(
             slave_segment=carrier,
-            slave_shape=holds[np.arange(len(nodes)), carrier].astype(np.float64),
+            slave_shape=shape,
             master_segment=home,
             master_shape=points.slave_shape[:, 0],
             position=z.reshape(-1, 3)[nodes],

@@ -12,6 +12,9 @@ import numpy as np
 from contactverif.contract.arrays import Array
 
 TRIANGLE = 3
+# A foot past the border of a face by this share of it still counts, since one on an edge between two faces must stand
+# on one of them. Shape functions are rounded by 2⁻⁵³ × how slender a face is: enough for faces of 1 : 10⁶.
+PAST_BORDER = 2.0**-30
 N_STEPS = 12  # Steps of Newton's method; on convex faces it converges to roundoff in six or fewer.
 
 

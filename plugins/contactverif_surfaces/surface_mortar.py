@@ -20,7 +20,7 @@ from contactverif.contract.option_checks import check_penalty
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_surfaces.cell_points import CellPoints, SlaveView, axes_of, flatten_pushes, gauss_points
-from contactverif_surfaces.face_pairs import FacePairs
+from contactverif_surfaces.face_pairs import FacePairs, first_faces
 from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
 from contactverif_surfaces.surface_traits import SURFACE_TRAITS
 
@@ -76,12 +76,11 @@ class SurfaceMortar:
         pairs, faces = FacePairs.from_pairing(interface, pairing), interface.slave.faces
         gaps, weights = _node_sums(pairs, z, interface.n_slave_nodes)
         nodes = np.flatnonzero(weights > 0)
-        holds = faces[None] == nodes[:, None, None]  # (n_nodes, n_faces, n_corners)
-        carrier = holds.any(axis=2).argmax(axis=1)
+        carrier, shape = first_faces(faces, nodes)
         slave = z.reshape(-1, 3)[faces[carrier]]
         return ContactPoints.on_faces(
             slave_segment=carrier,
-            slave_shape=holds[np.arange(len(nodes)), carrier].astype(np.float64),
+            slave_shape=shape,
             master_segment=np.full(len(nodes), -1),
             master_shape=np.full((len(nodes), interface.master.faces.shape[1]), np.nan),
             position=z.reshape(-1, 3)[nodes],

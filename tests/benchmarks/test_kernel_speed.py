@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from racing import Race
 from scipy import sparse
-from subjects import load_subject
+from subjects import load_subject, plane_names
 
 from contactverif import Interface, evaluate_both
-from contactverif.plugins.registry import standalone_names
 
-NAMES = (*(name for name in standalone_names() if not name.endswith("-3d")), "two-pass/nts-ar")
+NAMES = (*plane_names(), "two-pass/nts-ar")
 N_SLAVE = 300
 
 

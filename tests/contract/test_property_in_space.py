@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from subjects import load_property, load_subject
 
-from contactverif import Property, Traits, Verdict, load_properties
+from contactverif import MisuseError, Property, Subject, Traits, Verdict, load_properties, named_case
 from contactverif.contract.cases import name_of_source
 from contactverif.run.run import run
 
@@ -78,3 +78,35 @@ def test_a_flat_failure_in_space_shrinks_to_squares() -> None:
     assert row.shrunk is not None
     interface = row.shrunk.case.interface
     assert len(interface.slave) + len(interface.master) <= 6
+
+
+@pytest.mark.parametrize(("name", "case", "dimension"), [("sts-3d", "a1", 2), ("sts", "crossed-diagonals", 3)])
+def test_an_interface_of_another_dimension_is_refused_before_a_plugin_sees_it(
+    name: str, case: str, dimension: int
+) -> None:
+    state = named_case(case)
+    with pytest.raises(
+        MisuseError, match=f"interface: found nodes with {dimension} coordinates; needed {5 - dimension}"
+    ):
+        load_subject(name).for_case(state).pair(state.interface, state.z)
+
+
+def test_a_witness_of_another_dimension_is_refused_by_its_name() -> None:
+    inner = load_subject("nts-3d")
+    traits = inner.traits.revise(witnesses={"patch": "a1"})
+    wrong = Subject("wrong", lambda *, penalty: replace(inner.with_penalty(penalty).plugin, traits=traits))
+    (row,) = run([wrong], [load_property("patch.flat.transmission")], examples=1, seed=1).rows
+    assert row.unexpected
+    assert "witness of patch.flat.transmission: found 'a1', whose interface has 2 coordinates" in row.reason
+
+
+def test_two_passes_in_space_keep_their_promises_and_report_points() -> None:
+    subject = load_subject("two-pass/nts-3d")
+    names = ("balance.force", "patch.flat.transmission", "patch.flat.resultant", "purity", "swap")
+    result = run([subject], [load_property(name) for name in names], examples=6, seed=2, shrink="none")
+    assert result.promises_kept
+    assert {row.property_id: row.verdict for row in result.rows}["patch.flat.transmission"] is Verdict.FAIL
+    case = named_case("crossed-diagonals")
+    formulation = subject.for_case(case)
+    points = formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
+    assert points.on_master.tolist() == [False] * 4 + [True] * 4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from killing import properties
 from strangers import STRANGERS
-from subjects import load_subject
+from subjects import load_subject, plane_names
 from wrong import MUTANTS
 from wrong_springs import FORCES, TANGENTS, Right
 
@@ -17,7 +17,6 @@ from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.diagnosis.flat_state import flat_state
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.plugins.registry import standalone_names
 from contactverif.run.run import run
 
 TANGENT, PATCH = "tangent.directional", "patch.flat.transmission"
@@ -67,7 +66,7 @@ def test_nothing_is_said_of_a_right_formulation_of_a_stranger(name: str) -> None
     assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
 
 
-@pytest.mark.parametrize("name", [name for name in standalone_names() if not name.endswith("-3d")])  # A run asks none.
+@pytest.mark.parametrize("name", plane_names())
 def test_nothing_is_said_of_an_included_formulation(name: str) -> None:
     subject = load_subject(name)
     assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3

@@ -12,7 +12,6 @@ from itertools import combinations, product
 
 from contactverif import load_formulation
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import PLANE
 from contactverif.contract.subject import Subject
 
 COUNTS = range(1, 6)  # The numbers of points on a slave segment.
@@ -88,7 +87,7 @@ def all_variants(most_options: int = 1) -> list[str]:
 def is_plane(name: str) -> bool:
     """Return whether a formulation takes interfaces in the plane; wrappers are asked with these alone."""
     subject = load_formulation(name)
-    return not isinstance(subject, Subject) or PLANE in subject.traits.abilities.dimensions
+    return not isinstance(subject, Subject) or subject.traits.abilities.in_plane
 
 
 def is_pair(name: str) -> bool:
