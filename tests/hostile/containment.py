@@ -27,6 +27,8 @@ from hostile_kit import CAUGHT, IMPURE, LIKE_NTS, STOPS
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.isolation.box import why_no_box
+from contactverif.plugins.registry import load_formulation, load_properties
+from contactverif.run.run import run
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
@@ -119,10 +121,12 @@ def questions(plugin: HostilePlugin) -> tuple[str, ...]:
     return PROPERTY, *sorted(str(name) for name in more)
 
 
-def verify(folder: Path, mode: str, properties: tuple[str, ...], *names: str, seconds: float = SECONDS) -> Finish:
+def verify(
+    folder: Path, mode: str, properties: tuple[str, ...], *names: str, examples: int, seconds: float = SECONDS
+) -> Finish:
     """Verify some formulations with few cases."""
     globs = [word for name in properties for word in ("-p", name)]
-    sampling = ["--examples", str(EXAMPLES), "--seed", "1", "--jobs", "1"]
+    sampling = ["--examples", str(examples), "--seed", "1", "--jobs", "1"]
     options = (*globs, *sampling, "--keep-going", "--out", "report.nc", *MODES[mode])
     return run_command(folder, "verify", *names, *options, seconds=seconds)
 
@@ -143,12 +147,12 @@ def differences(a: Run, b: Run) -> list[str]:
 
 
 @cache
-def reference(mode: str, properties: tuple[str, ...]) -> Run:
+def reference(mode: str, properties: tuple[str, ...], examples: int) -> Run:
     """Return the run of the others alone."""
-    if mode != "inline":
-        reference("inline", properties)  # It compiles the kernels, for which a hostile plugin has no time.
+    if mode != "inline":  # This compiles the kernels, for which a hostile plugin has no time.
+        run(list(map(load_formulation, OTHERS)), load_properties(properties), examples=examples, seed=1)
     with scratch() as folder:
-        finish = verify(folder, mode, properties, *OTHERS)
+        finish = verify(folder, mode, properties, *OTHERS, examples=examples)
         assert finish.status == 0, (finish.status, finish.seconds, finish.errors[-1000:])
         assert not finish.left, finish.left
         return read_run(finish.report)
@@ -206,13 +210,13 @@ def _status_is_right(plugin: HostilePlugin, run: Run, finish: Finish, alone: Run
     return ""
 
 
-def judge(plugins: Sequence[HostilePlugin], mode: str) -> dict[str, list[str]]:
+def judge(plugins: Sequence[HostilePlugin], mode: str, examples: int = EXAMPLES) -> dict[str, list[str]]:
     """Run some plugins in one run, between the others; return {plugin: cells of its line}."""
     properties = questions(plugins[0])
-    alone, seconds = reference(mode, properties), INLINE_SECONDS if mode == "inline" else SECONDS
+    alone, seconds = reference(mode, properties, examples), INLINE_SECONDS if mode == "inline" else SECONDS
     names = ("nts", *(plugin.name for plugin in plugins), "vts-ppt")
     with scratch() as folder:
-        finish = verify(folder, mode, properties, *names, seconds=seconds)
+        finish = verify(folder, mode, properties, *names, examples=examples, seconds=seconds)
         run, remark = _read(finish)
         text = finish.output + finish.errors
         clean = len(text) < MOST_OUTPUT * len(plugins) and not CONTROL.search(text.replace(b"\r\n", b"\n"))
