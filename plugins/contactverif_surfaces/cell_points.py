@@ -21,7 +21,6 @@ _THREE = np.array([[4.0, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
 _SIX = np.array([[1 - 2 * c if i == j else c for j in range(3)] for c in (_A, _B) for i in range(3)])
 _SIX_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 GAUSS = {3: (_THREE, np.full(3, 1 / 3)), 6: (_SIX, _SIX_WEIGHTS / _SIX_WEIGHTS.sum())}
-_NO_AREA = 1e-300  # A smaller area is that of an empty cell.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +150,7 @@ def _centroid(corners: Array) -> tuple[Array, Array]:
     areas = _areas(np.stack([first, corners[..., 1:-1, :], corners[..., 2:, :]], axis=-2))
     moments = areas[..., None] * ((corners[..., 1:-1, :] - start) + (corners[..., 2:, :] - start)) / 3
     area = areas.sum(axis=-1)
-    whole = np.where(np.abs(area.real) > _NO_AREA, area, 1.0)
+    whole = np.where(area.real == 0, 1.0, area)  # An empty cell has no centroid, and its points no weight.
     return start + moments.sum(axis=-2, keepdims=True) / whole[..., None, None], area
 
 
