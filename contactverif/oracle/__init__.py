@@ -11,7 +11,11 @@ from contactverif.oracle.flat_answers import (
     uniform_pressure_weights,
     uniform_pressure_weights_exact,
 )
-from contactverif.oracle.flat_surfaces import uniform_surface_weights, uniform_surface_weights_exact
+from contactverif.oracle.flat_surfaces import (
+    nodal_surface_weights,
+    uniform_surface_weights,
+    uniform_surface_weights_exact,
+)
 from contactverif.oracle.kink_distance import default_points, kink_margin
 from contactverif.oracle.projection_kinds import is_of_kind, kind_of
 
@@ -25,6 +29,7 @@ __all__ = [
     "kink_margin",
     "nearest_segments",
     "nodal_spring_weights",
+    "nodal_surface_weights",
     "uniform_pressure_weights",
     "uniform_pressure_weights_exact",
     "uniform_surface_weights",

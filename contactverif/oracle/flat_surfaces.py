@@ -58,6 +58,28 @@ def uniform_surface_weights(interface: Interface, plane: ArrayLike, domain: Arra
     return np.array([float(weight) for weight in uniform_surface_weights_exact(interface, plane, domain)])
 
 
+def nodal_surface_weights(interface: Interface, plane: ArrayLike, *, both_surfaces: bool = False) -> FloatArray:
+    """Return the forces (n_nodes,) away from the other body of springs of unit force at the nodes of the slave.
+
+    The force of a spring is shared by the shape functions of the triangle below. The surfaces are triangles in one
+    plane, where their nodes have the coordinates `plane` (n_nodes, 2). A node beside the other surface has no spring.
+    With `both_surfaces` there are springs at the nodes of the master too.
+    """
+    places = _as_points(plane)
+    forces = [Fraction(0)] * len(places)
+    passes = [(interface.slave, interface.master), (interface.master, interface.slave)]
+    for surface, other in passes if both_surfaces else passes[:1]:
+        for node in np.unique(surface.faces).tolist():
+            for face in other.faces.tolist():
+                parts = [_turn(places[node], places[face[i - 2]], places[face[i - 1]]) for i in range(3)]
+                if min(parts) >= 0 or max(parts) <= 0:
+                    forces[node] += 1
+                    for corner, part in zip(face, parts, strict=True):
+                        forces[corner] += part / sum(parts)
+                    break
+    return np.array([float(force) for force in forces])
+
+
 def _as_points(values: ArrayLike) -> Polygon:
     return [(Fraction(x), Fraction(y)) for x, y in np.asarray(values, dtype=np.float64).tolist()]
 

@@ -140,7 +140,7 @@ def nts_3d(*, penalty: float) -> NodesOnFaces:
         Nodal stiffness ε > 0, force per length of penetration.
     """
     # The force is the derivative of ε g²/2, since the foot lies straight below the node.
-    traits = _TRAITS.revise(penalty="nodal", area=None, symmetric=True)
+    traits = _TRAITS.revise(penalty="nodal", area=None, symmetric=True, normal=None)
     return NodesOnFaces(traits, check_penalty(penalty), by_area=False)
 
 
@@ -157,6 +157,7 @@ def nts_ar_3d(*, penalty: float) -> NodesOnFaces:
 
 _TRAITS = SURFACE_TRAITS.revise(
     flat=False,
+    normal=True,
     gap="closest point",
     force_along="master normal",
     witnesses={**SURFACE_TRAITS.evidence.witnesses, "patch": "crossed-diagonals"},

@@ -12,6 +12,7 @@ SURFACE_TRAITS = Traits(
         conserves_force=True,
         conserves_moment=True,
         unbiased=False,
+        nodes_push=True,
         translation_stable=True,
     ),
     rules=Rules(gap="cells", force_along="slave normal", penalty="distributed", area="current"),

@@ -15,15 +15,16 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.errors import ContractError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.oracle import nodal_spring_weights
+from contactverif.oracle import nodal_spring_weights, nodal_surface_weights
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
-from contactverif.strategies.surfaces import flat_surface_cases
+from contactverif.strategies.surfaces import flat_surface_cases, matched_surface_cases, overhung_surface_cases
 from contactverif_properties.shared import uniform_pressure
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.kinks import explain_by_kink
@@ -184,8 +185,10 @@ def _heals(before: Measurement, after: Measurement) -> bool:
 def _move_ends_inwards(case: Case) -> Case | None:
     """Return the case with end nodes of the slave that face a free end of the master exactly moved inwards by roundoff.
 
-    Roundoff decides whether such a node is over the master. None if there is no such node.
+    Roundoff decides whether such a node is over the master. None if there is no such node, or in space.
     """
+    if case.interface.dim != PLANE:
+        return None
     interface, along = case.interface, case.parameters["along"].copy()
     reach = COORDINATE_ROUNDING * case.largest_coordinate
     slave = interface.slave
@@ -213,12 +216,18 @@ _define_class = partial(
 )
 
 
-@_define_class(id="patch.flat.normal", cases=Cases.random(normal_cases), promise=promise_normal)
+@_define_class(
+    id="patch.flat.normal",
+    cases=Cases.random(normal_cases),
+    cases_in_space=Cases.random(matched_surface_cases),
+    promise=promise_normal,
+)
 def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     """Forces, gaps and pressures are exact on flat meshes with each inner master node on a slave node.
 
     **Question.** Two flat surfaces penetrate each other by the same depth everywhere. The master covers the slave, and
-    each inner master node lies on a slave node, as in cases A1 and A2. Are the nodal forces on both sides, the reported
+    each inner master node lies on a slave node, as in cases A1 and A2. In space both have the same faces, and the
+    master a ring of more faces in half of the cases. Are the nodal forces on both sides, the reported
     gaps and the reported pressures exact?
 
     **Why it matters.** Many formulations state that they fail the general patch test, and a general test cannot tell
@@ -266,6 +275,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     id="patch.flat.nodal",
     quantities=(FORCE, GAP, REPORTED_FORCE),
     cases=Cases.random(overhung_cases),
+    cases_in_space=Cases.random(overhung_surface_cases),
     promise=lambda traits: True if traits.rules.penalty == "nodal" and traits.rules.enforcement == "penalty" else None,
     asks=frozenset({"penalty"}),
     applicable=lambda traits: "" if traits.rules.penalty == "nodal" else "there are no nodal springs",
@@ -298,7 +308,10 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     )
     spring = subject.penalty(case) * depth
     unbiased = bool(subject.traits.promises.unbiased)
-    weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
+    if interface.dim == PLANE:
+        weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
+    else:
+        weights = nodal_surface_weights(interface, case.parameters["plane"], both_surfaces=unbiased)
     exact = spring * uniform_pressure.push_apart(case, weights, 1.0)
     forces = -state.forces
     if unbiased:

@@ -11,17 +11,19 @@ from itertools import pairwise
 import numpy as np
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.faces import turns_of
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import flat_cases, general_cases
+from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties.shared import roundoff
 from contactverif_properties.shared.any_state import freeze_state, prepare_state, random_moves
 from contactverif_properties.shared.applicability import may_act_twice
@@ -59,6 +61,12 @@ def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
     return ({} if flat is None else {FLAT: flat}) | {ANY_SHAPE: general_cases(interface)}
 
 
+@random_source("contactverif_properties.pushes.pushing_surfaces")
+def pushing_surfaces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+    """Return flat cases in space with a uniform penetration, and tilted and warped ones, each half of all cases."""
+    return {FLAT: flat_surface_cases(), ANY_SHAPE: surface_cases()} if interface is None else None
+
+
 def lift_slave(case: Case, height: float) -> Case:
     """Return the case with its slave moved away from the master, across the interface, by a height (a length)."""
     positions = case.positions.copy()
@@ -81,20 +89,31 @@ def open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
 
 def nodes_far_from_contact(case: Case) -> BoolArray:
     """Return which slave nodes (n_slave_nodes,) are then FAR or more segments from the closed end."""
-    interface, along = case.interface, case.parameters["along"]
+    interface, along = case.interface, _places_along(case)
     slave = along[: interface.n_slave_nodes]
-    longest = max(float(np.abs(np.diff(along[side.segments])).max()) for side in (interface.slave, interface.master))
+    longest = max(float(np.ptp(along[side.faces], axis=1).max()) for side in (interface.slave, interface.master))
     return (_slave_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
 
 
 def _slave_places(case: Case) -> FloatArray:
     """Return where the slave's nodes lie along the interface (n_slave_nodes,), from 0 to 1."""
-    slave = case.parameters["along"][: case.interface.n_slave_nodes]
+    slave = _places_along(case)[: case.interface.n_slave_nodes]
     places: FloatArray = (slave - slave.min()) / np.ptp(slave)
     return places
 
 
-_define = partial(Property.define, family="invariants", cases=Cases.by_kind(pushing_cases), kinds=(FLAT, ANY_SHAPE))
+def _places_along(case: Case) -> FloatArray:
+    """Return where the nodes of a flat case lie along the interface (n_nodes,), in space along its first axis."""
+    return case.parameters["along"] if case.interface.dim == PLANE else case.parameters["plane"][:, 0]
+
+
+_define = partial(
+    Property.define,
+    family="invariants",
+    cases=Cases.by_kind(pushing_cases),
+    cases_in_space=Cases.by_kind(pushing_surfaces),
+    kinds=(FLAT, ANY_SHAPE),
+)
 
 
 @_define(
@@ -158,7 +177,7 @@ def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     """
     formulation = subject.for_case(case)
     depth = case.parameter("penetration")
-    size = case.penalty * depth * case.slave_length
+    size = case.penalty * depth * case.slave_measure
     raised = FrozenState.with_multiplier(formulation, lift_slave(case, 2 * depth), 0.0)
     values = {OPEN: float(np.abs(raised.forces).max()) / size}
     distant, one_end = nodes_far_from_contact(case), open_all_but_one_end(case)
@@ -204,9 +223,10 @@ def measure_barrier(case: Case, subject: Subject) -> Measurement:
 
 
 def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
-    """Return the residual of the nodes (n_nodes, 2): of springs, or of multipliers that are all 1."""
+    """Return the residual of the nodes (n_nodes, dim): of springs, or of multipliers that are all 1."""
     state = FrozenState.with_multiplier(formulation, case, 0.0)
-    return unit_forces(state).sum(axis=1).reshape(-1, 2) if state.case.n_multipliers else state.forces
+    whole = unit_forces(state).sum(axis=1) if state.case.n_multipliers else state.forces
+    return whole.reshape(case.interface.nodes.shape)
 
 
 def _push_of_slave(forces: FloatArray, case: Case) -> float:
@@ -300,7 +320,7 @@ def _excuse_pulls(state: FrozenState, pulled: set[int], traits: Traits) -> str:
 def _nodes_round_corners(state: FrozenState) -> set[int]:
     """Return the nodes of all master segments that a point faces beside a corner of more than 60°."""
     nodes: set[int] = set()
-    for each in state.passes if state.has_points else ():
+    for each in state.passes if state.has_points and state.case.interface.dim == PLANE else ():
         master = each.interface.master
         for segment, normal in zip(each.points.master_segment, each.points.normal, strict=True):
             for neighbour in master.neighbours[segment] if segment >= 0 else ():
@@ -335,10 +355,17 @@ def allowed_pushes(state: FrozenState) -> tuple[dict[int, list[FloatArray]], Flo
 
 
 def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, FloatArray]]:
-    """Return (node, unit normal into its own body, which is on the left) of both ends of every segment."""
-    along = positions[side.segments[:, 1]] - positions[side.segments[:, 0]]
-    inward = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
-    return [(node, normal) for ends, normal in zip(side.segments.tolist(), inward, strict=True) for node in ends]
+    """Return (node, unit normal into its own body) of all corners of every segment or face.
+
+    The body is on the left of a segment; a face lists its corners counter-clockwise, seen from outside.
+    """
+    if positions.shape[1] == PLANE:
+        along = positions[side.segments[:, 1]] - positions[side.segments[:, 0]]
+        inward = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    else:
+        inward = -turns_of(positions[side.faces]).sum(axis=1)
+        inward /= np.linalg.norm(inward, axis=1)[:, None]
+    return [(node, normal) for corners, normal in zip(side.faces.tolist(), inward, strict=True) for node in corners]
 
 
 def _allow_everything(state: Case, normals: dict[int, list[FloatArray]]) -> None:
@@ -355,14 +382,14 @@ def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: F
     """Add what the points of a pass allow to the nodes that carry them and to the nodes opposite."""
     directed: BoolArray = np.asarray(np.isfinite(each.points.normal).all(axis=1))
     points = each.points.select(directed)
-    slave, master = each.interface.slave.segments, each.interface.master.segments
-    for segment, c, normal in zip(points.slave_segment.tolist(), points.c.tolist(), points.normal, strict=True):
+    slave, master = each.interface.slave.faces, each.interface.master.faces
+    node_of = _nodes_of_points(each.interface, points)
+    for segment, own, normal in zip(points.slave_segment.tolist(), node_of.tolist(), points.normal, strict=True):
         if segment < 0:
             continue
-        segments = {segment}
-        if abs(c) == 1:  # The point is a node, and so on both of its segments.
-            segments |= {int(each.interface.slave.neighbours[segment, int(c > 0)])} - {-1}
-        for node in np.unique(slave[list(segments)]):
+        # A point that is a node is on all segments or faces there.
+        carriers = slave[(slave == own).any(axis=1)] if own >= 0 else slave[segment]
+        for node in np.unique(carriers):
             normals[int(each.numbers[node])].append(normal)
     carriers = slave[points.slave_segment[points.slave_segment >= 0]].reshape(-1)
     pushing = [normal for node in np.unique(each.numbers[carriers]) for normal in normals[int(node)]]
@@ -373,15 +400,35 @@ def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: F
             allowance[each.numbers[master[segment]]] += pull
 
 
+def _nodes_of_points(interface: Interface, points: ContactPoints) -> IntArray:
+    """Return the slave node that each point is (n_points,); −1 for a point inside a segment or a face."""
+    shape = points.slave_shape
+    if interface.dim == PLANE:
+        shape = np.stack([1 - points.c, 1 + points.c], axis=1) / 2
+    corner = (shape == 1).argmax(axis=1)
+    return np.where((shape == 1).any(axis=1), interface.slave.faces[points.slave_segment, corner], -1)
+
+
+def _master_shape(points: ContactPoints) -> FloatArray:
+    """Return the shape functions (n_points, n_corners) of the master's corners at the feet."""
+    if points.master_shape.shape[1]:
+        return points.master_shape
+    return np.stack([1 - points.xi, points.xi], axis=1)
+
+
 def _pull_past_ends(points: ContactPoints) -> FloatArray:
-    """Return max(−ξ, ξ − 1, 0) |F| of each point (n_points,); 0 for weighted nodes, which have no foot."""
-    past = np.maximum(0.0, np.maximum(-points.xi, points.xi - 1.0))
-    return np.where(points.weighted | np.isnan(past), 0.0, past * np.abs(points.pressure * points.weight))
+    """Return max(−ξ, ξ − 1, 0) |F| of each point (n_points,); 0 for weighted nodes, which have no foot.
+
+    In space the most negative shape function takes the place of −ξ and ξ − 1, which are those of a segment.
+    """
+    past = np.maximum(0.0, -_master_shape(points).min(axis=1))
+    counted = ~points.weighted & np.isfinite(past)
+    return np.where(counted, past * np.abs(points.pressure * points.weight), 0.0)
 
 
 def _distance_from_cone(normals: list[FloatArray], force: FloatArray) -> float:
     """Return the distance of a force from the sums of non-negative multiples of the normals."""
     from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
 
-    different = sorted({(x, y) for x, y in np.array(normals).tolist()})
-    return float(nnls(np.array(different).T, force)[1]) if normals else float(np.hypot(*force))
+    different = sorted(set(map(tuple, np.array(normals).tolist())))
+    return float(nnls(np.array(different).T, force)[1]) if normals else float(np.linalg.norm(force))

@@ -121,12 +121,12 @@ def says(make: Callable[..., Any], **promises: Any) -> Callable[..., Any]:
 def reports(make: Callable[..., Any], change: Callable[..., dict[str, Any]]) -> Callable[..., Any]:
     """Return the factory of a formulation that computes the right thing and reports other arrays.
 
-    They are those of `change(points, interface, x)`; positions x (n_nodes, 2).
+    They are those of `change(points, interface, x)`; positions x (n_nodes, dim).
     """
 
     def contact_points(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
         points = right(interface, pairing, z)
-        return replace(points, **change(points, interface, z[: interface.n_unknowns].reshape(-1, 2)))
+        return replace(points, **change(points, interface, z[: interface.n_unknowns].reshape(interface.nodes.shape)))
 
     return lambda *, penalty: wrap(penalty, make, contact_points=contact_points)
 

@@ -5,11 +5,14 @@ from functools import cache
 import pytest
 from mutate import Mutant
 from subjects import load_property, load_subject
-from wrong_surfaces import MUTANTS, RIGHT
+from wrong_surface_contact import MUTANTS as CONTACT
+from wrong_surfaces import MUTANTS as CELLS
+from wrong_surfaces import RIGHT
 
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
 from contactverif.sampling.draw import Sampling, draw_cases
 
+MUTANTS = CELLS + CONTACT
 EXAMPLES = 60
 SPACE = load_subject("sts-3d").traits
 

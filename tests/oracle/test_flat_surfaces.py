@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contactverif import Interface, MisuseError
-from contactverif.oracle import uniform_surface_weights, uniform_surface_weights_exact
+from contactverif.oracle import nodal_surface_weights, uniform_surface_weights, uniform_surface_weights_exact
 
 SQUARE = [[0.0, 0], [1, 0], [1, 1], [0, 1]]
 Polygon = list[tuple[Fraction, Fraction]]
@@ -116,3 +116,11 @@ def test_the_cuts_of_all_pairs_of_faces_give_the_same_rationals() -> None:
 
     check()
     assert len(checked_cases) >= 3
+
+
+def test_a_spring_is_shared_by_the_triangle_below_and_one_beside_the_master_has_no_force() -> None:
+    meshes = interface([[1, 1], [0, 2], [5, 5]], [[0, 1, 2]], [[0.0, 0], [4, 0], [0, 4]], [[0, 1, 2]])
+    weights = nodal_surface_weights(meshes, meshes.nodes[:, :2])
+    assert weights.tolist() == [1, 1, 0, 0.5 + 0.5, 0.25, 0.25 + 0.5]
+    both = nodal_surface_weights(meshes, meshes.nodes[:, :2], both_surfaces=True)
+    assert both[3:].tolist() == weights[3:].tolist()  # No node of the master lies under the slave.

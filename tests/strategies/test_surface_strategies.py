@@ -10,9 +10,16 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif import Case
 from contactverif.contract.arrays import FloatArray
-from contactverif.oracle import uniform_surface_weights_exact
+from contactverif.oracle import nodal_surface_weights, uniform_surface_weights_exact
 from contactverif.sampling.draw import draw_cases
-from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases, tilted_plane_cases
+from contactverif.strategies.surfaces import (
+    flat_surface_cases,
+    matched_surface_cases,
+    overhung_surface_cases,
+    smooth_surface_cases,
+    surface_cases,
+    tilted_plane_cases,
+)
 
 STRATEGIES: list[Callable[[], SearchStrategy[Case]]] = [flat_surface_cases, surface_cases, smooth_surface_cases]  # type: ignore[list-item]
 
@@ -88,3 +95,23 @@ def test_there_are_none_on_an_interface_of_the_user() -> None:
     case = collect(flat_surface_cases, 1)[0]  # type: ignore[arg-type]
     assert flat_surface_cases(case.interface) is None
     assert surface_cases(case.interface) is None
+
+
+def test_matched_faces_are_equal_or_lie_beside_the_slave() -> None:
+    rings = set()
+    for case in collect(matched_surface_cases, 30):  # type: ignore[arg-type]
+        plane, interface, n_slave = case.parameters["plane"], case.interface, case.interface.n_slave_nodes
+        place = {tuple(point): number for number, point in enumerate(plane[:n_slave].tolist())}
+        over = [[place.get(tuple(plane[node].tolist()), -1) for node in face] for face in interface.master.faces]
+        inner = {frozenset(face) for face in over if min(face) >= 0}
+        assert inner == {frozenset(face) for face in interface.slave.faces.tolist()}
+        rings.add(len(inner) < len(over))
+    assert rings == {False, True}
+
+
+def test_an_overhung_slave_would_be_covered_if_it_were_larger() -> None:
+    for case in collect(overhung_surface_cases, 30):  # type: ignore[arg-type]
+        n_slave, plane = case.interface.n_slave_nodes, case.parameters["plane"].copy()
+        middle = case.parameters["domain"].mean(axis=0)
+        plane[:n_slave] = middle + 1.25 * (plane[:n_slave] - middle)
+        assert (nodal_surface_weights(case.interface, plane)[:n_slave] == 1).all()

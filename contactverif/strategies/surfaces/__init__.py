@@ -9,10 +9,16 @@ from contactverif.strategies.surfaces.tilted_surfaces import (
     surface_cases,
     translated_surface_cases,
 )
-from contactverif.strategies.surfaces.uniform_surfaces import flat_surface_cases
+from contactverif.strategies.surfaces.uniform_surfaces import (
+    flat_surface_cases,
+    matched_surface_cases,
+    overhung_surface_cases,
+)
 
 __all__ = [
     "flat_surface_cases",
+    "matched_surface_cases",
+    "overhung_surface_cases",
     "smooth_surface_cases",
     "surface_cases",
     "tilted_plane_cases",

@@ -7,7 +7,7 @@ formulation sees.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -39,10 +39,20 @@ class SurfaceGrid:
         place = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) + move
         return on_lattice((place / [self.columns, self.rows]).reshape(-1, 2))
 
+    @property
+    def choices(self) -> IntArray:
+        """The diagonal of each cell (n_cells,)."""
+        return repeat_cyclically(self.diagonals, self.columns * self.rows)
+
+    def with_ring(self) -> SurfaceGrid:
+        """Return a grid with one more cell on each side, in which the cells of this grid keep their diagonals."""
+        choices = np.pad(self.choices.reshape(self.columns, self.rows), 1).reshape(-1)
+        return replace(self, columns=self.columns + 2, rows=self.rows + 2, diagonals=choices.tolist())
+
     def triangles(self) -> IntArray:
         """Return the faces (2 · n_cells, 3), counter-clockwise in the plane."""
         a, b, c, d = self.quadrilaterals().T
-        choice = repeat_cyclically(self.diagonals, len(a))[:, None] == 0
+        choice = self.choices[:, None] == 0
         first = np.where(choice, np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
         second = np.where(choice, np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
         return np.stack([first, second], axis=1).reshape(-1, 3)

@@ -67,6 +67,24 @@ class SurfacePair:
         ]
 
 
+@dataclass(frozen=True, slots=True)
+class MatchedPair(SurfacePair):
+    """A slave grid and a master grid with the same faces, and with a ring of more faces unless the domain is the same.
+
+    So each master node over the slave lies on a slave node.
+    """
+
+    def _master_points(self) -> FloatArray:
+        """Return the master's nodes (n, 2) before the stretch."""
+        points = self.slave.points()
+        if self.same_domain:
+            return points
+        points = np.pad(points.reshape(self.slave.columns + 1, -1, 2), ((1, 1), (1, 1), (0, 0)), mode="edge")
+        points[[0, -1], :, 0] = [[-0.5], [1.5]]
+        points[:, [0, -1], 1] = [-0.5, 1.5]
+        return points.reshape(-1, 2)
+
+
 def _start(face: IntArray, random: np.random.Generator) -> IntArray:
     """Return the corners of a face from another one on."""
     return np.roll(face, int(random.integers(len(face))))
@@ -81,3 +99,14 @@ def surface_pairs(
     grids, shuffle = surface_grids(most=most), st.one_of(st.just(0), st.integers(0, 255))
     stretches = _STRETCHES if stretched else st.just(0)
     return st.builds(SurfacePair, grids, grids, same, st.integers(0, 359), stretches, shuffle)
+
+
+@cache
+def matched_pairs() -> SearchStrategy[SurfacePair]:
+    """Return pairs with master nodes on slave nodes; half of them share their domain, and half do not."""
+    shuffle = st.one_of(st.just(0), st.integers(0, 255))
+
+    def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
+        return MatchedPair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number)
+
+    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, shuffle)

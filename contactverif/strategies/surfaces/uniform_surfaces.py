@@ -11,7 +11,7 @@ from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.strategies.parts import depth_units, penalties, seeds
 from contactverif.strategies.surfaces.space_motions import space_motions
-from contactverif.strategies.surfaces.surface_pairs import SurfacePair, surface_pairs
+from contactverif.strategies.surfaces.surface_pairs import SurfacePair, matched_pairs, surface_pairs
 
 _QUARTERS = st.integers(1, 8)  # The penetration, in quarters of a unit of the least height of a face.
 
@@ -25,6 +25,18 @@ def flat_surface_cases(interface: Interface | None = None) -> SearchStrategy[Cas
     (3,) (the unit vector out of the master). There are none on an interface of the user.
     """
     return _flat_states(surface_pairs()) if interface is None else None
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")
+def matched_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return cases as `flat_surface_cases` does, with each master node over the slave on a slave node."""
+    return _flat_states(matched_pairs()) if interface is None else None
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.overhung_surface_cases")
+def overhung_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return cases as `flat_surface_cases` does, with a master that goes beyond the slave on all sides."""
+    return _flat_states(surface_pairs(same_domain=False)) if interface is None else None
 
 
 @st.composite

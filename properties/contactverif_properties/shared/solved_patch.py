@@ -15,7 +15,7 @@ from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Surface
+from contactverif.contract.interface import PLANE, Surface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
@@ -226,12 +226,14 @@ def point_errors(state: FrozenState, penalty: float, pressure: float) -> tuple[f
 
 
 def beside_master(case: Case, points: ContactPoints) -> BoolArray:
-    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end.
+    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end; in space none does.
 
     A point that names no place on its surface does not lie beside the other. Where the master covers the slave, no
     point of the slave does. A point of a second pass lies on the master, and the other surface is the slave.
     """
     beside = np.zeros(len(points.c), bool)
+    if case.interface.dim != PLANE:
+        return beside
     covered = not overhangs(case)
     rounding = COORDINATE_ROUNDING * case.largest_coordinate
     interface, along = case.interface, case.parameters["along"]
