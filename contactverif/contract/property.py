@@ -249,7 +249,9 @@ class Property(PropertyInfo):
 def _in_space(question: Property) -> Property:
     """Return a property with its cases in space, the same object at each call."""
     assert question.cases_in_space is not None
-    return replace(question, cases=question.cases_in_space)
+    cases = question.cases_in_space(None) if question.kinds else ()
+    kinds = tuple(cases) if isinstance(cases, Mapping) else ()
+    return replace(question, cases=question.cases_in_space, kinds=kinds)
 
 
 def _find_defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:

@@ -33,7 +33,7 @@ class Reach(NamedTuple):
 def integers(values: FloatArray) -> tuple[list[int], int]:
     """Return integers and one power of two, the scale, such that value = integer / scale exactly."""
     ratios = [value.as_integer_ratio() for value in values.reshape(-1).tolist()]
-    scale = max(denominator for _, denominator in ratios)
+    scale = max((denominator for _, denominator in ratios), default=1)
     return [numerator * (scale // denominator) for numerator, denominator in ratios], scale
 
 

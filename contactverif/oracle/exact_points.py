@@ -24,7 +24,7 @@ from contactverif.oracle.exact_distance import integers
 
 Integers = NDArray[Any]  # An array of Python integers of any size.
 
-_SHIFT = 128  # The bits of a root behind the lattice's own.
+ROOT_SHIFT = 128  # The bits of a root behind the lattice's own.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,11 +115,11 @@ def closest_view(lattice: Lattice, points: ExactPoints, segments: IntArray) -> V
     """Return what points see of master segments (n_points,) along the normals of these segments."""
     arm, along = _arm_and_along(lattice, points, segments)
     squared = _dot(along, along)
-    length = _roots(squared)
+    length = roots(squared)
     return View(
         xi=Ratios(_dot(arm, along), points.weight * squared),
-        gap=Ratios(_cross(arm, along) << _SHIFT, points.weight * length * lattice.scale),
-        normal=Ratios(np.stack([along[:, 1], -along[:, 0]], axis=1) << _SHIFT, length[:, None]),
+        gap=Ratios(_cross(arm, along) << ROOT_SHIFT, points.weight * length * lattice.scale),
+        normal=Ratios(np.stack([along[:, 1], -along[:, 0]], axis=1) << ROOT_SHIFT, length[:, None]),
         lengths=_lengths(lattice, points, arm, along),
         slave_length=_sizes(points.along, lattice.scale),
         master_length=_sizes(along, lattice.scale),
@@ -136,13 +136,13 @@ def slave_normal_view(lattice: Lattice, points: ExactPoints, segments: IntArray)
     advance = -_dot(along, points.along)  # It is positive where the segments face each other.
     sign = np.where(advance < 0, -1, 1).astype(object)
     size = abs(advance) + (advance == 0)
-    slave_length = _roots(_dot(points.along, points.along))
+    slave_length = roots(_dot(points.along, points.along))
     master_length, slave_float = _sizes(along, lattice.scale), _sizes(points.along, lattice.scale)
     cosine = Ratios(advance, np.full(len(segments), lattice.scale**2, dtype=object)).floats()
     return View(
         xi=Ratios(-sign * _dot(arm, points.along), points.weight * size),
-        gap=Ratios(sign * slave_length * _cross(arm, along), points.weight * size * lattice.scale << _SHIFT),
-        normal=Ratios(np.stack([-points.along[:, 1], points.along[:, 0]], axis=1) << _SHIFT, slave_length[:, None]),
+        gap=Ratios(sign * slave_length * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
+        normal=Ratios(np.stack([-points.along[:, 1], points.along[:, 0]], axis=1) << ROOT_SHIFT, slave_length[:, None]),
         lengths=_lengths(lattice, points, arm, along),
         slave_length=slave_float,
         master_length=master_length,
@@ -188,9 +188,9 @@ def _cross(a: Integers, b: Integers) -> Integers:
     return product
 
 
-def _roots(squares: Integers) -> Integers:
+def roots(squares: Integers) -> Integers:
     """Return 2^128 times the roots of integers, rounded down."""
-    return _objects([isqrt(square << 2 * _SHIFT) for square in squares.tolist()])
+    return _objects([isqrt(square << 2 * ROOT_SHIFT) for square in squares.tolist()])
 
 
 def _objects(values: Sequence[int]) -> Integers:

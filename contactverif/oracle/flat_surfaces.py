@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -98,10 +99,20 @@ def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
         raise MisuseError(
             "plane", "a quadrilateral partly outside of the domain", "triangles, or none cut by the border"
         )
-    part = corners
-    for start, end in edges:
-        part = _cut(part, start, end)
-    return _triangle_over(corners, part)
+    return _triangle_over(corners, cut_polygon(corners, border))
+
+
+def cut_polygon(polygon: Polygon, border: Polygon) -> Polygon:
+    """Return the part of a convex polygon in another one, at most empty."""
+    for start, end in zip(border, border[1:] + border[:1], strict=True):
+        polygon = _cut(polygon, start, end)
+    return polygon
+
+
+def area_of(polygon: Polygon) -> Fraction:
+    """Return the area of a polygon."""
+    corners = polygon[1:]
+    return sum((_turn(polygon[0], *pair) for pair in pairwise(corners)), Fraction(0)) / 2
 
 
 def _cut(polygon: Polygon, start: Point, end: Point) -> Polygon:

@@ -229,5 +229,7 @@ def vts_ppt_3d(*, penalty: float) -> FaceQuarters:
     source = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, the outlook"
     # A part that overhangs the master presses the slave with all its area, and the master with what is covered.
     witnesses = {**SURFACE_TRAITS.evidence.witnesses, "balance": "tilted-faces"}
-    traits = SURFACE_TRAITS.revise(conserves_force=False, conserves_moment=False, witnesses=witnesses, source=source)
+    traits = SURFACE_TRAITS.revise(
+        gap="slave normal", conserves_force=False, conserves_moment=False, witnesses=witnesses, source=source
+    )
     return FaceQuarters(traits, check_penalty(penalty))

@@ -114,9 +114,10 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray) -> bool:
             here = edge[0] * (places[v, 1] - start[1]) - edge[1] * (places[v, 0] - start[0])
             there = edge[0] * (places[w, 1] - start[1]) - edge[1] * (places[w, 0] - start[0])
             if here >= tie:
-                clipped[n_left], new_codes[n_left], new_labels[n_left] = places[v], codes[v], labels[v]
+                clipped[n_left], new_codes[n_left] = places[v], codes[v]
+                new_labels[n_left] = -1 - i if here <= -tie and there < tie else labels[v]
                 n_left += 1
-            if (here >= tie) != (there >= tie):
+            if cross_edge(here, there, -tie):
                 clipped[n_left] = places[v] + here / (here - there) * (places[w] - places[v])
                 set_crossing(new_codes[n_left], i, labels[v], len(slave))
                 new_labels[n_left] = -1 - i if here >= tie else labels[v]
@@ -128,6 +129,15 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray) -> bool:
     for v in range(len(corners)):
         corners[v] = codes[min(v, count - 1)]
     return True
+
+
+@compile_maker
+def cross_edge(here: float, there: float, tie: float) -> bool:
+    """Return whether the ends of an edge lie beyond another edge, each by more than a tie, on different sides.
+
+    An end within the tie is a corner itself: a crossing there would be a quotient of two roundoffs.
+    """
+    return (here > tie and there < -tie) or (here < -tie and there > tie)
 
 
 @compile_maker

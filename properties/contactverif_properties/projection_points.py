@@ -9,6 +9,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -25,6 +26,7 @@ from contactverif_properties.shared.exact_places import (
     largest,
     name_places,
 )
+from contactverif_properties.shared.face_places import ON_FACES, count_decisions, face_errors, place_errors
 from contactverif_properties.shared.passes import Pass
 
 
@@ -38,7 +40,9 @@ OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
 FARTHER = Quantity("distance beyond the nearest segment", "4u", LOCAL_REASON)
 
 
-@define_projection(id="projection.segment", quantities=(FARTHER,), applicable=refuse_without_rule)
+@define_projection(
+    id="projection.segment", quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=refuse_without_rule
+)
 def projection_segment(case: Case, subject: Subject) -> Measurement:
     """Each contact point is measured against the master segment that the stated rule names.
 
@@ -56,8 +60,14 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
     overlap: a point whose weight is at most 8u of those lengths may name it. For `cells` it may be the nearest at the
     point or in the middle of its overlap, and segments beyond two lengths of both are no rivals.
 
+    In space a master face must look at the slave. Along the slave's normal the foot lies in it, or past the border of
+    the master. By the closest point no face with a foot inside is nearer. Lengths are those of `projection.place`.
+
     **Undecided.** Never. The number of exact ties is a detail. A point that names no segment is not judged here.
     """
+    if case.interface.dim != PLANE:
+        value, broken, idle = face_errors(case, subject)
+        return Measurement([FARTHER.check(value, 4 * UNIT_ROUNDOFF)], broken=broken, idle=idle)
     reported = Reported.from_case(case, subject)
     rule, value, ties, broken = subject.traits.rules.gap, 0.0, 0, ""
     for each in reported.passes:
@@ -93,7 +103,12 @@ POSITION = Quantity("error of the position", "4u", "Two products and their sum a
 _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 
-@define_projection(id="projection.place", quantities=(GAP, XI, NORMAL, POSITION), applicable=refuse_without_rule)
+@define_projection(
+    id="projection.place",
+    quantities=(GAP, XI, NORMAL, POSITION),
+    cases_in_space=ON_FACES,
+    applicable=refuse_without_rule,
+)
 def projection_place(case: Case, subject: Subject) -> Measurement:
     """Position, ξ, normal and gap of each contact point are those of its place.
 
@@ -113,16 +128,23 @@ def projection_place(case: Case, subject: Subject) -> Measurement:
     Along the slave's normal the first tolerance is over the cosine of the angle between the segments. X takes the place
     of D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
 
+    In space the shape functions of a foot take the place of ξ, times the longest edge of their face. The lengths are
+    2 (L + |P − A| + D + |gap| D/h) ℓ/h over the cosine, with the longest edge ℓ and the height h of a face: a foot is a
+    quotient by the area of its face.
+
     **Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted
     node is a mean, and is not judged here.
     """
+    tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
+    if case.interface.dim != PLANE:
+        on_faces, idle = place_errors(case, subject)
+        return Measurement(check_all(dict(zip(_ROUNDINGS, on_faces.values(), strict=True)), tolerances), idle=idle)
     reported = Reported.from_case(case, subject)
     values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
     for each in reported.passes:
         places = Places.from_pass(each, subject.traits.rules.gap, reported.distant)
         for name, errors in (*_errors(places, reported.distant), (POSITION, _position_errors(each, far))):
             values[name] = float(np.maximum(values[name], largest(errors)))
-    tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
     return Measurement(check_all(values, tolerances), idle=not reported.points.active.any())
 
 
@@ -166,7 +188,9 @@ def refuse_other_decisions(traits: Traits) -> str:
     return refuse_without_rule(traits)
 
 
-@define_projection(id="projection.activity", quantities=(WRONG,), applicable=refuse_other_decisions)
+@define_projection(
+    id="projection.activity", quantities=(WRONG,), cases_in_space=ON_FACES, applicable=refuse_other_decisions
+)
 def projection_activity(case: Case, subject: Subject) -> Measurement:
     """A contact point is active exactly where its gap is closed and its foot is on the master.
 
@@ -187,7 +211,7 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     are not asked.
     """
     both = [Reported.from_case(state, subject) for state in (case, _in_large_unit(case))]
-    wrong, decided = zip(*map(_count, both), strict=True)
+    wrong, decided = zip(*map(_count if case.interface.dim == PLANE else count_decisions, both), strict=True)
     samples = [each.points for each in both]
     homeless = any(
         (points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))).any()

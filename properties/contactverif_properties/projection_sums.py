@@ -9,7 +9,9 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.faces import turns_of
 from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
@@ -23,6 +25,7 @@ from contactverif_properties.shared.exact_places import (
     largest,
     name_places,
 )
+from contactverif_properties.shared.face_places import ON_FACES, FacePlaces, area_error
 from contactverif_properties.shared.passes import Pass
 from contactverif_properties.shared.roundoff import sum_slave_forces
 
@@ -35,6 +38,7 @@ SUM = Quantity("error of the sum of weights", "64u", "As above; nodes that are c
 @define_projection(
     id="projection.area",
     quantities=(WEIGHT, ENDS, SUM),
+    cases_in_space=ON_FACES,
     applicable=lambda traits: "" if traits.rules.penalty == "distributed" else "there are no distributed springs",
 )
 def projection_area(case: Case, subject: Subject) -> Measurement:
@@ -56,18 +60,26 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
     Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is asked only where the
     slave faces one master chain as above, since cells of averaged normals overlap where a master folds back.
 
+    In space a weight is an area, negative by rounding at most, and areas have no ends. The sums are over the area's
+    root and the diameter. Closest points add up to the slave's area where they are all its nodes.
+
     **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is
     deeper than two lengths, is not measured. A nodal penalty has no areas and is not asked.
     """
     reported = Reported.from_case(case, subject)
-    values = dict.fromkeys((WEIGHT, ENDS, SUM), 0.0)
+    in_space = case.interface.dim != PLANE
+    values = dict.fromkeys((SUM,) if in_space else (WEIGHT, ENDS, SUM), 0.0)
     one_pass = not reported.points.on_master.any()
     for each in reported.passes:
         lengths = _lengths(each, subject.traits)
+        if in_space:
+            rule, distant = subject.traits.rules.gap, reported.distant
+            values[SUM] = max(values[SUM], min(area_error(each, rule, length, distant) for length in lengths))
+            continue
         trials = [_Areas(each, subject.traits, length, reported.distant, one_pass).errors() for length in lengths]
         best = min(trials, key=lambda trial: max(trial.values()))
         values = {name: max(value, best[name]) for name, value in values.items()}
-    tolerances = {WEIGHT: 16 * UNIT_ROUNDOFF, ENDS: 16 * UNIT_ROUNDOFF, SUM: 64 * UNIT_ROUNDOFF}
+    tolerances = {name: {SUM: 64}.get(name, 16) * UNIT_ROUNDOFF for name in values}
     fits = values[SUM] <= tolerances[SUM]
     return Measurement(
         check_all(values, tolerances), broken=_area_breach(reported, fits=fits), idle=not reported.points.active.any()
@@ -80,7 +92,9 @@ def _area_breach(reported: Reported, *, fits: bool) -> str:
     Idle points are left out if no point is idle, and lengths are missing.
     """
     points = reported.points
-    if not (points.weight >= 0).all():
+    # An area of no more than rounding may have either sign, a length not.
+    rounding = 16 * UNIT_ROUNDOFF * reported.distant**2 if reported.state.interface.dim != PLANE else 0.0
+    if not (points.weight >= -rounding).all():
         return "a weight is negative or NaN"
     length = sum(float(_lengths(each, reported.traits)[0].sum()) for each in reported.passes)
     if not fits and points.active.all() and float(points.weight.sum()) < length:
@@ -89,8 +103,8 @@ def _area_breach(reported: Reported, *, fits: bool) -> str:
 
 
 def _lengths(each: Pass, traits: Traits) -> list[FloatArray]:
-    """Return the lengths (n_segments,) of the slave in the configurations in which areas may be measured."""
-    current, reference = (each.interface.slave.lengths(nodes) for nodes in (each.positions, each.interface.nodes))
+    """Return the lengths or areas (n_faces,) of the slave in the configurations in which they may be measured."""
+    current, reference = (each.interface.slave.measures(nodes) for nodes in (each.positions, each.interface.nodes))
     return {"current": [current], "reference": [reference], None: [current, reference]}[traits.rules.area]
 
 
@@ -188,7 +202,7 @@ FOOT = Quantity(
 LAW = Quantity("pressure against −ε̂ × gap", "8u", "The gap may be formed anew for the pressure.")
 
 
-@define_projection(id="projection.forces", quantities=(UNIT, FORCES, FOOT, LAW))
+@define_projection(id="projection.forces", quantities=(UNIT, FORCES, FOOT, LAW), cases_in_space=ON_FACES)
 def projection_forces(case: Case, subject: Subject) -> Measurement:
     """The pressures at the contact points are the forces on the slave, and their gaps are what the places show.
 
@@ -213,7 +227,8 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
 
     Sums are compared over Σ|R|, with u(8D/min(g, ℓ) + 4N). Vectors are compared over X, |gap| D/ℓ and the lengths that
     they are formed from, with 16u, and pressures over ε̂ times the gap and D, with 8u. X takes the place of the
-    diameter D where the traits do not promise `translation_stable`.
+    diameter D where the traits do not promise `translation_stable`. In space vectors are compared over X and the
+    lengths of `projection.place`.
 
     **Undecided.** Never. What does not hold for a formulation by its traits is not measured.
     """
@@ -246,7 +261,7 @@ def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, 
     penetration of u D gives.
     """
     state = reported.state
-    stiffness = state.penalty * state.slave_length  # Force per length of penetration.
+    stiffness = state.penalty * state.slave_measure  # Force per length of penetration.
     size = max(sum_slave_forces(state, reported.forces), UNIT_ROUNDOFF * reported.distant * stiffness)
     reach = min(size / stiffness, state.shortest_segment)
     tolerance = UNIT_ROUNDOFF * (8 * reported.distant / reach + 4 * state.n_segments)
@@ -255,7 +270,8 @@ def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, 
 
 def _breach(points: ContactPoints, traits: Traits) -> str:
     """Return how the points break the contract, or an empty string."""
-    if (points.weighted & (np.abs(points.c) < 1)).any():
+    inside = (points.slave_shape < 1).all(axis=1) if points.slave_shape.shape[1] else np.abs(points.c) < 1
+    if (points.weighted & inside).any():
         return "a weighted node lies inside a segment"
     if traits.rules.penalty == "nodal" and (points.weight[points.active] != 1).any():
         return "a nodal force has a weight other than 1"
@@ -269,11 +285,16 @@ def _breach(points: ContactPoints, traits: Traits) -> str:
 def _normal_error(points: ContactPoints) -> float:
     """Return the largest difference of a normal's length from 1, where a point has a pressure or a normal."""
     counted = (points.pressure > 0) | np.isfinite(points.normal).all(axis=1)
-    return largest(np.abs(np.hypot(points.normal[counted, 0], points.normal[counted, 1]) - 1))
+    return largest(np.abs(_norms(points.normal[counted]) - 1))
+
+
+def _norms(vectors: FloatArray) -> FloatArray:
+    """Return the lengths (n,) of vectors (n, dim)."""
+    return np.hypot(vectors[:, 0], vectors[:, 1]) if vectors.shape[1] == PLANE else np.linalg.norm(vectors, axis=1)
 
 
 def _force_difference(reported: Reported) -> FloatArray | None:
-    """Return Σ pressure × weight × normal + ΣR of the slave (2,), or None where the two need not be equal.
+    """Return Σ pressure × weight × normal + ΣR of the slave (dim,), or None where the two need not be equal.
 
     A second pass pushes the master. What it does to the slave is the reaction, if forces balance.
     """
@@ -303,9 +324,13 @@ def _bend(reported: Reported) -> float:
     bend = 0.0
     for each in reported.passes:
         if each.points.weighted.any():
-            ends = each.positions[each.interface.slave.segments]
-            along = (ends[:, 1] - ends[:, 0]) / each.interface.slave.lengths(each.positions)[:, None]
-            bend = max(bend, float(np.ptp(along, axis=0).max()))
+            ends = each.positions[each.interface.slave.faces]
+            if each.interface.dim == PLANE:
+                ways = (ends[:, 1] - ends[:, 0]) / each.interface.slave.lengths(each.positions)[:, None]
+            else:
+                ways = turns_of(ends).sum(axis=1)
+                ways /= _norms(ways)[:, None]
+            bend = max(bend, float(np.ptp(ways, axis=0).max()))
     return bend
 
 
@@ -315,7 +340,7 @@ def _thinness(reported: Reported) -> float:
     Dual shapes on a covered share of a segment are differences of places, which are rounded by u over that share.
     """
     thinness = 0.0
-    for each in reported.passes:
+    for each in reported.passes if reported.state.interface.dim == PLANE else ():
         points = each.points.select(each.points.weighted & each.points.active & name_places(each.points))
         length = each.interface.slave.lengths(each.positions)[points.slave_segment]
         with np.errstate(divide="ignore"):
@@ -330,6 +355,12 @@ def _foot_error(each: Pass, reported: Reported) -> float:
     the lengths are over that cosine. A kernel that rounds nodes at D turns the segment whose normal it takes by uD/ℓ,
     which moves the end of gap × normal by |gap| uD/ℓ, and ξ past an end by |ξ| uD/ℓ.
     """
+    if each.interface.dim != PLANE:
+        places = FacePlaces.from_pass(each, reported.traits.rules.gap, reported.distant)
+        points, nodes = places.reported, each.positions[each.interface.master.faces]
+        foot = np.einsum("qk,qki->qi", points.master_shape, nodes[points.master_segment])
+        errors = points.position - foot - points.gap[:, None] * points.normal
+        return largest(_norms(errors) / (np.abs(each.positions).max() + places.scale))
     named = name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
     points = each.points.select(named & np.isfinite(each.points.gap))
     first, second = np.swapaxes(each.positions[each.interface.master.segments[points.master_segment]], 0, 1)

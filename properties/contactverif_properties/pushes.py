@@ -64,7 +64,8 @@ def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
 @random_source("contactverif_properties.pushes.pushing_surfaces")
 def pushing_surfaces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return flat cases in space with a uniform penetration, and tilted and warped ones, each half of all cases."""
-    return {FLAT: flat_surface_cases(), ANY_SHAPE: surface_cases()} if interface is None else None
+    flat, tilted = flat_surface_cases(interface), surface_cases(interface)
+    return None if flat is None or tilted is None else {FLAT: flat, ANY_SHAPE: tilted}
 
 
 def lift_slave(case: Case, height: float) -> Case:
@@ -384,12 +385,8 @@ def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: F
     points = each.points.select(directed)
     slave, master = each.interface.slave.faces, each.interface.master.faces
     node_of = _nodes_of_points(each.interface, points)
-    for segment, own, normal in zip(points.slave_segment.tolist(), node_of.tolist(), points.normal, strict=True):
-        if segment < 0:
-            continue
-        # A point that is a node is on all segments or faces there.
-        carriers = slave[(slave == own).any(axis=1)] if own >= 0 else slave[segment]
-        for node in np.unique(carriers):
+    for segment, number, normal in zip(points.slave_segment.tolist(), node_of.tolist(), points.normal, strict=True):
+        for node in _carriers(slave, segment, number):
             normals[int(each.numbers[node])].append(normal)
     carriers = slave[points.slave_segment[points.slave_segment >= 0]].reshape(-1)
     pushing = [normal for node in np.unique(each.numbers[carriers]) for normal in normals[int(node)]]
@@ -398,6 +395,13 @@ def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: F
     for segment, pull in zip(points.master_segment.tolist(), _pull_past_ends(points), strict=True):
         if segment >= 0:
             allowance[each.numbers[master[segment]]] += pull
+
+
+def _carriers(slave: IntArray, segment: int, node: int) -> IntArray:
+    """Return the nodes of the segment or face of a point; of all that meet in a node, if the point is one."""
+    if segment < 0:
+        return slave[:0].reshape(-1)
+    return np.unique(slave[(slave == node).any(axis=1)] if node >= 0 else slave[segment])
 
 
 def _nodes_of_points(interface: Interface, points: ContactPoints) -> IntArray:

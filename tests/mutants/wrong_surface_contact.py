@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from mutate import Mutant, decides, reports, says
+import numpy as np
+from mutate import Mutant, decides, reports, says, wrap
 from wrong_surfaces import MORTAR, STS, changes_points
 
 import contactverif_surfaces
@@ -22,6 +23,16 @@ def _pushing(make: Callable[..., Any]) -> Callable[..., Any]:
     return says(make, nodes_push=True)
 
 
+def _report_closed(make: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the factory of a right formulation that reports the points in contact alone."""
+
+    def contact_points(right: Any, *arguments: Any) -> Any:
+        points = right(*arguments)
+        return points.select(points.active)
+
+    return lambda *, penalty: wrap(penalty, make, contact_points=contact_points)
+
+
 MUTANTS = (
     Mutant("springs that pull, too", "unilateral", decides(STS, lambda pairing, interface: pairing["active"] | True)),
     Mutant("all points of a cell closed with one of them", "unilateral",
@@ -36,6 +47,25 @@ MUTANTS = (
     Mutant("equal stiffness at nodes said to be that of areas", "patch.flat.normal",
            says(NTS, normal=True, penalty="distributed", area="current")),
     Mutant("nodal areas said to be nodal springs", "patch.flat.nodal", says(NTS_AR, penalty="nodal", area=None)),
+    Mutant("gap over the cosine reported", "projection.place",
+           reports(STS, lambda points, interface, x: {"gap": points.gap / np.abs(points.normal[:, 2])})),
+    Mutant("foot reported in the middle of its face", "projection.place",
+           reports(STS, lambda points, interface, x: {"master_shape": np.full_like(points.master_shape, 1 / 3)})),
+    Mutant("normal of the slave reported", "projection.place",
+           reports(STS, lambda points, interface, x: {"normal": -points.normal})),
+    Mutant("position reported on the master", "projection.place",
+           reports(STS, lambda points, interface, x: {
+               "position": points.position - points.gap[:, None] * points.normal})),
+    Mutant("another master face reported", "projection.segment",
+           reports(STS, lambda points, interface, x: {
+               "master_segment": (points.master_segment + 1) % len(interface.master)})),
+    Mutant("all points of a cell decided by the first one", "projection.activity",
+           decides(STS, lambda pairing, interface: pairing["active"] & pairing["active"][:, :1])),
+    Mutant("area in the plane z = 0 reported", "projection.area",
+           reports(STS, lambda points, interface, x: {"weight": points.weight * np.abs(points.normal[:, 2])})),
+    Mutant("closed points alone reported on faces", "projection.area", _report_closed(STS)),
+    Mutant("pressure of points reported twice", "projection.forces",
+           reports(STS, lambda points, interface, x: {"pressure": 2 * points.pressure})),
     Mutant("forces of nodes reported twice", "patch.flat.nodal",
            reports(NTS, lambda points, interface, x: {"pressure": 2 * points.pressure})),
 )  # fmt: skip

@@ -42,7 +42,7 @@ class SurfaceGrid:
     @property
     def choices(self) -> IntArray:
         """The diagonal of each cell (n_cells,)."""
-        return repeat_cyclically(self.diagonals, self.columns * self.rows)
+        return repeat_cyclically(self.diagonals, self.columns * self.rows).astype(np.int64)
 
     def with_ring(self) -> SurfaceGrid:
         """Return a grid with one more cell on each side, in which the cells of this grid keep their diagonals."""

@@ -47,7 +47,7 @@ class Reported:
     """The answers of a formulation in a state."""
 
     state: Case  # With multipliers, if the formulation has any.
-    forces: FloatArray  # The position rows of the residual, of shape (n_nodes, 2).
+    forces: FloatArray  # The position rows of the residual, of shape (n_nodes, dim).
     points: ContactPoints
     traits: Traits
 
@@ -56,7 +56,9 @@ class Reported:
         """Ask a formulation about a case without multipliers."""
         frozen = freeze_state(case, subject)
         forces, points = frozen.formulation.answers([frozen.call("residual"), frozen.call("contact_points")])
-        return cls(frozen.case, forces[: case.interface.n_unknowns].reshape(-1, 2), points, subject.traits)
+        return cls(
+            frozen.case, forces[: case.interface.n_unknowns].reshape(case.positions.shape), points, subject.traits
+        )
 
     @property
     def passes(self) -> Iterator[Pass]:
@@ -110,7 +112,8 @@ class Places:
 
 def name_places(points: ContactPoints) -> BoolArray:
     """Return which points (n_points,) name a place on their surface."""
-    return (points.slave_segment >= 0) & np.isfinite(points.c)
+    placed = np.isfinite(points.slave_shape).all(axis=1) if points.slave_shape.shape[1] else np.isfinite(points.c)
+    return np.asarray((points.slave_segment >= 0) & placed)
 
 
 @random_source("contactverif_properties.shared.exact_places.projected_cases")
