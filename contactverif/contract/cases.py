@@ -6,10 +6,12 @@ Rule for the next editor: a stored name never changes, wherever its function mov
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any, TypeVar
 
 from contactverif.contract.case import Case
+from contactverif.contract.faces import TRIANGLE
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -90,6 +92,15 @@ class Cases:
         return cls(make, is_list=True, on_place=on_place, needs=needs)
 
     @property
+    def takes_faces(self) -> bool:
+        """True if the function makes cases in space with other faces than triangles, by an argument `faces`."""
+        return "faces" in signature(self.make).parameters
+
+    def on_faces(self, faces: tuple[int, ...]) -> Cases:
+        """Return the cases on faces with these numbers of corners."""
+        return self if faces == (TRIANGLE,) else replace(self, make=_OnFaces(self.make, faces))
+
+    @property
     def random_source(self) -> str:
         """The stored name of the function, or an empty string."""
         return name_of_source(self.make)
@@ -99,6 +110,22 @@ class Cases:
         if not self.is_list:
             return self.make(place)
         return self.make() if place is None else self.on_place(place)
+
+
+@dataclass(frozen=True, slots=True)
+class _OnFaces:
+    """A function that makes cases on faces with some numbers of corners."""
+
+    make: Callable[..., Any]
+    faces: tuple[int, ...]
+
+    def __call__(self, place: Any) -> Any:
+        return self.make(place, self.faces)
+
+    @property
+    def random_source(self) -> str:
+        """The stored name of the function; the same seed draws other faces from it."""
+        return name_of_source(self.make)
 
 
 def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function]:

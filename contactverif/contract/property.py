@@ -17,6 +17,7 @@ from typing import Any, TypedDict, Unpack
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
+from contactverif.contract.cases import Cases
 from contactverif.contract.engine_subject import SOLVE, EngineSubject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import TRIANGLE
@@ -121,7 +122,7 @@ class OtherAttributes(TypedDict, total=False):
     bodies: bool
     engines: bool
     exact: Callable[[Case], FloatArray] | None
-    cases_in_space: Callable[[Any], Any] | None
+    cases_in_space: Cases | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,9 +133,9 @@ class Property(PropertyInfo):
     ----------
     cases : Callable[[Any], Any]
         The cases, a `Cases`.
-    cases_in_space : Callable[[Any], Any] | None
-        The cases on interfaces in space, a `Cases` with a stored name of its own; None if the question is about plane
-        interfaces alone.
+    cases_in_space : Cases | None
+        The cases on interfaces in space, with a stored name of their own; None if the question is about plane
+        interfaces alone. They are on triangles, unless the function that makes them has an argument `faces`.
     measure : Callable[[Case, Subject], Measurement]
         Measures one case; it raises what the plugin raises.
     promise : Callable[[Traits], bool | None]
@@ -170,7 +171,7 @@ class Property(PropertyInfo):
     engines: bool = False
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""
-    cases_in_space: Callable[[Any], Any] | None = None
+    cases_in_space: Cases | None = None
 
     @classmethod
     def define(
@@ -207,7 +208,7 @@ class Property(PropertyInfo):
         """
         if traits.abilities.in_plane or self.cases_in_space in (None, self.cases):
             return self
-        return _in_space(self)
+        return _in_space(self, traits.abilities.faces if self.cases_in_space.takes_faces else (TRIANGLE,))
 
     def refusal_of(self, subject: Subject) -> str:
         """Return why the property is not asked of a formulation or an engine, or an empty string."""
@@ -219,13 +220,8 @@ class Property(PropertyInfo):
 
     def refusal(self, traits: Traits) -> str:
         """Return why the property is not asked of a formulation of these traits, or an empty string."""
-        if not traits.abilities.in_plane:
-            if self.cases_in_space is None:
-                return "the interfaces are plane, and the formulation takes none of them"
-            if TRIANGLE not in traits.abilities.faces:
-                return "the interfaces in space are of triangles, and the formulation takes none of them"
-            if traits.rules.enforcement == "barrier":
-                return "the states in space penetrate, where a barrier is not defined"
+        if not traits.abilities.in_plane and (reason := self._refuse_in_space(traits)):
+            return reason
         if traits.rules.enforcement in self.asks:
             if traits.rules.enforcement == "barrier" and traits.rules.activation is None:
                 return "the barrier does not state the trait `activation`, so no gap is known"
@@ -233,6 +229,16 @@ class Property(PropertyInfo):
         if traits.rules.enforcement == "barrier" and "penalty" in self.asks:
             return "the states penetrate, where a barrier is not defined"
         return f"the enforcement is by a {traits.rules.enforcement}"
+
+    def _refuse_in_space(self, traits: Traits) -> str:
+        """Return why there is no case in space for a formulation of these traits, or an empty string."""
+        if self.cases_in_space is None:
+            return "the interfaces are plane, and the formulation takes none of them"
+        if TRIANGLE not in traits.abilities.faces and not self.cases_in_space.takes_faces:
+            return "the interfaces in space are of triangles, and the formulation takes none of them"
+        if traits.rules.enforcement == "barrier":
+            return "the states in space penetrate, where a barrier is not defined"
+        return ""
 
     def __reduce__(self) -> str | tuple[Any, ...]:
         # The name of a decorated function is that of the property, so the function itself cannot be pickled by it.
@@ -246,12 +252,12 @@ class Property(PropertyInfo):
 
 
 @cache
-def _in_space(question: Property) -> Property:
-    """Return a property with its cases in space, the same object at each call."""
+def _in_space(question: Property, faces: tuple[int, ...]) -> Property:
+    """Return a property with its cases in space on such faces, the same object at each call."""
     assert question.cases_in_space is not None
-    cases = question.cases_in_space(None) if question.kinds else ()
-    kinds = tuple(cases) if isinstance(cases, Mapping) else ()
-    return replace(question, cases=question.cases_in_space, kinds=kinds)
+    cases = question.cases_in_space.on_faces(faces)
+    by_kind = cases(None) if question.kinds else ()
+    return replace(question, cases=cases, kinds=tuple(by_kind) if isinstance(by_kind, Mapping) else ())
 
 
 def _find_defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:

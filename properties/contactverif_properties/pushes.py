@@ -14,7 +14,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.cases import Cases, random_source
-from contactverif.contract.faces import turns_of
+from contactverif.contract.faces import TRIANGLE, turns_of
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
@@ -62,9 +62,11 @@ def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
 
 
 @random_source("contactverif_properties.pushes.pushing_surfaces")
-def pushing_surfaces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+def pushing_surfaces(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> dict[str, SearchStrategy[Case]] | None:
     """Return flat cases in space with a uniform penetration, and tilted and warped ones, each half of all cases."""
-    flat, tilted = flat_surface_cases(interface), surface_cases(interface)
+    flat, tilted = flat_surface_cases(interface, faces), surface_cases(interface, faces)
     return None if flat is None or tilted is None else {FLAT: flat, ANY_SHAPE: tilted}
 
 

@@ -278,6 +278,7 @@ MUTANTS = (
     Mutant("cells said to be symmetric", "symmetric", says(STS, symmetric=True)),
     Mutant("cells said to be unbiased", "swap", says(CELL, unbiased=True)),
     Mutant("quarters said to balance past the border", FORCE, says(QUARTERS, conserves_force=True)),
+    Mutant("one point a cell said to be exact on rectangles", TRANSMISSION, says(CELL, faces=(3, 4))),
     Mutant("nodes said to pass the patch test", TRANSMISSION,
            says(contactverif_surfaces.nts_ar_3d, flat=True)),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for interfaces in space: grids of triangles, built constructively and never filtered.
+"""Hypothesis strategies for interfaces in space: grids of triangles and of quadrilaterals, built and never filtered.
 
 All shrink to one square on one square, each cut in two, without any motion.
 """
@@ -13,12 +13,14 @@ from contactverif.strategies.surfaces.uniform_surfaces import (
     flat_surface_cases,
     matched_surface_cases,
     overhung_surface_cases,
+    skewed_surface_cases,
 )
 
 __all__ = [
     "flat_surface_cases",
     "matched_surface_cases",
     "overhung_surface_cases",
+    "skewed_surface_cases",
     "smooth_surface_cases",
     "surface_cases",
     "tilted_plane_cases",

@@ -16,8 +16,9 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
+from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.interface import Interface
-from contactverif.strategies.parts import OFFSETS, depth_units, on_own_meshes, penalties, repeat_cyclically, seeds
+from contactverif.strategies.parts import OFFSETS, depth_units, penalties, repeat_cyclically, seeds
 from contactverif.strategies.surfaces.space_motions import SpaceMotion, space_motions
 from contactverif.strategies.surfaces.surface_pairs import SurfacePair, surface_pairs
 from contactverif.strategies.translations import FINENESS, FURTHEST
@@ -30,26 +31,36 @@ _WARPS = st.lists(st.integers(-4, 4), min_size=1, max_size=9)  # Moves across in
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.surface_cases")
-def surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+def surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
     """Return tilted and warped states, of which half have surfaces on the same domain, with all its ties."""
-    return _tilted_states(surface_pairs(), smooth=False) if interface is None else None
+    return _tilted_states(surface_pairs(faces=faces), smooth=False) if interface is None else None
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
-def smooth_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+def smooth_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
     """Return tilted and warped states off the lattice, over a larger master: for derivatives."""
-    pairs = surface_pairs(same_domain=False, stretched=False)
+    pairs = surface_pairs(same_domain=False, stretched=False, faces=faces)
     return _tilted_states(pairs, smooth=True) if interface is None else None
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
-@on_own_meshes
-def translated_surface_cases(draw: DrawFn) -> Case:
+def translated_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
     """Return turned states near the origin that a translation by the parameter "shift" (3,) moves exactly.
 
     State and reference are rounded to multiples of 2^-33, and the translation goes up to 2^20.
     """
-    pair = surface_pairs(same_domain=False, stretched=False, most=3)
+    pairs = surface_pairs(same_domain=False, stretched=False, most=3, faces=faces)
+    return _translated_states(pairs) if interface is None else None
+
+
+@st.composite
+def _translated_states(draw: DrawFn, pair: SearchStrategy[SurfacePair]) -> Case:
     case = draw(_tilted_states(pair, smooth=True, motions=space_motions(furthest=0, exponents=0)))
     shift = np.array([draw(_PLACES), draw(_PLACES), draw(_PLACES)], dtype=np.float64)
     nodes, z = (

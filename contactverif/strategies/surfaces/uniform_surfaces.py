@@ -8,6 +8,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
+from contactverif.contract.faces import QUADRILATERAL, TRIANGLE
 from contactverif.contract.interface import Interface
 from contactverif.strategies.parts import depth_units, penalties, seeds
 from contactverif.strategies.surfaces.space_motions import space_motions
@@ -17,14 +18,25 @@ _QUARTERS = st.integers(1, 8)  # The penetration, in quarters of a unit of the l
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.flat_surface_cases")
-def flat_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+def flat_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
     """Return cases of uniform penetration in space; the master covers the slave.
 
     Their parameters are "penetration" (|g| > 0, a length), "plane" (n_nodes, 2) (coordinates of the nodes in the plane
     of the interface, before any rigid motion), "domain" (4, 2) (the corners of the slave's domain there) and "normal"
-    (3,) (the unit vector out of the master). There are none on an interface of the user.
+    (3,) (the unit vector out of the master). Quadrilaterals are rectangles. There are no cases on an interface of the
+    user.
     """
-    return _flat_states(surface_pairs()) if interface is None else None
+    return _flat_states(surface_pairs(faces=faces, straight=True)) if interface is None else None
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.skewed_surface_cases")
+def skewed_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (QUADRILATERAL,)
+) -> SearchStrategy[Case] | None:
+    """Return cases as `flat_surface_cases` does, on the same domain, with quadrilaterals of any convex shape."""
+    return _flat_states(surface_pairs(same_domain=True, faces=faces)) if interface is None else None
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")

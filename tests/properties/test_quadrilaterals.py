@@ -1,0 +1,68 @@
+"""Quadrilaterals in space: which are cases for whom, and how far from exact quadratures of their overlaps are."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from subjects import load_property, load_subject
+from wrong_surfaces import CELL, STS, by_rule
+
+from contactverif import Case, Property, Subject, judge_case
+from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.surfaces import flat_surface_cases, skewed_surface_cases, surface_cases
+from contactverif_surfaces.cell_points import gauss_points
+
+
+def corners_of(case: Case) -> tuple[int, int]:
+    return case.interface.slave.faces.shape[1], case.interface.master.faces.shape[1]
+
+
+@pytest.mark.parametrize(
+    ("faces", "kinds"), [((3,), {(3, 3)}), ((4,), {(4, 4)}), ((3, 4), {(3, 3), (3, 4), (4, 3), (4, 4)})]
+)
+def test_only_faces_that_a_formulation_takes_are_cases(faces: tuple[int, ...], kinds: set[tuple[int, int]]) -> None:
+    for name in ("balance.force", "tangent.directional", "patch.flat.transmission"):
+        traits = load_subject("sts-3d").traits.revise(faces=faces)
+        question = load_property(name).for_traits(traits)
+        cases = draw_cases(question.cases(None), seed="quads", examples=40).cases
+        assert {corners_of(case) for case in cases} == kinds
+
+
+def test_flat_quadrilaterals_are_rectangles_and_lie_in_the_domain() -> None:
+    for case in draw_cases(flat_surface_cases(faces=(4,)), seed="flat", examples=20).cases:
+        for side in (case.interface.slave, case.interface.master):
+            corners = case.parameters["plane"][side.faces]
+            assert (corners[:, 0] + corners[:, 2] == corners[:, 1] + corners[:, 3]).all()
+            assert (corners.min(axis=(0, 1)) == case.parameters["domain"].min(axis=0)).all()
+
+
+def test_no_quadrilateral_is_refused_by_the_contract() -> None:
+    for strategy in (surface_cases, skewed_surface_cases):
+        for case in draw_cases(strategy(faces=(4,)), seed="shapes", examples=60).cases:
+            assert corners_of(case) == (4, 4)
+            assert np.isfinite(case.interface.slave.heights(case.positions)).all()
+
+
+def test_a_formulation_of_triangles_is_not_asked_about_quadrilaterals() -> None:
+    question = load_property("patch.flat.quad")
+    assert question.refusal(load_subject("vts-cell-3d").traits) == "the formulation takes no quadrilaterals"
+    assert "in space" in question.refusal(load_subject("vts-ppt").traits)
+    assert question.refusal(load_subject("sts-3d").traits) == ""
+
+
+def error(question: Property, case: Case, make: Any) -> float:
+    measurement = judge_case(question, case, Subject("a rule", make)).measurement
+    assert measurement is not None
+    return measurement.numbers[0].value
+
+
+def test_more_points_are_nearer_to_exact_on_skewed_quadrilaterals() -> None:
+    """A right rule of three points errs by up to 1e-3, of six by some 1e-4, and one point a cell by some 1e-2."""
+    question = load_property("patch.flat.quad").for_traits(load_subject("sts-3d").traits)
+    cases = draw_cases(skewed_surface_cases(faces=(4,)), seed="errors", examples=40).cases
+    rules = {6: STS, 3: by_rule(partial(gauss_points, n_points=3)), 1: CELL}
+    worst = {count: max(error(question, case, make) for case in cases) for count, make in rules.items()}
+    print(worst)
+    assert worst[6] < worst[3] / 4 < worst[1] / 16
+    assert worst[6] < 1e-3
