@@ -257,7 +257,8 @@ def _in_space(question: Property, faces: tuple[int, ...]) -> Property:
     assert question.cases_in_space is not None
     cases = question.cases_in_space.on_faces(faces)
     by_kind = cases(None) if question.kinds else ()
-    return replace(question, cases=cases, kinds=tuple(by_kind) if isinstance(by_kind, Mapping) else ())
+    kinds = tuple(by_kind) if isinstance(by_kind, Mapping) else ()
+    return replace(question, cases=cases, cases_in_space=cases, kinds=kinds)
 
 
 def _find_defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:
