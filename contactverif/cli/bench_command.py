@@ -77,7 +77,7 @@ def bench(
     \bExit status
       0  measured; with --against, no count grew and nothing is slower
       1  a count grew, an evaluation is slower by its interval, or a plugin
-         crashes or does not load
+         crashes, does not load, or poses a problem wrongly
       2  the command line is wrong; one line says what is needed
 
     \bExamples
@@ -195,7 +195,7 @@ def _show(
 
     _show_costs(results)
     for name, reason in results.not_loaded.items():
-        show(f"{name} did not load: {reason}")
+        show(f"{name} is not measured: {reason}")
     if compared:
         sentences = [change.sentence for change in changes]
         show("\n".join(sentences) or "The earlier bench has none of these formulations and cells.")

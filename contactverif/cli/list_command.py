@@ -1,4 +1,4 @@
-"""The command `list`: installed formulations with what they state, and installed properties."""
+"""The command `list`: installed formulations with what they state, properties, problems, and engines."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def list_installed(
     traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
     isolation: IsolationOptions,
 ) -> None:
-    """List the installed formulations with their promises, properties, and engines.
+    """List the installed formulations with their promises, properties, problems of bench, and engines.
 
     A promise is what a formulation says of itself; verify checks it. A
     witness is a named case on which a formulation says that it fails.
@@ -54,7 +54,7 @@ def list_installed(
     from contactverif.cli.console import plain_table, show
     from contactverif.contract.result import NotLoaded
     from contactverif.plugins.engines import describe_engines
-    from contactverif.plugins.registry import load_formulations, load_properties
+    from contactverif.plugins.registry import load_formulations, load_problems, load_properties
 
     table = plain_table("formulations", words=("name",))
     table.add_column("promises")
@@ -71,6 +71,11 @@ def list_installed(
             table.add_row(question.formulation, _not_loaded(question))
         else:
             table.add_row(question.id, question.summary)
+    show(table)
+    table = plain_table("problems", words=("name",))
+    table.add_column("what bench solves")
+    for name, problem in load_problems().items():
+        table.add_row(name, _not_loaded(problem) if isinstance(problem, NotLoaded) else problem.label)
     show(table)
     table = plain_table("engines", words=("name",))
     table.add_column("what it is")

@@ -187,11 +187,16 @@ class Property(PropertyInfo):
         """Return a decorator that makes a property of the function that measures.
 
         The first line of its docstring is the summary, and what follows is the question. The arguments are the other
-        attributes of the property. A property that is made so can be pickled.
+        attributes of the property. A property that is made so can be pickled. A function without a docstring is
+        refused.
         """
 
         def make(measure: Measure) -> Property:
             summary, _, question = (getdoc(measure) or "").partition("\n\n")
+            if not summary:
+                name = f"{measure.__module__}.{measure.__qualname__}"
+                needed = "what must hold, in one line, and the question below it: the property's page is made of them"
+                raise MisuseError(f"docstring of {name}", "none", needed)
             return cls(id, family, summary, quantities, cases, measure, promise, question=question, **others)
 
         return make

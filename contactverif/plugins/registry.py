@@ -40,6 +40,7 @@ FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
 ENGINE_PROPERTIES = "contactverif.engine_properties"  # Those that are asked of engines alone.
 PROBLEMS = "contactverif.problems"
+_OURS = "contactverif"  # The distribution whose problems keep their names.
 
 _SHORT_NAME = f"at most {LONGEST_NAME} characters"
 _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
@@ -250,17 +251,29 @@ def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> P
 
 
 def load_problems() -> dict[str, Problem | NotLoaded]:
-    """Load the installed problems with an exact answer by name, those of lower rank first."""
+    """Load the installed problems with an exact answer by name, those of lower rank first.
+
+    Another distribution that registers the name of one of ours does not replace it, and is listed by its entry point.
+    """
     from contactverif.problems.problem import Problem  # It needs mechanics, which most commands do not.
 
     problems: dict[str, Problem | NotLoaded] = {}
     for name, entries in entries_by_name(PROBLEMS).items():
-        loaded = load_entry(name, entries)
+        ours = [entry for entry in entries if entry.dist is not None and entry.dist.name == _OURS]
+        problems |= _refuse_others(name, entries, ours) if ours else {}
+        loaded = load_entry(name, ours or entries)
         if not isinstance(loaded, NotLoaded | Problem):
             needed = "a contactverif.problems.problem.Problem"
             loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}, not {needed}")
         problems[name] = loaded
     return dict(sorted(problems.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))
+
+
+def _refuse_others(name: str, entries: Iterable[EntryPoint], ours: Collection[EntryPoint]) -> dict[str, NotLoaded]:
+    """Return the refusals of other distributions' entry points that have the name of one of our problems."""
+    words = f"is registered as {name}, the name of a problem of {_OURS}; needed another name"
+    others = [entry for entry in entries if entry not in ours]
+    return {entry.value: NotLoaded(entry.value, f"{_origin(entry)} {words}") for entry in others}
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:

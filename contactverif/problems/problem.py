@@ -14,6 +14,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import describe_error, place_of_error
 from contactverif.contract.measurement import Quantity
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import (
@@ -70,7 +71,7 @@ class ProblemInstance:
 
     def exact_forces(self, state: Case) -> FloatArray:
         """Return the exact forces (n_nodes, 2) that push the nodes in a state of this mesh."""
-        forces = np.asarray(self.forces(state.positions if self.deformed else state.interface.nodes))
+        forces = _call("forces", self.forces, state.positions if self.deformed else state.interface.nodes)
         if forces.shape != state.interface.nodes.shape:
             needed = f"{state.interface.nodes.shape}, a force for each node"
             raise MisuseError("ProblemInstance.forces", f"shape {forces.shape}", needed)
@@ -101,11 +102,20 @@ class ProblemInstance:
         return errors | self.further(solution)
 
 
+def _call(name: str, exact: Field, places: FloatArray) -> FloatArray:
+    """Return what an exact answer gives at places; an exception of it is named with its file and line."""
+    try:
+        return np.asarray(exact(places))
+    except Exception as error:  # A stranger's function may raise what it likes.
+        cause = f"{describe_error(error)}{place_of_error(error)}"
+        raise MisuseError(f"ProblemInstance.{name}", cause, "values at all places") from error
+
+
 def _check_field(name: str, exact: Field, *components: int) -> Field:
     """Return a field that refuses values of another shape than a number, or so many components, for each place."""
 
     def values(places: FloatArray) -> FloatArray:
-        exact_values, needed = np.asarray(exact(places)), (len(places), *components)
+        exact_values, needed = _call(name, exact, places), (len(places), *components)
         if exact_values.shape != needed:
             kind = "a vector" if components else "a number"
             text = f"{needed}, {kind} for each place"

@@ -355,7 +355,7 @@ def test_lists_fit_the_terminal_and_lose_nothing(ask: Ask, columns: int) -> None
         assert answer.status == 0
         assert max(map(cell_len, answer.out.splitlines())) <= columns  # ε̂ is two characters in one column.
         assert "…" not in answer.out
-        for name in (*registry.formulation_names(), *registry.property_ids()):
+        for name in (*registry.formulation_names(), *registry.property_ids(), *registry.load_problems()):
             assert re.search(rf"^ *{re.escape(name)} ", answer.out, re.M)
     assert "balance.force fails on tilted" in " ".join(answer.out.split())
 

@@ -14,6 +14,7 @@ from contactverif import (
     Finding,
     Interface,
     Measurement,
+    MisuseError,
     Quantity,
     Rules,
     Subject,
@@ -160,6 +161,17 @@ def test_a_defined_property_has_its_question_and_is_pickled_by_its_name() -> Non
     assert pickle.loads(pickle.dumps(definition)) is definition
     other = pickle.loads(pickle.dumps(replace(definition, id="another")))
     assert (other.id, other.measure) == ("another", definition.measure)
+
+
+def test_a_property_without_a_docstring_is_refused_by_the_name_of_its_function() -> None:
+    def silent(case: Case, subject: Subject) -> Measurement:
+        return Measurement()
+
+    words = r"docstring of .*\.silent: found none; needed what must hold, in one line, and the question below it: "
+    with pytest.raises(MisuseError, match=words + "the property's page is made of them"):
+        Property.define(
+            id="a.silent", family="a", quantities=(MOST,), promise=lambda traits: None, cases=definition.cases
+        )(silent)
 
 
 def test_who_is_not_asked_is_told_why() -> None:

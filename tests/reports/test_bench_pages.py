@@ -221,7 +221,7 @@ def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) 
     assert not complaints(page)
     assert not re.search(r'(src|href)="http', page)
     assert "never there: poor" in page
-    assert "absent did not load: no such module" in page
+    assert "absent is not measured: no such module" in page
     text = bench_markdown(RESULTS, "bench.nc", with_pictures=True)
     assert set(re.findall(r"\]\(([^)]+)\)", text)) == {"cost.svg", "wavy.svg", "runtimes.svg", "starts.svg"}
     assert "| `poor` | 0/6 | ∞ |" in text

@@ -1,6 +1,7 @@
 """The bench: all is counted, a failure is kept, a killed bench goes on, and a stranger is one more curve."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -291,19 +292,33 @@ def test_a_damaged_journal_is_one_line(tmp_path: Path, header: bytes) -> None:
         Journal(tmp_path / "a.nc", HEADER)
 
 
+def install_problems(monkeypatch: pytest.MonkeyPatch, **strangers: Any) -> None:
+    """Install problems {name: problem} beside those that are there."""
+    module = ModuleType("a_strangers_problems")
+    module.__dict__.update(strangers)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    more = [EntryPoint(name, f"{module.__name__}:{name}", registry.PROBLEMS) for name in strangers]
+
+    def list_entry_points(*, group: str) -> list[EntryPoint]:
+        return [*find_entries(group=group), *(more if group == registry.PROBLEMS else [])]
+
+    monkeypatch.setattr(registry, "entry_points", list_entry_points)
+    bench_plan._problem.cache_clear()
+
+
+def test_a_stranger_takes_no_problem_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    install_problems(monkeypatch, wavy=replace(PROBLEMS["kinked"], label="another wave"))
+    problems = load_problems()
+    assert problems["wavy"] is PROBLEMS["wavy"]
+    name = "a_strangers_problems:wavy"
+    words = f"{name} is registered as wavy, the name of a problem of contactverif; needed another name"
+    assert make_plan(instances=1).not_loaded == {name: words}
+
+
 def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One entry point is all that it takes; the results say in words what it is."""
     stranger = replace(PROBLEMS["kinked"], label="a stranger's zigzag", meshes=(1, 2), rank=7)
-    module = ModuleType("a_strangers_problems")
-    module.__dict__.update(ZIGZAG=stranger, NUMBER=3)
-    monkeypatch.setitem(sys.modules, module.__name__, module)
-    entries = [
-        *find_entries(group=registry.PROBLEMS),
-        EntryPoint("zigzag", "a_strangers_problems:ZIGZAG", registry.PROBLEMS),
-        EntryPoint("number", "a_strangers_problems:NUMBER", registry.PROBLEMS),
-    ]
-    installed = {group: find_entries(group=group) for group in (registry.FORMULATIONS, registry.PROPERTIES)}
-    monkeypatch.setattr(registry, "entry_points", lambda *, group: {**installed, registry.PROBLEMS: entries}[group])
+    install_problems(monkeypatch, zigzag=stranger, number=3)
     problems = PROBLEMS | {"zigzag": stranger}
     assert list(load_problems()) == [*sorted(problems, key=lambda name: problems[name].rank), "number"]
     plan = make_plan(["number", "zigzag"], instances=1, processes=1)
@@ -325,6 +340,13 @@ def _fail(mesh: int, penalty: float, traits: Traits, variation: Variation) -> Pr
     raise ValueError(f"no mesh {mesh}")
 
 
+NO_MESH = r"ValueError: no mesh 1 \(test_bench.py, line \d+\)"
+
+
+def _pose_no_forces(mesh: int, penalty: float, traits: Traits, variation: Variation) -> ProblemInstance:
+    return replace(PROBLEMS["kinked"].pose(mesh, penalty, traits, variation), forces=lambda positions: 1 // 0)
+
+
 def _pose_flat_forces(mesh: int, penalty: float, traits: Traits, variation: Variation) -> ProblemInstance:
     instance = PROBLEMS["kinked"].pose(mesh, penalty, traits, variation)
     return replace(instance, forces=lambda positions: instance.forces(positions).reshape(-1))
@@ -333,7 +355,11 @@ def _pose_flat_forces(mesh: int, penalty: float, traits: Traits, variation: Vari
 @pytest.mark.parametrize(
     ("pose", "message"),
     [
-        (_fail, "pose of the problem mine: found ValueError: no mesh 1, on mesh 1 at the penalty 10; needed a Problem"),
+        (_fail, rf"pose of the problem mine: found {NO_MESH}, on mesh 1 at the penalty 10; needed a Problem"),
+        (
+            _pose_no_forces,
+            r"ProblemInstance.forces: found ZeroDivisionError: .* \(test_bench.py, line \d+\); needed values",
+        ),
         (lambda *arguments: 3, "pose of the problem mine: found a int; needed a ProblemInstance"),
         (_pose_flat_forces, r"ProblemInstance.forces: found shape \(.*,\); needed \(.*, 2\), a force for each node"),
     ],
@@ -345,6 +371,25 @@ def test_a_strangers_mistake_in_a_problem_is_named(
     subject = load_subject("vts-ppt")
     with pytest.raises(MisuseError, match=message):
         run_cell(Cell("mine", 1, 0), [subject], 0)
+
+
+def test_a_problem_that_is_posed_wrongly_is_not_measured_and_the_others_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may fail on its second mesh alone."""
+
+    def pose_once(mesh: int, *others: Any) -> ProblemInstance:
+        return PROBLEMS["kinked"].pose(mesh, *others) if mesh == 2 else _fail(mesh, *others)
+
+    mine = replace(PROBLEMS["kinked"], meshes=(2, 1), pose=pose_once)
+    install_problems(monkeypatch, mine=mine, zigzag=replace(PROBLEMS["kinked"], meshes=(1,)))
+    subjects = [load_subject("vts-ppt")]
+    plan = make_plan(["mine", "zigzag"], instances=1, processes=1)
+    results = run_bench(subjects, plan)
+    assert results.cells == (Cell("zigzag", 1, 0),)
+    assert re.fullmatch(f"pose of the problem mine: found {NO_MESH}, on mesh 1 .*", results.not_loaded.pop("mine"))
+    assert (results.outcomes == Outcome.SOLVED).all()
+    assert not results.not_loaded
+    with pytest.raises(MisuseError, match=r"--scene: found mine: pose of .*; needed a problem that can be posed"):
+        run_bench(subjects, make_plan(["mine"], instances=1, processes=1))
 
 
 @pytest.mark.parametrize(

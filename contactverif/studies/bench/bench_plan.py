@@ -16,7 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import describe_error
+from contactverif.contract.foreign_text import describe_error, place_of_error
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution
@@ -107,12 +107,12 @@ def vary(cell: Cell, seed: int) -> Variation:
 
 def pose(cell: Cell, penalty: float, traits: Traits, seed: int) -> ProblemInstance:
     """Return the problem that formulations of some traits solve in a cell at a penalty in E/h."""
+    problem = _problem(cell.scene)
     try:
-        instance: Any = _problem(cell.scene).pose(cell.mesh, penalty, traits, vary(cell, seed))
-    except MisuseError:
-        raise
+        instance: Any = problem.pose(cell.mesh, penalty, traits, vary(cell, seed))
     except Exception as error:  # A stranger's function may raise what it likes.
-        cause = f"{describe_error(error)}, on mesh {cell.mesh} at the penalty {penalty:g}"
+        place = f"{place_of_error(error)}, on mesh {cell.mesh} at the penalty {penalty:g}"
+        cause = f"{describe_error(error)}{place}"
         raise MisuseError(f"pose of the problem {cell.scene}", cause, "a ProblemInstance") from error
     if not isinstance(instance, ProblemInstance):
         raise MisuseError(f"pose of the problem {cell.scene}", f"a {type(instance).__name__}", "a ProblemInstance")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from contactverif.plugins.provenance import collect_provenance
 from contactverif.studies.bench.bench_journal import Header, Journal
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, SolutionRecord, run_cell
-from contactverif_reports.bench.results import COUNTS, ERRORS, BenchResults, Outcome
+from contactverif_reports.bench.results import COUNTS, ERRORS, BenchResults, Cell, Outcome
 
 Progress = Callable[[str, int, int], None]  # The next cell in words, the number of finished cells, the number of all
 
@@ -45,51 +46,80 @@ def run_bench(
     with ExitStack() as stack:
         header = Header.from_plan(plan, names, provenance)
         journal = stack.enter_context(closing(Journal(output, header))) if output else None
-        records = _run_cells(loaded, plan, journal, progress or _show_nothing)
+        records, failures = _run_cells(loaded, plan, journal, progress or _show_nothing)
+    cells = _measured_cells(plan, failures)
     not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)} | plan.not_loaded
-    return collect_results(names, plan, records, not_loaded, provenance)
+    return collect_results(names, replace(plan, cells=cells), records, not_loaded | failures, provenance)
 
 
 def _show_nothing(description: str, n_finished: int, n_planned: int) -> None:
     """Take the progress of a bench that nobody looks at."""
 
 
+def _measured_cells(plan: BenchPlan, failures: dict[str, str]) -> tuple[Cell, ...]:
+    """Return the cells of the problems that did not fail; that there are none is a mistake."""
+    cells = tuple(cell for cell in plan.cells if cell.scene not in failures)
+    if not cells:
+        raise MisuseError("--scene", "; ".join(map(": ".join, failures.items())), "a problem that can be posed")
+    return cells
+
+
 def _run_cells(
     loaded: Sequence[Subject], plan: BenchPlan, journal: Journal | None, progress: Progress
-) -> list[list[CellRecord]]:
-    """Return the records of all cells in each process, those of the journal without running them again."""
+) -> tuple[list[dict[Cell, CellRecord]], dict[str, str]]:
+    """Return the records of each process by cell, and {problem: its mistake} of those that are not solved further."""
     n_cells = len(plan.cells)
-    records: list[list[CellRecord]] = []
+    records: list[dict[Cell, CellRecord]] = []
+    failures: dict[str, str] = {}
     for process in range(plan.processes):
-        for subject in loaded if process else ():
-            if isinstance(subject, RemoteSubject):
-                subject.host.end()  # The next question starts another process.
-        records.append([])
+        if process:
+            _end_processes(loaded)
+        records.append({})
         for place, cell in enumerate(plan.cells):
+            if cell.scene in failures:
+                continue
             number = process * n_cells + place
             words = f"{cell.scene}, mesh {cell.mesh}, instance {cell.instance}, process {process + 1}"
             progress(words, number, n_cells * plan.processes)
-            record = journal.finished.get(number) if journal is not None else None
-            if record is None:
-                record = run_cell(cell, loaded, plan.seed, solve=process == 0)
-                if journal is not None:
-                    journal.add(number, record)
-            records[-1].append(record)
+            try:
+                records[-1][cell] = _run_unless_finished(journal, number, cell, loaded, plan.seed, solve=process == 0)
+            except MisuseError as error:  # The mistake of a problem.
+                failures[cell.scene] = str(error)
     progress("writing", n_cells * plan.processes, n_cells * plan.processes)
-    return records
+    return records, failures
+
+
+def _run_unless_finished(
+    journal: Journal | None, number: int, cell: Cell, loaded: Sequence[Subject], seed: int, *, solve: bool
+) -> CellRecord:
+    """Return the record that the journal has under a number; run the cell and note it if there is none."""
+    record = journal.finished.get(number) if journal is not None else None
+    if record is None:
+        record = run_cell(cell, loaded, seed, solve=solve)
+        if journal is not None:
+            journal.add(number, record)
+    return record
+
+
+def _end_processes(subjects: Sequence[Subject]) -> None:
+    """End the processes of plugins; the next question to each starts another one."""
+    for subject in subjects:
+        if isinstance(subject, RemoteSubject):
+            subject.host.end()
 
 
 def collect_results(
     names: Sequence[str],
     plan: BenchPlan,
-    records: Sequence[Sequence[CellRecord]],
+    records: Sequence[Mapping[Cell, CellRecord]],
     not_loaded: dict[str, str],
     provenance: dict[str, str],
 ) -> BenchResults:
     """Return the records of all processes and cells as arrays."""
-    first = records[0]
+    first = [*map(records[0].__getitem__, plan.cells)]
     rows = [[record.runs[name] for record in first] for name in names]
-    seconds = _array_of_runs([cell for process in records for cell in process], names, lambda run: run.evaluation)
+    timed = [process[cell] for process in records for cell in plan.cells]
+    seconds = _array_of_runs(timed, names, lambda run: run.evaluation)
     return BenchResults(
         formulations=tuple(names),
         cells=plan.cells,

@@ -100,7 +100,7 @@ class BenchResults:
     evaluation: FloatArray
     factorisation: FloatArray  # (n_formulations, n_cells) The least seconds of one factorisation; NaN without one.
     remarks: Mapping[tuple[str, int, int], str]  # {(formulation, cell, variant): how a run ended without a solution}
-    not_loaded: Mapping[str, str]  # {formulation: why it did not load}.
+    not_loaded: Mapping[str, str]  # {formulation or problem: why it did not load, or failed to be posed}.
     provenance: Mapping[str, str]  # Versions, machine, time and command.
 
     def __post_init__(self) -> None:
