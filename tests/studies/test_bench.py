@@ -25,6 +25,7 @@ from subjects import Changed, alone, load_subject
 
 from contactverif import MisuseError, Subject, Traits
 from contactverif.contract.arrays import dense
+from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import remote_formulation
 from contactverif.isolation.host import answer_of
@@ -212,6 +213,27 @@ def test_a_failure_is_kept_and_stops_no_one() -> None:
     assert results.work[:2, :, 1:].sum() == 0
     assert results.not_loaded == {"absent": "no such module"}
     assert results.provenance["isolation"] == "inline"
+
+
+def test_a_plugin_that_always_ends_its_process_is_asked_no_further_mesh_of_the_scene() -> None:
+    states: list[int] = []
+
+    def die(interface: Any, pairing: Any, z: Any) -> Any:
+        states.append(len(interface.slave))
+        raise PluginError("residual: its process ended with status 0", "exit", ended=True)
+
+    def make_dying(*, penalty: float) -> Any:
+        return Changed(load_subject("vts-ppt").with_penalty(penalty).plugin, residual=die)
+
+    cells = (WAVY, Cell("wavy", 16, 0), Cell("kinked", 1, 0))
+    results = run_bench([Subject("dying", make_dying), load_subject("vts-ppt")], BenchPlan(cells, processes=2))
+    assert (results.outcomes[0] == Outcome.CRASHED).all()
+    assert (results.outcomes[1] == Outcome.SOLVED).all()
+    assert np.isnan(results.evaluation[0]).all()
+    assert np.isfinite(results.evaluation[1]).all()
+    assert len(states) == 2 * len(VARIANTS)
+    assert "ended with status 0" in results.remarks["dying", 2, 0]
+    assert "not asked: the plugin ended its process in all solutions" in results.remarks["dying", 1, 0]
 
 
 @pytest.mark.parametrize("seconds", [-1.0, float("nan"), 1e300])

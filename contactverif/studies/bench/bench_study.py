@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
+from functools import partial
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -81,21 +82,26 @@ def _run_cells(
             number = process * n_cells + place
             words = f"{cell.scene}, mesh {cell.mesh}, instance {cell.instance}, process {process + 1}"
             progress(words, number, n_cells * plan.processes)
+            run = partial(run_cell, cell, loaded, plan.seed, solve=process == 0, lost=_lost(records[0], cell.scene))
             try:
-                records[-1][cell] = _run_unless_finished(journal, number, cell, loaded, plan.seed, solve=process == 0)
+                records[-1][cell] = _run_unless_finished(journal, number, run)
             except MisuseError as error:  # The mistake of a problem.
                 failures[cell.scene] = str(error)
     progress("writing", n_cells * plan.processes, n_cells * plan.processes)
     return records, failures
 
 
-def _run_unless_finished(
-    journal: Journal | None, number: int, cell: Cell, loaded: Sequence[Subject], seed: int, *, solve: bool
-) -> CellRecord:
+def _lost(records: Mapping[Cell, CellRecord], scene: str) -> set[str]:
+    """Return the names of the formulations that ended their process in all solutions of a cell of a scene."""
+    of_scene = [record for cell, record in records.items() if cell.scene == scene]
+    return {name for record in of_scene for name, run in record.runs.items() if run.is_lost}
+
+
+def _run_unless_finished(journal: Journal | None, number: int, run: Callable[[], CellRecord]) -> CellRecord:
     """Return the record that the journal has under a number; run the cell and note it if there is none."""
     record = journal.finished.get(number) if journal is not None else None
     if record is None:
-        record = run_cell(cell, loaded, seed, solve=solve)
+        record = run()
         if journal is not None:
             journal.add(number, record)
     return record

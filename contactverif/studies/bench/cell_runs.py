@@ -8,7 +8,7 @@ Who begins a turn changes, so that whatever disturbs the machine disturbs all, a
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import nan
@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from contactverif.contract.errors import ContractError
+from contactverif.contract.errors import ContractError, PluginError
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.scene import forget_bodies
 from contactverif.mechanics.solving import solution_of, solve_in_tries
@@ -43,6 +43,13 @@ class SolutionRecord:
     remark: str = ""  # How it ended, if it is no solution.
     errors: dict[str, float] = field(default_factory=dict)  # The errors by kind; empty without a solution.
     counts: dict[str, int] = field(default_factory=dict)  # The counts by name; empty after a crash.
+    ended: bool = False  # The plugin ended its process.
+
+
+_NOT_ASKED = [
+    SolutionRecord(remark="not asked: the plugin ended its process in all solutions of an earlier mesh", ended=True)
+    for _ in VARIANTS
+]
 
 
 @dataclass(slots=True)
@@ -55,6 +62,11 @@ class RunRecord:
     factorisation: float = nan  # The least seconds of one factorisation
     evaluation: float = nan  # The least seconds of one evaluation in this process; NaN if it crashed
 
+    @property
+    def is_lost(self) -> bool:
+        """The plugin ended its process in all variants."""
+        return bool(self.solutions) and all(solution.ended for solution in self.solutions)
+
 
 @dataclass(slots=True)
 class CellRecord:
@@ -66,15 +78,19 @@ class CellRecord:
     best_pressure: float = 0.0  # The error of the best linear pressure on the slave's mesh; 0 in further processes
 
 
-def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True) -> CellRecord:
-    """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns."""
+def run_cell(
+    cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True, lost: Collection[str] = ()
+) -> CellRecord:
+    """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns.
+
+    Those whose names are in `lost` are asked nothing.
+    """
     instances = [pose(cell, RULE.penalty, subject.traits, seed) for subject in subjects]
     whole = WholeScene.of_scene(instances[0].scene) if solve else None
-    runs = [RunRecord() for _ in subjects]
+    runs = [RunRecord(_NOT_ASKED[:] if subject.name in lost else []) for subject in subjects]
     for subject, instance, run in zip(subjects, instances, runs, strict=True):
         if whole is not None:
             _solve_variants(cell, subject, instance, seed, whole, run)
-            run.calls = evaluate(subject, instance, counted=True).calls
     forget_bodies()
     _time_evaluations(subjects, instances, runs)
     names = (subject.name for subject in subjects)
@@ -86,12 +102,13 @@ def run_cell(cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool 
 def _time_evaluations(
     subjects: Sequence[Subject], instances: Sequence[ProblemInstance], runs: Sequence[RunRecord]
 ) -> None:
-    """Time one evaluation of each formulation in turns, of which each begins with another one."""
+    """Time one evaluation of each formulation that is not lost in turns, of which each begins with another one."""
+    asked = [number for number, run in enumerate(runs) if not run.is_lost]
     gc.collect()
     with without_collector():
         for turn in range(TURNS):
-            for place in range(len(runs)):
-                number = (place + turn) % len(runs)
+            for place in range(len(asked)):
+                number = asked[(place + turn) % len(asked)]
                 seconds = evaluate(subjects[number], instances[number], timed=True).seconds
                 runs[number].evaluation = float(np.fmin(runs[number].evaluation, seconds))
 
@@ -99,18 +116,22 @@ def _time_evaluations(
 def _solve_variants(
     cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeScene, run: RunRecord
 ) -> None:
-    """Solve all variants of a cell, and measure the whole system at the solution of the rule."""
+    """Solve all variants of a cell, measure the whole system at the solution of the rule, and count an evaluation."""
+    if run.is_lost:
+        return
     for variant in VARIANTS:
-        if variant.penalty != RULE.penalty:
-            instance = pose(cell, variant.penalty, subject.traits, seed)
+        other = variant.penalty != RULE.penalty
+        posed = pose(cell, variant.penalty, subject.traits, seed) if other else instance
         record = SolutionRecord()
         run.solutions.append(record)
         try:
-            trace = _solve(subject, instance, variant.start, record)
+            trace = _solve(subject, posed, variant.start, record)
             if variant == RULE and record.outcome == Outcome.SOLVED:
-                _measure_system(subject, instance, trace, whole, run)
+                _measure_system(subject, posed, trace, whole, run)
         except ContractError as error:
-            record.remark = str(error)
+            record.remark, record.ended = str(error), isinstance(error, PluginError) and error.ended
+    if not run.is_lost:
+        run.calls = evaluate(subject, instance, counted=True).calls
 
 
 def _solve(subject: Subject, instance: ProblemInstance, start: str, record: SolutionRecord) -> Trace:
