@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import os
 import re
+import sys
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from functools import partial
+from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from math import inf
 from pathlib import Path
@@ -110,8 +112,8 @@ def _with_kernels(limits: Limits, text: str) -> Limits:
     """Return the limits with a box that keeps compiled kernels, those of all formulations of the same modules."""
     if limits.box is None:
         return limits
-    names = names_within(text)
-    modules = {entry.module for entry in entry_points(group=FORMULATIONS) if entry.name in names}
+    installed = entries_by_name(FORMULATIONS)
+    modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
     store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share the name of a package.
     return replace(limits, box=replace(limits.box, store=store))
 
@@ -214,8 +216,26 @@ def installed_properties(*, engines: bool = False) -> Mapping[str, Sequence[Entr
 
 def entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
     """Return the entry points by name, sorted. A name has several where distributions disagree about it."""
+    folders = tuple((os.path.abspath(path), _time_of_change(path)) for path in sys.path)
+    return dict(_read_entries(entry_points, group, folders))
+
+
+def _time_of_change(path: str) -> int:
+    """Return when something was last installed into a folder or removed, in nanoseconds; 0 if it is no folder."""
+    try:
+        return os.stat(path or ".").st_mtime_ns
+    except OSError:
+        return 0
+
+
+# To list the formulations takes sixty looks, and each would read the files of all distributions.
+@lru_cache(maxsize=16)
+def _read_entries(
+    read: Callable[..., Iterable[EntryPoint]], group: str, folders: tuple[tuple[str, int], ...]
+) -> dict[str, list[EntryPoint]]:
+    """Return the entry points by name as they are while the folders of distributions are unchanged."""
     by_name: dict[str, list[EntryPoint]] = {}
-    for entry in sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value)):
+    for entry in sorted(read(group=group), key=lambda entry: (entry.name, entry.value)):
         same_name = by_name.setdefault(entry.name, [])
         if entry.value not in [other.value for other in same_name]:  # A distribution may be on the path twice.
             same_name.append(entry)

@@ -2,6 +2,7 @@
 
 import sys
 import types
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
@@ -9,7 +10,13 @@ import pytest
 from contactverif import MisuseError, Property, Subject, Traits
 from contactverif.contract.result import NotLoaded
 from contactverif.plugins import registry
-from contactverif.plugins.registry import load_formulation, load_formulations, load_properties, subject_of
+from contactverif.plugins.registry import (
+    formulation_names,
+    load_formulation,
+    load_formulations,
+    load_properties,
+    subject_of,
+)
 
 
 class Plugin:
@@ -308,6 +315,14 @@ def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     formulation = load_formulation("misspelt")
     assert isinstance(formulation, NotLoaded)
     assert "AttributeError" in formulation.reason
+
+
+def test_what_is_installed_meanwhile_is_found_at_the_next_look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert "late" not in formulation_names()
+    (tmp_path / "late-1.0.dist-info").mkdir()
+    (tmp_path / "late-1.0.dist-info" / "entry_points.txt").write_text("[contactverif.formulations]\nlate = late:make\n")
+    assert "late" in formulation_names()
 
 
 def test_a_mere_name_is_no_mistake_of_the_user_whatever_its_factory_says() -> None:
