@@ -3,7 +3,9 @@
 import re
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from importlib.metadata import EntryPoint, entry_points
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,12 +35,22 @@ def without_rows(err: str) -> str:
     return _ROW.sub("", err)
 
 
+def run_inline(*arguments: str | Path) -> Answer:
+    """Run `contactverif` in this process, and return all that it says; fixtures that tests share call it."""
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        patch.setattr(sys, "argv", ["contactverif", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exit_info:
+            cli.main()
+    assert isinstance(exit_info.value.code, int)
+    return Answer(exit_info.value.code, out.getvalue(), err.getvalue())
+
+
 def asking(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Return a function that runs `contactverif`, with 140 columns if the test does not say how many."""
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.delenv("FORCE_COLOR", raising=False)
 
-    def run_command(*arguments: str | Path, columns: int | None = None) -> Answer:
+    def run_command(*arguments: str | Path, columns: int | str | None = None) -> Answer:
         if columns is None:
             monkeypatch.delenv("COLUMNS", raising=False)
         else:

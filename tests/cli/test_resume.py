@@ -8,7 +8,7 @@ from typing import Any
 
 import psutil
 import pytest
-from asking import Ask, without_rows
+from asking import Ask, run_inline, without_rows
 from fresh_process import MAIN, PYTHON
 
 from contactverif.journals.journal import begin_journal, journal_folder
@@ -25,7 +25,7 @@ N_ROWS = 6
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     report = tmp_path_factory.mktemp("unbroken") / "r.nc"
-    subprocess.run([*MAIN, *RUN, "--out", str(report)], check=True, capture_output=True)
+    assert run_inline(*RUN, "--out", report).status == 0
     return report
 
 
