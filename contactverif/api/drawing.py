@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.subject import Subject
-from contactverif.run.judge import forces_on
+from contactverif.run.judge import forces_to_draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,6 +56,6 @@ def make_drawing(subject: Subject, question: Property, outcome: Outcome) -> Draw
     from contactverif_reports.draw.case_figure import make_case_figure  # It brings matplotlib, which is slow.
 
     title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
-    forces = forces_on(outcome.case, subject)
-    exact = question.exact(outcome.case) if question.exact is not None and forces is not None else None
-    return Drawing(make_case_figure(outcome.case, title=title, forces=forces, exact=exact))
+    forces = forces_to_draw(question, outcome.case, subject)
+    of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
+    return Drawing(make_case_figure(outcome.case, title=title, forces=of_formulation, exact=exact))

@@ -14,14 +14,18 @@ from rich.text import Text
 
 from contactverif.api.drawing import make_drawing
 from contactverif.cli.console import indent_below, plain_table
+from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
+from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample, failing_examples
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.names import parse_name
 from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import formulation_names
+from contactverif.run.judge import forces_to_draw
 from contactverif.run.telling import by_telling, most_telling
 from contactverif_reports.draw import as_text
 
@@ -74,11 +78,22 @@ def replay_table(example: Counterexample, formulation: str, outcome: Outcome) ->
 
 
 def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: Path, argument: str) -> None:
-    """Draw the case of an outcome to a file."""
+    """Draw the case of an outcome to a picture, or write a case in space for ParaView."""
     try:
+        if path.suffix.lower() == SOLVED_SCENE:
+            from contactverif_reports.draw.surface_vtu import write_surfaces
+
+            write_surfaces(outcome.case, forces_to_draw(question, outcome.case, subject), path)
+            return
         make_drawing(subject, question, outcome).write(path)
     except MisuseError as error:
         raise MisuseError(argument, error.found, error.needed) from None
+
+
+def check_surfaces(case: Case, files: OutputFiles) -> None:
+    """Refuse a file for ParaView of an interface in the plane."""
+    if case.interface.dim == PLANE and SOLVED_SCENE in files.names:
+        raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")
 
 
 def announce_stored(name: str) -> str:

@@ -62,6 +62,10 @@ class OutputFiles:
         """Yield the absolute path of each picture."""
         yield from (path for suffix, path in self.paths.items() if suffix in PICTURES)
 
+    def drawings(self) -> Iterator[Path]:
+        """Yield the absolute path of each picture, and of a file for ParaView."""
+        yield from (path for suffix, path in self.paths.items() if suffix in (*PICTURES, SOLVED_SCENE))
+
     def announce(self) -> None:
         """Print the name of each file that was written, a line each."""
         from contactverif.cli.console import say

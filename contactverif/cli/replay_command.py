@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import PICTURES, OutputFiles
+from contactverif.cli.output_files import PICTURES, SOLVED_SCENE, OutputFiles
 from contactverif.cli.shared_options import CaseId, ReportPath, formulation_option, output_option, with_engines
 
 
@@ -22,7 +22,12 @@ def replay(
     engine: Annotated[
         str | None, typer.Option(help="Judge this engine instead of the one that failed.", metavar="NAME[:OPTIONS]")
     ] = None,
-    out: Annotated[list[Path] | None, output_option("Draw the case to FILE.png or FILE.svg. Repeatable.")] = None,
+    out: Annotated[
+        list[Path] | None,
+        output_option(
+            "Draw the case to FILE.png or FILE.svg, or write one in space for ParaView to FILE.vtu. Repeatable."
+        ),
+    ] = None,
     isolation: IsolationOptions,
 ) -> None:
     """Judge one stored counterexample again; without --case, list the ids.
@@ -42,7 +47,13 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
     from contactverif.cli.console import say, show
-    from contactverif.cli.counterexample_output import announce_stored, draw_outcome, ending_lines, replay_table
+    from contactverif.cli.counterexample_output import (
+        announce_stored,
+        check_surfaces,
+        draw_outcome,
+        ending_lines,
+        replay_table,
+    )
     from contactverif.contract.property import Verdict
     from contactverif.plugins.engines import the_subject
     from contactverif.plugins.registry import the_property
@@ -50,17 +61,18 @@ def replay(
     from contactverif_reports.draw import as_text
     from contactverif_reports.netcdf.read import case_ids, read_case
 
-    files = OutputFiles.check(out, PICTURES)
+    files = OutputFiles.check(out, (*PICTURES, SOLVED_SCENE))
     if case is None:
         ids = case_ids(report)
         say("\n".join(ids) if ids else "no counterexamples: nothing failed")
         return
     example = read_case(report, case)
+    check_surfaces(example.case, files)
     instead = formulation if engine is None else with_engines(None, [engine])[0]
     subject = the_subject(instead or announce_stored(example.formulation), isolation.limits())
     question = the_property(example.property_id)
     outcome = judge_if_applicable(question, example.case, subject)
-    for picture in files.pictures():  # before anything is printed, in case a file cannot be written
+    for picture in files.drawings():  # before anything is printed, in case a file cannot be written
         draw_outcome(subject, question, outcome, picture, argument="--out")
     say(as_text(example.case))
     show(replay_table(example, subject.name, outcome))

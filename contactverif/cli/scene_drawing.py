@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.table import Table
 
 from contactverif.cli.console import plain_table, say, show
-from contactverif.cli.counterexample_output import announce_stored, draw_outcome
+from contactverif.cli.counterexample_output import announce_stored, check_surfaces, draw_outcome
 from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
@@ -89,8 +89,7 @@ def solutions_table(scene: SolvedScene) -> Table:
 
 def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFiles, limits: Limits | None) -> None:
     """Draw a case without bodies, as `replay --out` draws it."""
-    if SOLVED_SCENE in files.names:
-        raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")
+    check_surfaces(stored.case, files)
     if len(names) > 1:
         raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
     name = names[0] if names else announce_stored(stored.formulation)
@@ -98,7 +97,7 @@ def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFile
     outcome = judge_if_applicable(question, stored.case, subject)
     if not files.paths:
         say(as_text(stored.case))
-    for picture in files.pictures():
+    for picture in files.drawings():
         draw_outcome(subject, question, outcome, picture, argument="--out")
     files.announce()
 

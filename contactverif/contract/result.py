@@ -13,6 +13,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.case_counts import (
     CaseCounts,
     CaseKey,
@@ -119,6 +122,19 @@ def _closer(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class NodalForces:
+    """The forces (n_nodes, dim) that push the nodes of a case: a formulation's, and the exact ones where known."""
+
+    of_formulation: FloatArray
+    exact: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("of_formulation", "exact"):
+            if (forces := getattr(self, name)) is not None:
+                object.__setattr__(self, name, freeze(forces, np.float64))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Row:
     """The result of one formulation on one property.
 
@@ -150,6 +166,8 @@ class Row:
         The first planned case that clearly fails, where nothing was shrunk and no witness shows the failure.
     seconds : float
         Time spent judging, shrinking excluded.
+    forces : NodalForces | None
+        The nodal forces on the counterexample, if that is an interface in space.
     """
 
     formulation: str
@@ -165,6 +183,7 @@ class Row:
     shrunk: Outcome | None = None
     first: Outcome | None = None
     seconds: float = 0.0
+    forces: NodalForces | None = None
     _tally: Tally | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:

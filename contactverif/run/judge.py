@@ -31,7 +31,7 @@ from contactverif.contract.property import (
     checked_numbers,
     judge,
 )
-from contactverif.contract.result import JUDGED_SHARE, Row
+from contactverif.contract.result import JUDGED_SHARE, NodalForces, Row
 from contactverif.contract.subject import Subject
 from contactverif.problems.lifted_states import fit_to_traits
 from contactverif.problems.named_states import named_case
@@ -162,6 +162,14 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
     except ContractError:
         return None
     return -forces.reshape(case.interface.nodes.shape)
+
+
+def forces_to_draw(question: Property, case: Case, subject: Subject) -> NodalForces | None:
+    """Return the forces of a formulation on a case, beside the exact ones where the property knows them."""
+    forces = forces_on(case, subject)
+    if forces is None:
+        return None
+    return NodalForces(forces, None if question.exact is None else question.exact(case))
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,9 @@ from operator import attrgetter
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.result import NotLoaded, Result, Row, Run
+from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.isolation.remote_formulation import places
@@ -111,6 +112,7 @@ class RunJobs:
         scheduler.work(self)
         if self._share is None:
             scheduler.work(self._explain_most_telling())
+            scheduler.work(self._measure_forces())
 
     def _without_witnesses(self) -> dict[str, str]:
         """Return why formulations are not asked that state a failure and name no case that shows it."""
@@ -390,6 +392,20 @@ class RunJobs:
                 yield Job(diagnose, (row.subject, property_id, others), partial(self._add_diagnosis, name))
             if self._shrink == "one" and (goal := row.goal()) is not None:
                 yield from self._shrink_row(row, goal)
+
+    def _measure_forces(self) -> Iterator[Job]:
+        """Yield the jobs to ask for the forces on each counterexample in space, which no text can show."""
+        for row in self._rows.values():
+            if not isinstance(row, OpenRow) or (outcome := counterexample_of(row.row)) is None:
+                continue
+            if outcome.case.interface.dim != PLANE and outcome.verdict is Verdict.FAIL:
+                arguments = row.question, outcome.case, row.subject
+                yield Job(judge.forces_to_draw, arguments, partial(self._add_forces, row))
+
+    def _add_forces(self, row: OpenRow, forces: NodalForces | None) -> Iterable[Job]:
+        """Add the forces on the counterexample of a row."""
+        row.row = replace(row.row, forces=forces)
+        return ()
 
     def _find_most_telling(self, subject: Subject) -> OpenRow | None:
         """Return the row of a formulation whose failure a person wants to see first; crashes explain themselves."""

@@ -2,21 +2,27 @@
 
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
 from subjects import load_property, load_subject, same_case
 
-from contactverif import Run, judge_case, named_case
+from contactverif import Case, Interface, Run, judge_case, named_case
 from contactverif.api.drawing import make_drawing
 from contactverif.contract.counterexample import counterexamples
+from contactverif.contract.result import NodalForces
+from contactverif.run.judge import forces_to_draw
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases
 from contactverif_reports.draw import as_text, draw_case
 from contactverif_reports.draw.surface_figure import view_from_above, widen
+from contactverif_reports.draw.surface_vtu import write_surfaces
 from contactverif_reports.exchange.run_document import document_of
+from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
+from contactverif_reports.netcdf.stored_cases import counterexample_groups, read_forces
 from contactverif_reports.netcdf.write import write
 
 CROSSED = named_case("crossed-diagonals")
@@ -86,6 +92,82 @@ def test_a_report_stores_faces_and_gives_the_cases_back(tmp_path: Path, failing_
     assert mesh["mesh"].attrs["node_coordinates"] == "node_x node_y node_z"
     assert mesh["face_nodes"].shape == (example.case.n_segments, 3)
     assert np.array_equal(mesh["current_z"], example.case.positions[:, 2])
+
+
+def test_the_forces_found_and_exact_are_stored_and_stand_on_the_page(tmp_path: Path, failing_run: Run) -> None:
+    path = tmp_path / "report.nc"
+    write(failing_run, path)
+    (row,), again = failing_run.rows, read_run(path)
+    forces, stored = row.forces, again.rows[0].forces
+    assert forces is not None
+    assert stored is not None
+    assert forces.exact is not None
+    assert stored.exact is not None
+    assert np.array_equal(stored.of_formulation, forces.of_formulation)
+    assert np.array_equal(stored.exact, forces.exact)
+    page = report_page(again, path)
+    assert page == report_page(failing_run, path)
+    assert "at the nodes: number, force and, where it differs, exact force" in page
+    assert page.count(">exact 0.") + page.count(">exact 1") >= 2
+    figure = page[page.index("<svg data-figure") :]
+    assert "segment" not in figure[: figure.index("</svg>")]
+
+
+def test_the_page_lists_properties_that_do_not_apply_by_their_reason() -> None:
+    properties = [load_property(id_) for id_ in ("balance.force", "hard.c", "patch.curved")]
+    page = report_page(run([load_subject("nts-3d")], properties, examples=1, seed=1), "report.nc")
+    assert "2 properties do not apply</summary>" in page
+    assert "the interfaces are plane, and the formulation takes none of them: hard.c, patch.curved</li>" in page
+    assert "1 pass, 2 not applicable" in page
+    assert "<dt" in page[page.index("The properties") :]
+    assert "Case C" not in page
+
+
+def test_forces_of_other_nodes_are_damage(failing_run: Run) -> None:
+    (row,) = failing_run.rows
+    assert row.forces is not None
+    (example,) = counterexamples(failing_run).values()
+    groups = counterexample_groups(failing_run)
+    mesh = groups[f"/counterexamples/{example.id}"]
+    assert read_forces(mesh, example.case) is not None
+    with pytest.raises(ValueError, match="forces on other nodes than those of the case"):
+        read_forces(mesh, named_case("a1"))
+
+
+def test_a_case_in_space_is_written_for_paraview(tmp_path: Path) -> None:
+    subject, question = load_subject("nts-3d"), load_property("patch.flat.transmission")
+    write_surfaces(CROSSED, forces_to_draw(question, CROSSED, subject), tmp_path / "case.vtu")
+    mesh = meshio.read(tmp_path / "case.vtu")
+    assert np.array_equal(mesh.points, CROSSED.positions)
+    assert [len(block) for block in mesh.cells] == [4]
+    assert np.concatenate(mesh.cell_data["side"]).tolist() == [0, 0, 1, 1]
+    pressure = CROSSED.penalty * CROSSED.parameter("penetration")
+    assert mesh.point_data["exact_pressure"] == pytest.approx(np.full(8, pressure))
+    assert mesh.point_data["pressure"].max() == pytest.approx(1.5 * pressure)
+    assert mesh.point_data["force"][:4].sum(axis=0) == pytest.approx([0, 0, pressure])
+    write_surfaces(CROSSED, None, tmp_path / "bare.vtu")
+    assert meshio.read(tmp_path / "bare.vtu").point_data.keys() == {"node"}
+
+
+def test_quadrilaterals_have_the_pressure_of_their_forces(tmp_path: Path) -> None:
+    nodes = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]
+    interface = Interface.from_faces(nodes, [[3, 2, 1, 0]], nodes, [[0, 1, 2, 3]])
+    case = Case(interface, interface.nodes.ravel())
+    forces = np.repeat([[0, 0, 1.5], [0, 0, -1.5]], 4, axis=0)
+    write_surfaces(case, NodalForces(forces), tmp_path / "case.vtu")
+    mesh = meshio.read(tmp_path / "case.vtu")
+    assert mesh.point_data["pressure"] == pytest.approx(np.full(8, 3.0))
+    assert "exact_force" not in mesh.point_data
+
+
+def test_forces_of_one_size_and_two_directions_are_told_apart(tmp_path: Path) -> None:
+    forces = np.repeat([[0.0, 0, 1], [0, 0, -1]], 4, axis=0)
+    draw_case(CROSSED, tmp_path / "case.svg", forces=-forces, exact=forces)
+    text = (tmp_path / "case.svg").read_text(encoding="utf-8")
+    assert text.count("other way") == 8
+    assert "slave, seen through its body" in text  # The view is against the master's normal.
+    draw_case(CROSSED, tmp_path / "nan.svg", forces=np.nan * forces, exact=forces)
+    assert "error of the nodal forces, not finite" in (tmp_path / "nan.svg").read_text(encoding="utf-8")
 
 
 def test_the_document_of_a_run_lists_faces(failing_run: Run) -> None:

@@ -106,12 +106,12 @@ def _write_sizes(axes: Axes, nodes: FloatArray, forces: list[FloatArray], scale:
         sizes = np.linalg.norm(at_node, axis=1).tolist()
         tip, reach = at_node[int(np.argmax(sizes))], max(sizes)
         if reach > 0:
-            words = _size_in_words(sizes[-1], sizes[0], slack)
+            words = size_in_words(sizes[-1], sizes[0], slack)
             offset = (3 + 4 * (1 + words.count("\n"))) * tip / reach
             _write(axes, words, nodes[node] + tip * scale, offset, fontsize=7, color="black", zorder=7)
 
 
-def _size_in_words(size: float, exact: float, slack: float) -> str:
+def size_in_words(size: float, exact: float, slack: float) -> str:
     """Return the size of a force; if the exact one differs, both, with the digits that tell them apart."""
     if abs(exact - size) <= slack:
         return f"{size:.3g}"

@@ -1,7 +1,8 @@
-"""The figure of a case in space: both surfaces seen from above, side by side, with numbers and the error of the forces.
+"""The figure of a case in space: both surfaces seen from above, side by side, with numbers and forces.
 
-The view is along the mean normal of the master. Faces are shaded by the largest error of a nodal force at their
-corners. Importing matplotlib is slow.
+The view is along the mean normal of the master, so the slave is seen through its body. Nodes have the force of the
+formulation beside the exact one, and faces are shaded by the largest error at their corners. Importing matplotlib is
+slow.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
 from contactverif_reports.draw.lengths import format_number, one_digit
+from contactverif_reports.draw.strokes import size_in_words
 from contactverif_reports.draw.surface_text import headline
 
 _NUMBERED = 60  # The faces of at most so many on a side get numbers.
+_MEASURED = 16  # The nodes of at most so many on a side get their forces.
+_SAME = 1e-6  # Forces that differ by a smaller share of the largest one are written as one.
 _SHADES = "Oranges"
 _THIN = 6.0  # The ratio of length and width from which surfaces are drawn wider.
 
@@ -33,21 +37,34 @@ def make_surface_figure(
     figure = Figure(figsize=(width, width / 2 + 1.2), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     interface = case.interface
-    for axes, surface, name in zip(panels, (interface.slave, interface.master), ("slave", "master"), strict=True):
-        _draw_faces(axes, surface, places, errors)
-        axes.set_title(f"{name}, seen from outside its body", fontsize=9)
+    titles = "slave, seen through its body", "master, seen from outside"
+    for axes, surface, name in zip(panels, (interface.slave, interface.master), titles, strict=True):
+        _draw_faces(axes, surface, places, errors, _force_labels(surface, forces, exact))
+        axes.set_title(name, fontsize=9, pad=6 if forces is None else 22)  # Forces stand above the upper nodes.
+        axes.margins(0.08)
         axes.set_aspect("equal", adjustable="box")
         axes.set_axis_off()
     for axes, other in zip(panels, (interface.master, interface.slave), strict=True):
         outlines = list(places[other.faces])
         axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors="0.8", linewidths=0.5, zorder=0))
         axes.autoscale_view()
-    notes = [headline(case) + (f", drawn {format_number(stretch)} times wider across" if stretch > 1 else "")]
-    if errors is not None:
-        largest = format_number(float(errors.max()))
-        notes.append(f"shade: error of the nodal forces, up to {largest} of the largest force")
-    figure.suptitle("\n".join([*textwrap.wrap(title, 92), *notes]), fontsize=9, x=0.02, ha="left", parse_math=False)
+    lines = [headline(case) + (f", drawn {format_number(stretch)} times wider across" if stretch > 1 else "")]
+    lines += _force_notes(forces, errors)
+    figure.suptitle("\n".join([*textwrap.wrap(title, 92), *lines]), fontsize=9, x=0.02, ha="left", parse_math=False)
     return figure
+
+
+def _force_notes(forces: FloatArray | None, errors: FloatArray | None) -> list[str]:
+    """Say what the numbers at the nodes and the shades of the faces are."""
+    if forces is None:
+        return []
+    if errors is None:
+        return ["at the nodes: number, force"]
+    largest = f"up to {errors.max():.3g} of the largest exact force" if np.isfinite(errors).all() else "not finite"
+    return [
+        "at the nodes: number, force and, where it differs, exact force",
+        f"shade: error of the nodal forces, {largest}",
+    ]
 
 
 def view_from_above(case: Case) -> FloatArray:
@@ -78,15 +95,32 @@ def _node_errors(case: Case, forces: FloatArray | None, exact: FloatArray | None
     if forces is None or exact is None:
         return None
     difference = (forces - exact).reshape(case.interface.nodes.shape)
-    size = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
-    errors: FloatArray = np.linalg.norm(difference, axis=1) / (size or 1.0)
+    largest = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
+    errors: FloatArray = np.linalg.norm(difference, axis=1) / (largest or 1.0)
     return errors
 
 
-def _draw_faces(axes: Axes, surface: Surface, places: FloatArray, errors: FloatArray | None) -> None:
-    """Draw the faces of a surface with their numbers and those of nodes, shaded by the errors (n_nodes,) at corners."""
+def _force_labels(surface: Surface, forces: FloatArray | None, exact: FloatArray | None) -> dict[int, str]:
+    """Return {node: its number, its force, and the exact one if that differs}; numbers alone for a large surface."""
+    if forces is None or len(surface.nodes) > _MEASURED:
+        return {node: str(node) for node in surface.nodes.tolist()}
+    by_node, exact_by_node = (np.reshape(each, (-1, 3)) for each in (forces, forces if exact is None else exact))
+    sizes, exact_sizes = (np.linalg.norm(each, axis=1) for each in (by_node, exact_by_node))
+    slack = _SAME * float(exact_sizes.max())
+    labels = {}
+    for node in surface.nodes.tolist():
+        labels[node] = f"{node}: {size_in_words(float(sizes[node]), float(exact_sizes[node]), slack)}"
+        if "\n" not in labels[node] and np.linalg.norm(by_node[node] - exact_by_node[node]) > slack:
+            labels[node] += "\nother way"  # Forces of one size in two directions.
+    return labels
+
+
+def _draw_faces(
+    axes: Axes, surface: Surface, places: FloatArray, errors: FloatArray | None, labels: dict[int, str]
+) -> None:
+    """Draw the faces of a surface with their numbers, shaded by the errors (n_nodes,) at corners, and its nodes."""
     collection = PolyCollection(list(places[surface.faces]), facecolors="white", edgecolors="black", linewidths=0.8)
-    if errors is not None:
+    if errors is not None and np.isfinite(errors).all():
         collection.set_array(errors[surface.faces].max(axis=1))
         collection.set_cmap(_SHADES)
         collection.set_clim(0.0, max(2 * float(errors.max()), np.finfo(np.float64).tiny))  # Numbers stay legible.
@@ -96,6 +130,17 @@ def _draw_faces(axes: Axes, surface: Surface, places: FloatArray, errors: FloatA
     for number, corners in enumerate(surface.faces.tolist()):
         x, y = places[corners].mean(axis=0).tolist()
         axes.text(x, y, str(number), fontsize=7, ha="center", va="center", color="0.35")
-    for node in surface.nodes.tolist():
+    middle = places[surface.nodes].mean(axis=0)
+    for node, label in labels.items():
         axes.plot(*places[node], "o", markersize=2.5, color="black")
-        axes.annotate(str(node), places[node], (2, 2), textcoords="offset points", fontsize=7, fontweight="bold")
+        right, upper = (places[node] >= middle).tolist()
+        axes.annotate(
+            label,
+            places[node],
+            (0, 3 if upper else -3),
+            textcoords="offset points",
+            ha="right" if right else "left",
+            va="bottom" if upper else "top",
+            fontsize=7,
+            fontweight="bold",
+        )

@@ -14,7 +14,7 @@ from contactverif_reports.draw.solved_scene import Solution, SolvedScene, pressu
 from contactverif_reports.files import checked_name, whole
 
 SUFFIXES = (".vtu",)
-_KINDS = {2: "line", 3: "triangle", 4: "quad"}
+KINDS = {2: "line", 3: "triangle", 4: "quad"}
 _CELL_DATA = ("stress_xx", "stress_yy", "stress_xy", "pressure", "body", "side")
 SIDES = {"slave": 0, "master": 1, "": -1}
 
@@ -77,7 +77,7 @@ def _cells(
         stresses = np.zeros((len(numbers), 3)) if body.rigid else solution.stresses[number]
         side = np.full(len(numbers), SIDES[solved.sides[number]])
         columns = [stresses, pressures_across(body, stresses), np.full(len(numbers), number), side]
-        kind = _KINDS[numbers.shape[1]]
+        kind = KINDS[numbers.shape[1]]
         cells.setdefault(kind, []).append(numbers + first)
         data.setdefault(kind, []).append(np.column_stack(columns))
     blocks = [np.vstack(parts) for parts in data.values()]

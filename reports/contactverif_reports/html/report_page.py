@@ -11,7 +11,7 @@ from markupsafe import Markup
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Run, coverage_of
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
 from contactverif_reports.compare.cells import Cell
 from contactverif_reports.compare.comparison import Iterations, count_iterations
 from contactverif_reports.draw import as_text
@@ -56,7 +56,8 @@ class Section:
     number: int  # The number of the section, from 1, for anchors.
     open: bool  # The section is unfolded.
     missing: tuple[str, ...]  # Parts of the contract that the formulation does not provide.
-    lines: tuple[Line, ...]  # A line for each property.
+    lines: tuple[Line, ...]  # A line for each property that applies.
+    inapplicable: tuple[tuple[str, list[str]], ...]  # Reasons why properties do not apply, and the properties.
     examples: tuple[Example, ...]  # Its counterexamples.
     iterations: tuple[Iterations, ...]  # Newton's iterations where a property solved.
 
@@ -64,6 +65,7 @@ class Section:
     def counts(self) -> str:
         """The numbers of properties with each result, in words."""
         results = [line.cell.row.result for line in self.lines]
+        results += [Result.NOT_APPLICABLE for _, ids in self.inapplicable for _ in ids]
         return ", ".join(f"{results.count(result)} {result}" for result in Result if result in results)
 
 
@@ -81,7 +83,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
         headline=headline(run),
         sections=[_section(run, name, cells, examples, axis) for name in run.formulations],
         chunks=_chunks(list(run.properties)),
-        anchors={id_: f"property-{n}" for n, id_ in enumerate(run.properties, 1)},
+        anchors=_anchors(run),
         numbers={name: n for n, name in enumerate(run.formulations, 1)},
         results=[result for result in Result if run.count(result)],
         ticks=ticks(axis),
@@ -130,9 +132,29 @@ def _section(
         open=len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in run.rows_of(name)),
         missing=tuple(part for part, provided in run.provided.get(name, {}).items() if not provided),
         lines=_lines(own_cells, own_examples, axis),
+        inapplicable=_inapplicable(run, name),
         examples=tuple(own_examples),
         iterations=tuple(line for cell in own_cells for line in count_iterations([cell])),
     )
+
+
+def _anchors(run: Run) -> dict[str, str]:
+    """Return {property id: anchor of its text} of the properties that apply to a formulation of the run."""
+    applicable = {row.property_id for row in run.rows if _applies(row)}
+    return {id_: f"property-{n}" for n, id_ in enumerate(run.properties, 1) if id_ in applicable}
+
+
+def _applies(row: Row) -> bool:
+    return row.result is not Result.NOT_APPLICABLE
+
+
+def _inapplicable(run: Run, name: str) -> tuple[tuple[str, list[str]], ...]:
+    """Return the reasons why properties do not apply to a formulation, each with the ids of these properties."""
+    by_reason: dict[str, list[str]] = {}
+    for row in run.rows_of(name):
+        if not _applies(row):
+            by_reason.setdefault(row.reason, []).append(row.property_id)
+    return tuple(by_reason.items())
 
 
 def _lines(cells: Sequence[Cell], examples: Sequence[Example], axis: Axis) -> tuple[Line, ...]:
@@ -141,6 +163,7 @@ def _lines(cells: Sequence[Cell], examples: Sequence[Example], axis: Axis) -> tu
     return tuple(
         Line(cell, _PROMISES[cell.row.promise], strip(cell.margins, axis), example_of.get(cell.row.property_id, ""))
         for cell in cells
+        if _applies(cell.row)
     )
 
 
@@ -176,8 +199,10 @@ def _figures(examples: Mapping[str, Counterexample]) -> dict[str, Markup]:
     ids = sorted(examples, key=lambda id_: not examples[id_].row.unexpected)
     figures = {}
     for id_ in ids[:MOST_FIGURES]:
-        case = examples[id_].case
-        figures[id_] = svg_inline(make_mesh_figure(case, _WIDTH), as_text(case).splitlines()[0])
+        case, forces = examples[id_].case, examples[id_].row.forces
+        of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
+        figure = make_mesh_figure(case, _WIDTH, forces=of_formulation, exact=exact)
+        figures[id_] = svg_inline(figure, as_text(case).splitlines()[0])
     return figures
 
 

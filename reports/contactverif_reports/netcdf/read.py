@@ -28,10 +28,10 @@ from contactverif.contract.counterexample import (
 )
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
-from contactverif.contract.result import NotLoaded, Row, Run
+from contactverif.contract.result import NodalForces, NotLoaded, Row, Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group
-from contactverif_reports.netcdf.stored_cases import case_of_group, read_named_cases
+from contactverif_reports.netcdf.stored_cases import case_of_group, read_forces, read_named_cases
 from contactverif_reports.netcdf.stored_groups import read_groups
 from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
 from contactverif_reports.netcdf.summary_group import root_attributes
@@ -185,6 +185,7 @@ class _Reader:
                 shrunk=shrunk,
                 first=first,
                 seconds=float(self._timing["row_seconds"].values[i, j]),
+                forces=self._forces(formulation, property_id),
             )
             yield i, row
 
@@ -209,6 +210,10 @@ class _Reader:
             return None, None, case
         outcome = OutcomeArrays(dataset, info, ()).outcome(0, case)
         return (outcome, None, None) if origin is Origin.SHRUNK else (None, outcome, None)
+
+    def _forces(self, formulation: str, property_id: str) -> NodalForces | None:
+        example = self._examples.get((formulation, property_id))
+        return None if example is None else read_forces(*example)
 
     def _case_seconds(self, i: int, j: int, n_cases: int) -> FloatArray:
         seconds: FloatArray = self._timing["case_seconds"].values[i, j, :n_cases]

@@ -17,7 +17,7 @@ from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import BODIES, Case
 from contactverif.contract.counterexample import Counterexample, counterexamples, named_failures, typeable
 from contactverif.contract.interface import PLANE, Interface
-from contactverif.contract.result import Run
+from contactverif.contract.result import NodalForces, Run
 from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.groups import Group, Variable
 from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
@@ -61,7 +61,7 @@ def counterexample_groups(run: Run) -> dict[str, Group]:
 def _mesh(example: Counterexample) -> Group:
     """Return the case as a UGRID-1.0 topology, of edges in the plane and of faces in space, with the outcome on it."""
     case, info = example.case, example.row.info
-    table = _topology(case)
+    table = _topology(case) | _forces(example.row.forces)
     names = SharedNames.from_outcomes(info, [example.outcome])
     names = replace(names, parameters=(), kinds=())  # They are among the arrays.
     table |= coordinates(info, names)
@@ -117,6 +117,30 @@ def _topology(case: Case) -> dict[str, Variable]:
     for axis in axes:
         table[f"current_{axis}"].attrs.update(mesh="mesh", location="node", coordinates=coordinates_of_nodes)
     return table
+
+
+def _forces(forces: NodalForces | None) -> dict[str, Variable]:
+    """Return the forces of the formulation on the nodes of a counterexample, and any exact ones that are known."""
+    kinds = [] if forces is None else [("", "force", forces.of_formulation), ("exact_", "exact force", forces.exact)]
+    table = {}
+    for prefix, words_of_name, values in kinds:
+        for axis, along in zip("xyz", () if values is None else values.T, strict=False):
+            variable = numbers(["node"], along, f"{words_of_name} that pushes the node, {axis}", schema.FORCE)
+            variable.attrs.update(mesh="mesh", location="node")
+            table[f"{prefix}force_{axis}"] = variable
+    return table
+
+
+def read_forces(dataset: Group, case: Case) -> NodalForces | None:
+    """Return the forces that `_mesh` stored beside a case; None where there are none."""
+    kinds = [
+        np.column_stack([dataset[f"{prefix}force_{axis}"].values for axis in "xyz"[: case.interface.dim]])
+        for prefix in ("", "exact_")
+        if f"{prefix}force_x" in dataset
+    ]
+    if any(forces.shape != case.interface.nodes.shape for forces in kinds):
+        raise ValueError("forces on other nodes than those of the case")
+    return NodalForces(*kinds) if kinds else None
 
 
 def _connectivity(interface: Interface) -> tuple[IntArray, str, str]:
