@@ -15,6 +15,7 @@ def new(
     jax: Annotated[
         bool, typer.Option("--jax", help="Formulations from functions of JAX, which differentiates them.")
     ] = False,
+    in_space: Annotated[bool, typer.Option("--3d", help="A formulation on triangles in space.")] = False,
     c: Annotated[bool, typer.Option("--c", help="A formulation in C, a library that is built by make.")] = False,
     fortran: Annotated[
         bool, typer.Option("--fortran", help="A formulation in Fortran, a user element of Abaqus (UEL).")
@@ -34,19 +35,21 @@ def new(
     \bExamples
       contactverif new mine
       contactverif new mine --jax
+      contactverif new mine --3d
       contactverif new mine --fortran
     """
     from contactverif.cli.console import say
     from contactverif.cli.new_project import library_subject, make_project
     from contactverif.contract.errors import MisuseError
 
-    kinds = {"--jax": jax, "--c": c, "--fortran": fortran}
-    if sum(kinds.values()) > 1:
-        raise MisuseError("NAME", " and ".join(kind for kind, typed in kinds.items() if typed), "one of them")
-    language = "c" if c else "f90" if fortran else ""
-    files = make_project(name, jax=jax, language=language)
+    options = {"--jax": ("jax", jax), "--3d": ("3d", in_space), "--c": ("c", c), "--fortran": ("f90", fortran)}
+    kinds = {option: kind for option, (kind, typed) in options.items() if typed}
+    if len(kinds) > 1:
+        raise MisuseError("NAME", " and ".join(kinds), "one of them")
+    kind = next(iter(kinds.values()), "")
+    files = make_project(name, kind)
     say(f"{name}: {', '.join(files)}")
-    if language:
-        say(f"next: cd {name} && make && contactverif verify {library_subject(name, language)}")
+    if c or fortran:
+        say(f"next: cd {name} && make && contactverif verify {library_subject(name, kind)}")
     else:
         say(f"next: cd {name} && pip install -e . && pytest && contactverif verify {name}")

@@ -32,6 +32,7 @@ _TEMPLATES = {
     ".gitignore": "gitignore",
     ".github/workflows/tests.yml": "workflow.yml",
 }
+_SOURCES = {"jax": "jax_formulation.py", "3d": "surface_formulation.py"}  # The formulation of a kind of project.
 # The files of a project of C ("c") or Fortran ("f90"), which is built by make and needs no package of its own.
 _LIBRARY_TEMPLATES = {
     "pyproject.toml": "library_pyproject.toml",
@@ -51,15 +52,15 @@ def library_subject(name: str, language: str) -> str:
     return f"{_LOADERS[language]}:file={_module_of(name)}.so"
 
 
-def make_project(name: str, *, jax: bool, language: str = "") -> list[str]:
+def make_project(name: str, kind: str = "") -> list[str]:
     """Write a project into a new folder of that name; return the names of its files.
 
-    The language is "c" or "f90"; none is Python.
+    The kind is "jax", "3d", a formulation in space, or the language of a library, "c" or "f90".
     """
     module = _module_of(name)
-    names = [name, f"{name}-energy"] if jax else [name]
+    names = [name, f"{name}-energy"] if kind == "jax" else [name]
     _check_is_free(name, names, module)
-    texts = _render_library(name, module, language) if language else _render(name, names, module, jax=jax)
+    texts = _render_library(name, module, kind) if kind in _LOADERS else _render(name, names, module, kind)
     with tempfile.TemporaryDirectory(prefix=".contactverif-new-", dir=".") as folder:
         project = Path(folder, name)
         for file, text in texts.items():
@@ -99,14 +100,14 @@ def _distribution(name: str) -> Distribution | None:
         return None
 
 
-def _render(name: str, names: list[str], module: str, *, jax: bool) -> dict[str, str]:
+def _render(name: str, names: list[str], module: str, kind: str) -> dict[str, str]:
     """Return {file: text} of a project."""
     requirement, shared_requirement = _requirements()
-    words = {"name": name, "names": " ".join(names), "module": module, "jax": jax, "language": ""}
+    words = {"name": name, "names": " ".join(names), "module": module, "kind": kind, "language": ""}
     words |= {"requirement": requirement, "shared_requirement": shared_requirement}
     texts = {}
     for file, template in _TEMPLATES.items():
-        source = f"jax_{template}" if jax and template == "formulation.py" else template
+        source = _SOURCES.get(kind, template) if template == "formulation.py" else template
         texts[file.format(module=module)] = _environment().get_template(f"{source}.jinja").render(words)
     return texts
 
