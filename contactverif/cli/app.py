@@ -67,7 +67,10 @@ for name, command in COMMANDS.items():
     app.command(name)(spell_out_groups(command))
 
 # The names that deeper modules have for an option.
-_OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {"known failure": "--known"}
+_OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {
+    "known failure": "--known",
+    "place": "--mesh",
+}
 _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlier versions, now all --out.
 _STOPPED = 130  # The exit status after Ctrl-C, of typer and of shells.
 _CLOSED_PIPE = 128 + signal.SIGPIPE

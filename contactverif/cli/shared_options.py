@@ -189,8 +189,12 @@ class PlaceOptions:
         Path | None,
         typer.Option(help="Check on the interface of this mesh file, and on the bodies of its cells.", metavar="FILE"),
     ] = None
-    slave: Annotated[str | None, typer.Option(help="Physical group of the mesh's slave lines.", metavar="TAG")] = None
-    master: Annotated[str | None, typer.Option(help="Physical group of the mesh's master lines.", metavar="TAG")] = None
+    slave: Annotated[
+        str | None, typer.Option(help="Group of the mesh's slave lines, or faces in space.", metavar="TAG")
+    ] = None
+    master: Annotated[
+        str | None, typer.Option(help="Group of the mesh's master lines, or faces in space.", metavar="TAG")
+    ] = None
     flip: Annotated[bool, typer.Option("--flip", help="Exchange inside and outside of the mesh's lines.")] = False
     material: Annotated[
         list[str] | None,
@@ -233,7 +237,9 @@ class PlaceOptions:
             return None
         if self.slave is None or self.master is None:
             missing = "--slave" if self.slave is None else "--master"
-            raise MisuseError(missing, "nothing", f"{missing} TAG, a physical group of line elements of {self.mesh}")
+            raise MisuseError(
+                missing, "nothing", f"{missing} TAG, a physical group of lines, or of faces in space, of {self.mesh}"
+            )
         from contactverif.meshes.mesh_file import read_interface
 
         try:

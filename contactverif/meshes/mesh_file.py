@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -18,19 +17,16 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
+from contactverif.meshes.mesh_groups import Group, groups_of, kinds_in, unknown_group_error
 from contactverif.meshes.plain_mesh import PlainMesh, read_mesh
-
-Group = list[IntArray]  # For each block of cells in the file: 0 no member, 1 a member, −1 a member to be reversed.
-
-MOST_MEMBERS = 10**8  # Groups times cells: so many take 1 GB. A mesh of a million cells may have a hundred groups.
-FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
+from contactverif.meshes.surface_mesh import FLAT, is_in_space, surfaces_of
 
 
 def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = False) -> Interface:
-    """Read the interface between two groups of 2-node lines from a mesh file.
+    """Read the interface between two groups of 2-node lines, or of faces in space, from a mesh file.
 
     The 2-D cells beside the lines show on which side the body lies. A chain without cells beside it runs as its first
-    line in the file.
+    line in the file. In space the groups have triangles or quadrilaterals, and volume cells show the side.
 
     Parameters
     ----------
@@ -39,7 +35,7 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
     slave, master : str
         The name or the number of a group each.
     flip : bool
-        True reverses the chains without cells beside them, or all chains if every one has cells.
+        True reverses the chains, or the faces, without cells beside them, or all if every one has cells.
 
     Returns
     -------
@@ -49,7 +45,7 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
     Raises
     ------
     MisuseError
-        If the file, a group, its lines, or the way in which the two surfaces face each other cannot be used.
+        If the file, a group, its lines or faces, or the way in which both surfaces face each other cannot be used.
 
     Examples
     --------
@@ -57,11 +53,22 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
 
         interface = read_interface("punch.msh", slave="punch", master="base")
     """
-    sides = read_sides(path, slave=slave, master=master, flip=flip)
-    interface = _renumber(sides.points, sides.slave, sides.master)
-    check_facing(interface)
-    sys.stderr.write(sides.mesh.warnings)
+    _check_names(slave, master)
+    mesh = read_mesh(path)
+    groups = groups_of(mesh)
+    if any(is_in_space(mesh, groups, name) for name in (slave, master)):
+        interface = surfaces_of(mesh, groups, (slave, master), flip=flip)
+    else:
+        sides = _sides_of(mesh, groups, slave=slave, master=master, flip=flip)
+        interface = _renumber(sides.points, sides.slave, sides.master)
+        check_facing(interface)
+    sys.stderr.write(mesh.warnings)
     return interface
+
+
+def _check_names(slave: str, master: str) -> None:
+    if slave == master:
+        raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,12 +84,18 @@ class MeshSides:
 
 def read_sides(path: str | Path, *, slave: str, master: str, flip: bool) -> MeshSides:
     """Read the lines of two groups, oriented; the arguments and errors are those of `read_interface`."""
-    if slave == master:
-        raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
-    names = (("--slave", slave), ("--master", master))
+    _check_names(slave, master)
     mesh = read_mesh(path)
+    groups = groups_of(mesh)
+    if any(is_in_space(mesh, groups, name) for name in (slave, master)):
+        raise MisuseError("--mesh", "faces in space", "lines in a plane: bodies in space are not solved")
+    return _sides_of(mesh, groups, slave=slave, master=master, flip=flip)
+
+
+def _sides_of(mesh: PlainMesh, groups: dict[str, Group], *, slave: str, master: str, flip: bool) -> MeshSides:
+    """Return the lines of two groups, oriented."""
+    names = (("--slave", slave), ("--master", master))
     points = _planar(mesh)
-    groups = _groups(mesh)
     named = [(argument, _lines(mesh, groups, argument, name)) for argument, name in names]
     shared = np.intersect1d(named[0][1], named[1][1])
     if len(shared):
@@ -142,55 +155,12 @@ def _planar(mesh: PlainMesh) -> FloatArray:
     return points[:, :2]
 
 
-def _groups(mesh: PlainMesh) -> dict[str, Group]:
-    """Return all groups of a mesh: sets of cells and physical groups by name, numbered groups by number as text."""
-    named, numbered = _cell_sets(mesh), _tagged_cells(mesh)
-    for name, (number, dim) in mesh.field_data.items():
-        group = numbered.get(str(number), [np.zeros(len(block), dtype=np.int64) for block in mesh.cells])
-        _include(named, name, [part * (block.dim == dim) for block, part in zip(mesh.cells, group, strict=True)])
-        # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
-        _include(numbered, str(number), named[name])
-    return numbered | named
-
-
-def _cell_sets(mesh: PlainMesh) -> dict[str, Group]:
-    """Return the sets of cells by name."""
-    numbers = [np.arange(len(block)) for block in mesh.cells]
-    return {
-        name: [np.isin(every, part).astype(np.int64) for every, part in zip(numbers, sets, strict=True)]
-        for name, sets in mesh.cell_sets.items()
-    }
-
-
-def _tagged_cells(mesh: PlainMesh) -> dict[str, Group]:
-    """Return the groups that the cell data number, by number as text."""
-    groups: dict[str, Group] = {}
-    n_cells = sum(map(len, mesh.cells))
-    for key, parts in mesh.cell_data.items():
-        tags = sorted({int(tag) for values in parts for tag in np.unique(values)} - {0})
-        if len(tags) * n_cells > MOST_MEMBERS:
-            raise MisuseError("--mesh", f"{len(tags)} groups of {n_cells} cells", "fewer groups")
-        for tag in tags:
-            group = [np.asarray(values == tag, dtype=np.int64) for values in parts]
-            if key == "gmsh:physical" and tag < 0:  # In Gmsh, a negative number reverses the lines of a curve.
-                _include(groups, str(-tag), [-part for part in group])
-            else:
-                _include(groups, str(tag), group)
-    return groups
-
-
-def _include(groups: dict[str, Group], name: str, group: Group) -> None:
-    """Add the members of a group to those that the name has already."""
-    known = groups.get(name, group)
-    groups[name] = [np.where(part != 0, part, more) for part, more in zip(known, group, strict=True)]
-
-
 def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
     """Return the nodes (n_lines, 2) of the lines of a group, in the order of the file."""
     if name not in groups:
         raise unknown_group_error(mesh, groups, argument, name)
     group = groups[name]
-    kinds = _kinds(mesh, group)
+    kinds = kinds_in(mesh, group)
     higher = [kind for kind in kinds if kind != "line" and kind.startswith(("line", "VTK_LAGRANGE_CURVE"))]
     if higher:
         actual = f"{name!r} with elements {', '.join(higher)}"
@@ -206,20 +176,6 @@ def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) 
         needed = "a group of 2-node lines (by its number, where a group of cells has the same name)"
         raise MisuseError(argument, actual, needed)
     return lines
-
-
-def _kinds(mesh: PlainMesh, group: Group) -> list[str]:
-    """Return the types of the cells in a group."""
-    return sorted({block.type for block, members in zip(mesh.cells, group, strict=True) if members.any()})
-
-
-def unknown_group_error(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> MisuseError:
-    """Return the error for a group that the file does not have; it names near groups and lists all."""
-    listed = ", ".join(f"{each!r} ({', '.join(_kinds(mesh, group)) or 'empty'})" for each, group in groups.items())
-    by_case = {each.casefold(): each for each in groups}
-    near = [repr(by_case[each]) for each in get_close_matches(name.casefold(), by_case)]
-    needed = (f"{' or '.join(near)}? The groups are " if near else "one of ") + listed
-    return MisuseError(argument, f"{name!r}, which is no group of the file", needed if listed else "groups in the file")
 
 
 def corners_of_cells(mesh: PlainMesh) -> list[IntArray]:

@@ -29,8 +29,8 @@ from contactverif.meshes.mesh_file import (
     corners_of_cells,
     describe_place,
     read_sides,
-    unknown_group_error,
 )
+from contactverif.meshes.mesh_groups import unknown_group_error
 
 YOUNG, POISSON = 1.0, 0.3  # The material of a body that the user says nothing about.
 STIFFNESS = 1.0  # The distributed stiffness ε̂ h / E of a scene, soft enough for Newton's method on bent surfaces.

@@ -18,8 +18,9 @@ from operator import attrgetter
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
+from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import PLANE
+from contactverif.contract.interface import PLANE, SEGMENT, Interface
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
@@ -50,6 +51,7 @@ from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, Sampling
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
+_FACE_NAMES = {2: "segments in the plane", 3: "triangles in space", 4: "quadrilaterals in space"}
 # The properties that are asked first: cheap ones, of which one fails for most mistakes. Balance is there soon. Purity
 # has the same cases, but starts a second process; its failure explains all that others would show.
 FIRST = ("balance.force", "purity", "unilateral", "scaling", "patch.flat.resultant", "tangent.sparsity")
@@ -76,6 +78,8 @@ class RunJobs:
     ) -> None:
         _check_once("formulation", map(attrgetter("name"), subjects))
         _check_once("property", map(attrgetter("id"), questions))
+        for subject in subjects:
+            _check_place(subject, sampling.interface)
         self._subjects, self._sampling, self._journal, self._report = subjects, sampling, journal, report
         self._questions, self._known = questions, known
         self._share, self._shrink, self._keep_going = share, shrink, keep_going
@@ -468,6 +472,18 @@ def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseC
 def _turn(question: Property) -> tuple[bool, int]:
     """Return the key by which properties are asked: those that solve bodies last, since they take long."""
     return question.bodies, FIRST.index(question.id) if question.id in FIRST else len(FIRST)
+
+
+def _check_place(subject: Subject, interface: Interface | None) -> None:
+    """Refuse the interface of a user if a formulation does not take such faces."""
+    if interface is None or isinstance(subject, EngineSubject):
+        return
+    abilities = subject.traits.abilities
+    corners = {side.faces.shape[1] for side in (interface.slave, interface.master)}
+    takes = {SEGMENT} if abilities.in_plane else set(abilities.faces)  # A formulation of both is asked in the plane.
+    if not corners <= takes:
+        found, needed = (" and ".join(_FACE_NAMES[count] for count in sorted(each)) for each in (corners, takes))
+        raise MisuseError("place", f"an interface of {found}", f"one of {needed}, on which {subject.name} is asked")
 
 
 def _check_once(argument: str, names: Iterable[str]) -> None:

@@ -18,7 +18,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.case import Case
 from contactverif.contract.cases import name_of_source
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.property import Outcome, Property
 from contactverif.sampling.blas_threads import one_thread
 from contactverif.sampling.hypothesis_draws import (
@@ -60,8 +60,10 @@ class Sampling:
 
     def source(self, question: Property) -> CaseSource | None:
         """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
-        if question.bodies and self.interface is not None and self.scene is None:
-            return None
+        if self.interface is not None:
+            in_space = question.cases is question.cases_in_space
+            if in_space is (self.interface.dim == PLANE) or (question.bodies and self.scene is None):
+                return None
         with one_thread():
             return cast("CaseSource | None", question.cases(self.scene if question.bodies else self.interface))
 

@@ -64,10 +64,10 @@ def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
 @random_source("contactverif_properties.pushes.pushing_surfaces")
 def pushing_surfaces(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
-) -> dict[str, SearchStrategy[Case]] | None:
+) -> dict[str, SearchStrategy[Case]]:
     """Return flat cases in space with a uniform penetration, and tilted and warped ones, each half of all cases."""
-    flat, tilted = flat_surface_cases(interface, faces), surface_cases(interface, faces)
-    return None if flat is None or tilted is None else {FLAT: flat, ANY_SHAPE: tilted}
+    cases = {FLAT: flat_surface_cases(interface, faces), ANY_SHAPE: surface_cases(interface, faces)}
+    return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
 
 
 def lift_slave(case: Case, height: float) -> Case:

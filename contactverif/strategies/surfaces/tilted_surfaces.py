@@ -19,6 +19,7 @@ from contactverif.contract.cases import random_source
 from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.interface import Interface
 from contactverif.strategies.parts import OFFSETS, depth_units, penalties, repeat_cyclically, seeds
+from contactverif.strategies.surfaces.given_surfaces import given_surface_states
 from contactverif.strategies.surfaces.space_motions import SpaceMotion, space_motions
 from contactverif.strategies.surfaces.surface_pairs import SurfacePair, surface_pairs
 from contactverif.strategies.translations import FINENESS, FURTHEST
@@ -34,17 +35,26 @@ _WARPS = st.lists(st.integers(-4, 4), min_size=1, max_size=9)  # Moves across in
 def surface_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> SearchStrategy[Case] | None:
-    """Return tilted and warped states, of which half have surfaces on the same domain, with all its ties."""
-    return _tilted_states(surface_pairs(faces=faces), smooth=False) if interface is None else None
+    """Return tilted and warped states, of which half have surfaces on the same domain, with all its ties.
+
+    On an interface of the user they are states of this.
+    """
+    if interface is not None:
+        return given_surface_states(interface, smooth=False)
+    return _tilted_states(surface_pairs(faces=faces), smooth=False)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
 def smooth_surface_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> SearchStrategy[Case] | None:
-    """Return tilted and warped states off the lattice, over a larger master: for derivatives."""
-    pairs = surface_pairs(same_domain=False, stretched=False, faces=faces)
-    return _tilted_states(pairs, smooth=True) if interface is None else None
+    """Return tilted and warped states off the lattice, over a larger master: for derivatives.
+
+    On an interface of the user they are states of this.
+    """
+    if interface is not None:
+        return given_surface_states(interface, smooth=True)
+    return _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")

@@ -11,6 +11,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import Subject
@@ -25,8 +26,10 @@ FLAT, TILTED = "flat faces", "tilted and warped faces"
 @random_source("contactverif_properties.shared.face_places.projected_faces")
 def projected_faces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return flat cases in space, and tilted and warped ones."""
-    flat, tilted = flat_surface_cases(interface), surface_cases(interface)
-    return None if flat is None or tilted is None else {FLAT: flat, TILTED: tilted}
+    cases = {FLAT: flat_surface_cases(interface), TILTED: surface_cases(interface)}
+    if interface is not None and interface.slave.faces.shape[1] + interface.master.faces.shape[1] > 2 * TRIANGLE:
+        return None  # A foot on a quadrilateral is a root, and no exact number.
+    return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
 
 
 ON_FACES = Cases.by_kind(projected_faces)
