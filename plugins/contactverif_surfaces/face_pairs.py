@@ -9,7 +9,7 @@ import numpy as np
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
-from contactverif_surfaces.face_search import find_face_cells
+from contactverif_surfaces.face_search import find_cells, longest_edges
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,8 +25,8 @@ class FacePairs:
     @classmethod
     def find(cls, interface: Interface, z: FloatArray) -> FacePairs:
         """Return the cells of an interface at a state z (n_unknowns,)."""
-        slave, master = interface.slave.faces, interface.master.faces
-        faces, codes = find_face_cells(np.array(z).reshape(-1, 3), np.array(slave), np.array(master))
+        x, sides = np.array(z).reshape(-1, 3), (interface.slave, interface.master)
+        faces, codes = find_cells(x, *(side.faces for side in sides), *(longest_edges(side, x) for side in sides))
         return cls.of_arrays(interface, faces[:, 0], faces[:, 1], codes)
 
     @classmethod

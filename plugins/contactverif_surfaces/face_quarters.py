@@ -22,7 +22,7 @@ from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pushes, gauss_points
 from contactverif_surfaces.face_pairs import positions_of
-from contactverif_surfaces.face_search import find_face_cells
+from contactverif_surfaces.face_search import find_cells, longest_edges
 from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
 from contactverif_surfaces.plane_shapes import PAST_BORDER, TRIANGLE, cross_plane, evaluate_shapes
 from contactverif_surfaces.surface_traits import SURFACE_TRAITS
@@ -93,14 +93,13 @@ class FaceQuarters:
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells of the parts, the master face under each centre (`home`), and the parts in contact."""
-        slave, x = interface.slave.faces, np.array(z).reshape(-1, 3)
+        slave, master, x = interface.slave.faces, interface.master, np.array(z).reshape(-1, 3)
         x = x - x[0]  # The middle of an edge is rounded at its distance from the origin.
         corners = np.einsum("pci,fij->fpcj", PARTS[slave.shape[1]], x[slave]).reshape(-1, slave.shape[1], 3)
         numbers = np.arange(corners.shape[0] * corners.shape[1]).reshape(corners.shape[:2])
-        faces, codes = find_face_cells(
-            np.vstack([corners.reshape(-1, 3), x]), numbers, interface.master.faces + numbers.size
-        )
-        home = _find_homes(corners, x[interface.master.faces], faces)
+        edges = np.repeat(longest_edges(interface.slave, x), N_PARTS), longest_edges(master, x)
+        faces, codes = find_cells(np.vstack([corners.reshape(-1, 3), x]), numbers, master.faces + numbers.size, *edges)
+        home = _find_homes(corners, x[master.faces], faces)
         parts = np.flatnonzero(home >= 0)
         active = np.zeros(len(home), bool)
         active[parts] = Centres.of_parts(interface, parts, home[parts]).points_at(z).gap[:, 0] < 0

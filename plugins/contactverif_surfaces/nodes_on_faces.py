@@ -1,8 +1,9 @@
 """Node-to-surface contact: a spring at each slave node, along the normal of the master face that it stands on.
 
-The foot of a node is the point of a master face straight below it; of the faces that have one, the nearest counts. The
-force is split by the shape functions of the foot. Neither the same stiffness at each node nor that of the area around
-it transmits a uniform pressure between meshes that do not match.
+The foot of a node is the point of a master face straight below it; of the faces that have one, the nearest counts, if
+its gap is at most 2 (h_s + h_m) either way, as for cells (`face_search`). The force is split by the shape functions of
+the foot. Neither the same stiffness at each node nor that of the area around it transmits a uniform pressure between
+meshes that do not match.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pushes
+from contactverif_surfaces.cell_points import CellPoints, SlaveView, axes_of, flatten_pushes
 from contactverif_surfaces.face_pairs import first_faces, positions_of
+from contactverif_surfaces.face_search import REACH, longest_edges
+from contactverif_surfaces.face_tree import find_boxes_at, grow_tree
 from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
 from contactverif_surfaces.plane_shapes import PAST_BORDER, cross_plane, evaluate_shapes
 from contactverif_surfaces.surface_traits import SURFACE_TRAITS
@@ -36,14 +39,20 @@ class NodesOnFaces:
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the master face under each slave node, −1 for none, and the nodes in contact."""
-        slave = np.arange(interface.n_slave_nodes)
-        node, face = (part.reshape(-1) for part in np.meshgrid(slave, np.arange(len(interface.master)), indexing="ij"))
-        points = _feet(positions_of(np.array(z), _nodes_and_faces(interface, node, face)))
-        reached = points.slave_shape[:, 0].min(axis=1) >= -PAST_BORDER
-        distance = np.where(reached, np.abs(points.gap[:, 0]), np.inf).reshape(len(slave), -1)
-        home = np.where(np.isfinite(distance.min(axis=1)), distance.argmin(axis=1), -1)
-        gap = points.gap[:, 0].reshape(len(slave), -1)[slave, home]
-        return Pairing({"home": home, "active": (home >= 0) & (gap < 0)})
+        x, faces = np.array(z).reshape(-1, 3), interface.slave.faces
+        edge, reach = np.zeros(interface.n_slave_nodes), REACH * longest_edges(interface.master, x)
+        edge[faces] = longest_edges(interface.slave, x)[:, None]
+        reach += REACH * edge.max()
+        node, face = find_boxes_at(x[: len(edge)], *grow_tree(_prisms(x[interface.master.faces], reach)))
+        points = _feet(positions_of(x.reshape(-1), _nodes_and_faces(interface, node, face)))
+        gap = points.gap[:, 0]
+        near = np.abs(gap) <= reach[face] - REACH * (edge.max() - edge[node])
+        good = np.flatnonzero(near & (points.slave_shape[:, 0].min(axis=1) >= -PAST_BORDER))
+        order = good[np.lexsort((face[good], np.abs(gap[good]), node[good]))]
+        first = order[np.diff(node[order], prepend=-1) > 0]  # The nearest of each node.
+        home, active = np.full(len(edge), -1), np.zeros(len(edge), bool)
+        home[node[first]], active[node[first]] = face[first], gap[first] < 0
+        return Pairing({"home": home, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
@@ -108,6 +117,16 @@ def _feet(corners: Array) -> CellPoints:
     gap = view.master_height - (shape * view.slave_height[..., None, :]).sum(axis=-1)
     whole = np.ones_like(gap)
     return CellPoints(shape, whole[..., None], whole, gap, view.normal)
+
+
+def _prisms(corners: FloatArray, reach: FloatArray) -> FloatArray:
+    """Return the boxes (n, 2, 3) that hold all that a face (n, n_corners, 3) reaches along its normal, either way.
+
+    They are a little larger, since a foot may lie past the border by `PAST_BORDER`.
+    """
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    more = reach[:, None] * (np.abs(axes_of(corners)[2]) + 2 * PAST_BORDER)
+    return np.stack([low - more, high + more], axis=1)
 
 
 def _forces(penalty: float, corners: Array) -> Array:
