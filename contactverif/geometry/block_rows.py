@@ -5,8 +5,8 @@ makes the pattern, the union of all couplings. For each coupling and pair of nod
 multiplier `add_row`, `add_column` and `add_entry`. They find the place by bisection. Nothing is allocated, nothing is
 sorted afterwards, and the sums have a fixed order.
 
-A node has two unknowns, 2 v and 2 v + 1. A multiplier stands behind the nodes: the number n_nodes + i in a coupling is
-the multiplier i, whose unknown is 2 n_nodes + i.
+In the plane a node has two unknowns, 2 v and 2 v + 1. A multiplier stands behind the nodes: the number n_nodes + i in a
+coupling is the multiplier i, whose unknown is 2 n_nodes + i. In space a pattern has three unknowns for each node.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ class _Pattern(NamedTuple):
 
     n_nodes: int
     n_multipliers: int
+    per_node: int
     couplings: Couplings
     indptr: AnyIntArray
     indices: AnyIntArray
@@ -49,14 +50,17 @@ class _Pattern(NamedTuple):
 _latest: list[_Pattern] = []  # The latest pattern. Newton's method asks for it again until a pairing changes.
 
 
-def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings) -> Any:
-    """Return a matrix (n_unknowns, n_unknowns) of zeros in the union of all couplings, columns ascending in rows."""
-    size, latest = 2 * n_nodes + n_multipliers, _latest[0] if _latest else None
-    if latest is None or latest[:2] != (n_nodes, n_multipliers) or not _are_equal(latest.couplings, couplings):
-        latest = _Pattern(n_nodes, n_multipliers, couplings, *_make_pattern(n_nodes, n_multipliers, couplings))
+def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings, per_node: int = 2) -> Any:
+    """Return a matrix (n_unknowns, n_unknowns) of zeros in the union of all couplings, columns ascending in rows.
+
+    A node has `per_node` unknowns.
+    """
+    sizes, latest = (n_nodes, n_multipliers, per_node), _latest[0] if _latest else None
+    if latest is None or latest[:3] != sizes or not _are_equal(latest.couplings, couplings):
+        latest = _Pattern(*sizes, couplings, *_make_pattern(*sizes, couplings))
         _latest[:] = [latest]
     indptr, indices = latest.indptr.copy(), latest.indices.copy()  # A caller may change its matrix.
-    matrix = compressed_matrix("csr", size, np.zeros(len(indices)), indices, indptr)
+    matrix = compressed_matrix("csr", len(indptr) - 1, np.zeros(len(indices)), indices, indptr)
     matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
     return matrix
 
@@ -67,17 +71,19 @@ def _are_equal(couplings: Couplings, others: Couplings) -> bool:
     return same_nodes and np.array_equal(starts, other_starts) and np.array_equal(rows, other_rows)
 
 
-def _make_pattern(n_nodes: int, n_multipliers: int, couplings: Couplings) -> tuple[AnyIntArray, AnyIntArray]:
+def _make_pattern(
+    n_nodes: int, n_multipliers: int, per_node: int, couplings: Couplings
+) -> tuple[AnyIntArray, AnyIntArray]:
     """Return where each row of unknowns begins, and the columns of all rows."""
-    size, n_numbers = 2 * n_nodes + n_multipliers, n_nodes + n_multipliers
+    size, n_numbers = per_node * n_nodes + n_multipliers, n_nodes + n_multipliers
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
     members, ends = np.empty(len(couplings.nodes), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
     _write_members(begins, member_starts, members, ends, *couplings)
     columns = np.empty(begins[-1], dtype=np.int32)
-    n_entries = _write_columns(columns, ends, n_nodes, begins, member_starts, members, *couplings)
+    n_entries = _write_columns(columns, ends, n_nodes, per_node, begins, member_starts, members, *couplings)
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
-    _write_pattern(indptr, indices, n_nodes, begins, ends, columns)
+    _write_pattern(indptr, indices, n_nodes, per_node, begins, ends, columns)
     return indptr, indices
 
 
@@ -116,6 +122,7 @@ def _write_columns(
     columns: NumberArray,
     ends: IntArray,
     n_nodes: int,
+    per_node: int,
     begins: IntArray,
     member_starts: IntArray,
     members: NumberArray,
@@ -132,7 +139,7 @@ def _write_columns(
     for row in range(len(ends)):
         ends[row] = begins[row]
     for column in range(len(ends)):
-        width = 2 if column < n_nodes else 1
+        width = per_node if column < n_nodes else 1
         for member in range(member_starts[column], member_starts[column + 1]):
             coupling = members[member]
             for place in range(first_row[coupling], starts[coupling + 1]):
@@ -141,26 +148,33 @@ def _write_columns(
                 if end == begins[row] or columns[end - 1] != column:
                     columns[end] = column
                     ends[row] = end + 1
-                    n_entries += 2 * width if row < n_nodes else width
+                    n_entries += per_node * width if row < n_nodes else width
     return n_entries
 
 
 @compile_kernel
 def _write_pattern(
-    indptr: AnyIntArray, indices: AnyIntArray, n_nodes: int, begins: IntArray, ends: IntArray, columns: NumberArray
+    indptr: AnyIntArray,
+    indices: AnyIntArray,
+    n_nodes: int,
+    per_node: int,
+    begins: IntArray,
+    ends: IntArray,
+    columns: NumberArray,
 ) -> None:
     """Write the starts of all rows of unknowns, and their columns."""
     at, unknown = 0, 0
     indptr[0] = 0
     for row in range(len(ends)):
-        for _ in range(2 if row < n_nodes else 1):
+        for _ in range(per_node if row < n_nodes else 1):
             for place in range(begins[row], ends[row]):
                 column = columns[place]
                 if column < n_nodes:
-                    indices[at], indices[at + 1] = 2 * column, 2 * column + 1
-                    at += 2
+                    for part in range(per_node):
+                        indices[at] = per_node * column + part
+                        at += 1
                 else:
-                    indices[at] = n_nodes + column
+                    indices[at] = (per_node - 1) * n_nodes + column
                     at += 1
             unknown += 1
             indptr[unknown] = at

@@ -5,11 +5,13 @@ every real number of a cell from the positions of its nodes. A method is a rule 
 (`cell_springs`), at slave nodes from weighted gaps (`surface_mortar`), at quarters of slave faces (`face_quarters`), or
 at slave nodes themselves (`nodes_on_faces`).
 
-The files are written to be read. All numbers are computed on arrays of real or complex positions, so a tangent is the
-derivative of the same lines, by a complex step in the nodes of one cell (`local_derivatives`).
+These files are written to be read. All numbers are computed on arrays of real or complex positions, so a tangent is the
+derivative of the same lines, by a complex step in the nodes of one cell (`local_derivatives`). One method is compiled:
+one point a cell (`centre_springs`, `centre_geometry`, `centre_tangent`).
 """
 
-from contactverif_surfaces.cell_springs import sts_3d, vts_cell_3d
+from contactverif_surfaces.cell_springs import sts_3d
+from contactverif_surfaces.centre_springs import vts_cell_3d
 from contactverif_surfaces.face_quarters import vts_ppt_3d
 from contactverif_surfaces.nodes_on_faces import nts_3d, nts_ar_3d
 from contactverif_surfaces.surface_mortar import mortar_3d

@@ -125,12 +125,6 @@ def gauss_points(view: SlaveView, codes: IntArray, n_points: int) -> CellPoints:
     return view.points_at(points.reshape(*points.shape[:-3], count, 2), area.reshape(*area.shape[:-2], count))
 
 
-def centre_points(view: SlaveView, codes: IntArray) -> CellPoints:
-    """Return one point for each cell: its centroid, with the area of the cell."""
-    centre, area = _centroid(view.cell_corners(codes))
-    return view.points_at(centre, area[..., None])
-
-
 def _middle(corners: Array, following: Array) -> Array:
     """Return a point in the middle of each cell (..., n_cells, 1, 2), the mean of its edges by their squared lengths.
 
@@ -141,17 +135,6 @@ def _middle(corners: Array, following: Array) -> Array:
     total = weights.sum(axis=-2, keepdims=True)
     middle: Array = (weights * (corners + following)).sum(axis=-2, keepdims=True) / np.where(total == 0, 1.0, 2 * total)
     return np.where(total == 0, corners[..., :1, :], middle)
-
-
-def _centroid(corners: Array) -> tuple[Array, Array]:
-    """Return the centroids (..., n_cells, 1, 2) and the areas (..., n_cells) of cells (..., n_cells, n_corners, 2)."""
-    start = corners[..., :1, :]
-    first = np.broadcast_to(start, corners[..., 1:-1, :].shape)
-    areas = _areas(np.stack([first, corners[..., 1:-1, :], corners[..., 2:, :]], axis=-2))
-    moments = areas[..., None] * ((corners[..., 1:-1, :] - start) + (corners[..., 2:, :] - start)) / 3
-    area = areas.sum(axis=-1)
-    whole = np.where(area.real == 0, 1.0, area)  # An empty cell has no centroid, and its points no weight.
-    return start + moments.sum(axis=-2, keepdims=True) / whole[..., None, None], area
 
 
 def _areas(triangles: Array) -> Array:

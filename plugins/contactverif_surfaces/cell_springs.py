@@ -1,8 +1,7 @@
-"""Springs at points of the cells: segment-to-segment contact in three dimensions, and one virtual slave node a cell.
+"""Springs at points of the cells: segment-to-segment contact in three dimensions.
 
 A point has the pressure −ε̂ g where g < 0, along the slave's normal, and pushes both faces by their shape functions
-there. So force and moment balance point by point. A uniform pressure is integrated exactly over what is covered: on
-triangles the shape functions are linear over a cell, and the centroid is enough for these.
+there. So force and moment balance point by point. A uniform pressure is integrated exactly over what is covered.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif_surfaces.cell_points import CellPoints, SlaveView, centre_points, flatten_pushes, gauss_points
+from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pushes, gauss_points
 from contactverif_surfaces.face_pairs import FacePairs
 from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
 from contactverif_surfaces.surface_traits import SURFACE_TRAITS
@@ -125,14 +124,3 @@ def _by_corners(view: SlaveView, codes: IntArray) -> CellPoints:
     """Return three Gauss points for each triangle of a cell of triangles, and six for others."""
     triangles = view.slave.shape[-2] == view.master.shape[-2] == 3
     return gauss_points(view, codes, 3 if triangles else 6)
-
-
-def vts_cell_3d(*, penalty: float) -> CellSprings:
-    """Take one virtual slave node at the centroid of each cell, with the area of the cell. On triangles it is exact.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per area per length of penetration.
-    """
-    return CellSprings(SURFACE_TRAITS.revise(source="here"), check_penalty(penalty), centre_points)

@@ -13,7 +13,8 @@ A corner of a cell is two integers (i, j): slave corner i is (i, −1), master c
 crossing of slave edge i and master edge j. The master is numbered in reverse, so that both run counter-clockwise.
 
 Two edges cross only if both ends lie off the other edge by more than `TIE` × size × length of that edge. Otherwise the
-place of a crossing would be a quotient of two roundoffs: meshes that share an edge have many such pairs.
+place of a crossing would be a quotient of two roundoffs: meshes that share an edge have many such pairs. For the same
+reason there is no cell that is thinner than `TIE` × size: its centroid could be anywhere.
 
 Candidates come from a tree of boxes (`face_tree`), at a cost of O(log n) for each slave face.
 
@@ -194,17 +195,19 @@ def view_face(
     """Write the components (n_corners, 3) of the corners of a face along the axes, seen from the origin."""
     for i in range(len(face)):
         node = face[len(face) - 1 - i if reverse else i]
+        arm_x, arm_y, arm_z = x[node, 0] - origin[0], x[node, 1] - origin[1], x[node, 2] - origin[2]
         for row in range(3):
-            seen[i, row] = 0.0
-            for axis in range(3):
-                seen[i, row] += (x[node, axis] - origin[axis]) * axes[row, axis]
+            seen[i, row] = arm_x * axes[row, 0] + arm_y * axes[row, 1] + arm_z * axes[row, 2]
 
 
 @compile_part
 def may_overlap(low: FloatArray, high: FloatArray, master: FloatArray) -> bool:
     """Return whether the boxes of two faces, seen in the plane, overlap, and the master faces the slave."""
     for axis in range(2):
-        if master[:, axis].min() > high[axis] or master[:, axis].max() < low[axis]:
+        first, last = master[0, axis], master[0, axis]
+        for j in range(1, len(master)):
+            first, last = min(first, master[j, axis]), max(last, master[j, axis])
+        if first > high[axis] or last < low[axis]:
             return False
     turn = 0.0
     for j in range(len(master)):
@@ -256,9 +259,23 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: 
         if n_left < 3:
             return 0
         count, old = n_left, new
+    if is_thin(places[old], count, TIE * size):
+        return 0
     for v in range(len(corners)):
         corners[v, 0], corners[v, 1] = codes[old, min(v, count - 1), 0], codes[old, min(v, count - 1), 1]
     return count
+
+
+@compile_part
+def is_thin(places: FloatArray, count: int, width: float) -> bool:
+    """Return whether the first corners (count, 2) of a cell enclose less than their longest distance × a width."""
+    area, longest = 0.0, 0.0
+    for v in range(1, count):
+        w = v + 1 if v + 1 < count else v
+        x, y = places[v, 0] - places[0, 0], places[v, 1] - places[0, 1]
+        area += (x * (places[w, 1] - places[0, 1]) - y * (places[w, 0] - places[0, 0])) / 2
+        longest = max(longest, x * x + y * y)
+    return area <= np.sqrt(longest) * width
 
 
 @compile_part

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 from mutate import Mutant, says, wrap
+from readable_cells import centre_points
 
 import contactverif_surfaces
 from contactverif import Pairing
-from contactverif_surfaces.cell_points import CellPoints, SlaveView, centre_points, gauss_points, unit_vectors
+from contactverif_surfaces.cell_points import CellPoints, SlaveView, gauss_points, unit_vectors
 
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT, TANGENT, OBJECTIVITY = "balance.force", "balance.moment", "tangent.directional", "objectivity"

@@ -1,0 +1,94 @@
+"""The compiled `vts-cell-3d` beside the readable one, which is differentiated by complex steps."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from readable_cells import readable_vts_cell
+
+from contactverif import Case, Pairing, named_case
+from contactverif.contract.arrays import UNIT_ROUNDOFF
+from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
+from contactverif_surfaces import vts_cell_3d
+
+
+@cache
+def smooth_states() -> tuple[Case, ...]:
+    return draw_cases(smooth_surface_cases(), seed="surface kernels", examples=60).cases  # type: ignore[arg-type]
+
+
+def test_forces_and_tangent_are_those_of_the_readable_code() -> None:
+    """A coordinate is rounded at its distance from the origin, and a face turns by that over its least height."""
+    fast, slow = vts_cell_3d(penalty=2.0), readable_vts_cell(penalty=2.0)
+    used = []
+    for case in (*smooth_states(), named_case("crossed-diagonals"), named_case("tilted-faces")):
+        interface, z = case.interface, case.z
+        pairing = fast.pair(interface, z)
+        other = slow.pair(interface, z)
+        assert np.array_equal(other["active"][:, 0], pairing["active"])
+        forces, tangent = fast.residual_and_tangent(interface, pairing, z)
+        right = slow.residual(interface, other, z), slow.tangent(interface, other, z).toarray()
+        rounding = UNIT_ROUNDOFF * case.largest_coordinate / case.shortest_segment
+        for mine, readable in zip((forces, tangent.toarray()), right, strict=True):
+            used.append(np.abs(mine - readable).max() / (rounding * (np.abs(readable).max() or 1.0)))
+    print(f"\nthe largest difference is {max(used):.3g} u X / h")
+    assert max(used) < 64
+
+
+def test_the_forces_of_a_residual_are_those_beside_the_tangent_and_a_repetition_has_the_same_bits() -> None:
+    formulation = vts_cell_3d(penalty=2.0)
+    for case in smooth_states()[:20]:
+        pairing = formulation.pair(case.interface, case.z)
+        assert formulation.pair(case.interface, case.z).same_as(pairing)
+        alone = formulation.residual(case.interface, pairing, case.z)
+        (forces, tangent), (forces_again, again) = (
+            formulation.residual_and_tangent(case.interface, pairing, case.z) for _ in range(2)
+        )
+        assert np.array_equal(forces, forces_again)
+        assert np.array_equal(tangent.data, again.data)
+        assert np.abs(alone - forces).max() <= 16 * UNIT_ROUNDOFF * np.abs(forces).max()  # Sums in the same order.
+
+
+def test_the_tangent_is_the_complex_step_of_the_residual() -> None:
+    formulation, random = vts_cell_3d(penalty=2.0), np.random.default_rng(0)
+    for case in smooth_states():
+        pairing = formulation.pair(case.interface, case.z)
+        direction = random.normal(size=case.z.size)
+        step = formulation.residual(case.interface, pairing, case.z + 2.0**-200 * 1j * direction).imag * 2.0**200
+        tangent = formulation.tangent(case.interface, pairing, case.z)
+        assert np.linalg.norm(tangent @ direction - step) <= 1e-12 * np.linalg.norm(step)
+
+
+def test_the_pattern_holds_the_nodes_of_cells_in_contact_and_no_other() -> None:
+    formulation = vts_cell_3d(penalty=2.0)
+    for case in smooth_states()[:20]:
+        pairing, interface = formulation.pair(case.interface, case.z), case.interface
+        tangent = formulation.tangent(interface, pairing, case.z)
+        felt = np.zeros((interface.n_nodes, interface.n_nodes), bool)
+        for cell in np.flatnonzero(pairing["active"]):
+            slave = interface.slave.faces[pairing["slave_face"][cell]]
+            nodes = np.concatenate([slave, interface.master.faces[pairing["master_face"][cell]]])
+            felt[np.ix_(nodes, nodes)] = True
+        assert tangent.nnz == 9 * felt.sum()
+        assert np.array_equal(np.sort(tangent.indices), np.sort(np.argwhere(np.kron(felt, np.ones((3, 3))))[:, 1]))
+
+
+@pytest.mark.parametrize("strategy", [flat_surface_cases, surface_cases])
+def test_no_centroid_lies_outside_its_faces(strategy: object) -> None:
+    """A cell that roundoff alone makes has no centroid: the search leaves it out."""
+    formulation = vts_cell_3d(penalty=2.0)
+    for case in draw_cases(strategy(), seed="surface kernels", examples=100).cases:  # type: ignore[operator]
+        pairing = formulation.pair(case.interface, case.z)
+        points = formulation.contact_points(case.interface, pairing, case.z)
+        assert points.slave_shape.min(initial=0.0) >= -1 / 8
+        assert points.master_shape.min(initial=0.0) >= -1 / 8
+
+
+def test_a_cell_without_contact_is_not_in_the_tangent() -> None:
+    case = named_case("crossed-diagonals")
+    nothing = Pairing({**(pairing := vts_cell_3d(penalty=2.0).pair(case.interface, case.z)),
+                       "active": np.zeros_like(pairing["active"])})  # fmt: skip
+    forces, tangent = vts_cell_3d(penalty=2.0).residual_and_tangent(case.interface, nothing, case.z)
+    assert not forces.any()
+    assert tangent.nnz == 0
