@@ -18,7 +18,7 @@ from contactverif.contract.subject import Subject
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases
 from contactverif.strategies.straight import cases_over_a_body
-from contactverif.strategies.surfaces import smooth_surface_cases
+from contactverif.strategies.surfaces import plane_cases_by_a_plate, smooth_surface_cases
 from contactverif_properties.shared.same_answer import TIE, Carry, compare, same_answer_quantities
 
 IN_MIRROR = same_answer_quantities("in the mirror image")
@@ -27,6 +27,7 @@ IN_OTHER_NUMBERS = same_answer_quantities("in other numbers")
 ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 FAR, BEHIND = "a far pair of bodies", "a body behind the master"
 DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
+PLATE = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]])  # The faces of a plate's lower and upper side.
 BESIDE_OTHERS = same_answer_quantities("beside another body")
 
 
@@ -198,10 +199,18 @@ def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
     return {FAR: smooth_cases(), BEHIND: behind}
 
 
+@random_source("contactverif_properties.remote.remote_surface_cases")
+def remote_surface_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+    """Return the same in space; there are none on an interface of the user."""
+    far, behind = smooth_surface_cases(interface), plane_cases_by_a_plate(interface)
+    return None if far is None or behind is None else {FAR: far, BEHIND: behind}
+
+
 @_define(
     id="remote",
     quantities=BESIDE_OTHERS,
     cases=Cases.by_kind(remote_cases),
+    cases_in_space=Cases.by_kind(remote_surface_cases),
     kinds=(FAR, BEHIND),
     asks=WITHOUT_BARRIER,  # The bodies that are added penetrate each other.
 )
@@ -223,43 +232,60 @@ def remote(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more.
     """
     if "behind" in case.parameters:
-        slave, master = np.empty((0, 2)), case.parameters["behind"]
+        slave, master = _no_part(case), case.parameters["behind"]
+        return compare(BESIDE_OTHERS, subject, case, *add_parts(case, slave, _as_part(master)))
+    return compare(BESIDE_OTHERS, subject, case, *add_parts(case, *make_far_pair(case)))
+
+
+Part = tuple[FloatArray, IntArray]  # The nodes (n, dim) of a part of a surface, and its faces by their places there.
+
+
+def make_far_pair(case: Case) -> tuple[Part, Part]:
+    """Return a slave and a master of one face each, that penetrate each other far from a state."""
+    random, length = np.random.default_rng([case.seed, 3]), case.shortest_segment
+    if case.interface.dim == PLANE:
+        angle = random.uniform(-np.pi, np.pi)
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        slave, master = np.array([[0.0, -0.125], [1.0, -0.25]]), np.array([[2.0, 0.0], [-1.0, 0.0]])
     else:
-        slave, master = make_far_pair(case)
-    return compare(BESIDE_OTHERS, subject, case, *add_chains(case, slave, master))
+        direction = random.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        slave = np.array([[0.0, 0.0, -0.125], [0.0, 1.0, -0.125], [1.0, 0.0, -0.25]])
+        master = np.array([[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]])
+    origin = case.positions.mean(axis=0) + DISTANCE * case.diameter * direction
+    return _as_part(origin + length * slave), _as_part(origin + length * master)
 
 
-def make_far_pair(case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return a slave and a master segment, points (2, 2) each, that penetrate each other far from a state."""
-    angle = np.random.default_rng([case.seed, 3]).uniform(-np.pi, np.pi)
-    length = case.shortest_segment
-    origin = case.positions.mean(axis=0) + DISTANCE * case.diameter * np.array([np.cos(angle), np.sin(angle)])
-    slave = origin + length * np.array([[0.0, -0.125], [1.0, -0.25]])
-    return slave, origin + length * np.array([[2.0, 0.0], [-1.0, 0.0]])
+def _as_part(nodes: FloatArray) -> Part:
+    """Return a part with these nodes: a chain as it is walked, a triangle, or a plate."""
+    if nodes.shape[1] == PLANE:
+        return nodes, np.column_stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))])
+    return nodes, PLATE if len(nodes) == 8 else np.array([[0, 1, 2]])
 
 
-def add_chains(case: Case, slave: FloatArray, master: FloatArray) -> tuple[Case, Carry]:
-    """Return a case with one more chain on each side, and the new numbers of its nodes.
+def _no_part(case: Case) -> Part:
+    """Return a part without nodes."""
+    dim = case.interface.dim
+    return np.empty((0, dim)), np.empty((0, dim), np.int64)
 
-    The nodes (n, 2) of the new chains, as they are walked, are in the same places in the reference; there may be none.
+
+def add_parts(case: Case, slave: Part, master: Part) -> tuple[Case, Carry]:
+    """Return a case with one more part on each side, and the new numbers of its nodes.
+
+    The nodes of the new parts are in the same places in the reference.
     """
     interface, n_slave = case.interface, case.interface.n_slave_nodes
-    first = n_slave + len(slave)  # The new number of the first master node.
-    last = interface.n_nodes + len(slave)  # That of the first node of the new master chain.
+    n_more = len(slave[0])
+    first = n_slave + n_more  # The new number of the first master node.
+    last = interface.n_nodes + n_more  # That of the first node of the new part of the master.
     sides = (
-        Surface(np.vstack([interface.slave.segments, _walk(n_slave, len(slave))])),
-        Surface(np.vstack([interface.master.segments + len(slave), _walk(last, len(master))])),
+        Surface(np.vstack([interface.slave.faces, slave[1] + n_slave])),
+        Surface(np.vstack([interface.master.faces + n_more, master[1] + last])),
     )
 
     def join(nodes: FloatArray) -> FloatArray:
-        return np.vstack([nodes[:n_slave], slave, nodes[n_slave:], master])
+        return np.vstack([nodes[:n_slave], slave[0], nodes[n_slave:], master[0]])
 
     more = replace(case, interface=Interface(join(interface.nodes), *sides), z=join(case.positions).reshape(-1))
     numbers = np.concatenate([np.arange(n_slave), first + np.arange(interface.n_nodes - n_slave)])
-    return more, Carry(numbers)
-
-
-def _walk(start: int, count: int) -> FloatArray:
-    """Return the segments (count − 1, 2) of a chain whose nodes are numbered from `start`."""
-    numbers = start + np.arange(count)
-    return np.column_stack([numbers[:-1], numbers[1:]]) if count else np.empty((0, 2), np.int64)
+    return more, Carry(numbers, np.eye(interface.dim))

@@ -15,6 +15,7 @@ from readable_cells import centre_points
 import contactverif_surfaces
 from contactverif import Pairing
 from contactverif_surfaces.cell_points import CellPoints, SlaveView, gauss_points, unit_vectors
+from contactverif_surfaces.face_search import find_cells
 
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT, TANGENT, OBJECTIVITY = "balance.force", "balance.moment", "tangent.directional", "objectivity"
@@ -235,6 +236,19 @@ def _skips_faces(right: Any, interface: Any, z: Any) -> Any:
     return Pairing({name: values[here] for name, values in pairing.items()})
 
 
+def _touches_all_layers(right: Any, interface: Any, z: Any) -> Any:
+    """Touch each master face at any distance, whatever lies before it."""
+    x, slave, master = np.array(z).reshape(-1, 3), interface.slave.faces, interface.master.faces
+    parts = []
+    for m in range(len(master)):
+        faces, codes = find_cells(x, slave, master[m : m + 1], np.full(len(slave), np.inf), np.array([np.inf]))
+        parts.append((faces[:, 0], np.full(len(faces), m), codes))
+    slave_face, master_face, codes = (np.concatenate(each) for each in zip(*parts, strict=True))
+    view = SlaveView.of_corners(x[slave[slave_face]], x[master[master_face]])
+    active = right_rule(view, codes).gap < 0
+    return Pairing({"slave_face": slave_face, "master_face": master_face, "corners": codes, "active": active})
+
+
 MUTANTS = (
     Mutant("whole slave face for a part of it", TRANSMISSION, changes_points(_whole_face)),
     Mutant("clip that loses a corner", TRANSMISSION, by_rule(_lose_corner)),
@@ -280,6 +294,8 @@ MUTANTS = (
     Mutant("cells said to be unbiased", "swap", says(CELL, unbiased=True)),
     Mutant("quarters said to balance past the border", FORCE, says(QUARTERS, conserves_force=True)),
     Mutant("one point a cell said to be exact on rectangles", TRANSMISSION, says(CELL, faces=(3, 4))),
+    Mutant("layers of the master touched at any distance", "remote",
+           lambda *, penalty: wrap(penalty, STS, pair=_touches_all_layers)),
     Mutant("nodes said to pass the patch test", TRANSMISSION,
            says(contactverif_surfaces.nts_ar_3d, flat=True)),
 )  # fmt: skip

@@ -3,7 +3,7 @@
 All shrink to one square on one square, each cut in two, without any motion.
 """
 
-from contactverif.strategies.surfaces.plane_slaves import tilted_plane_cases
+from contactverif.strategies.surfaces.plane_slaves import plane_cases_by_a_plate, tilted_plane_cases
 from contactverif.strategies.surfaces.tilted_surfaces import (
     smooth_surface_cases,
     surface_cases,
@@ -20,6 +20,7 @@ __all__ = [
     "flat_surface_cases",
     "matched_surface_cases",
     "overhung_surface_cases",
+    "plane_cases_by_a_plate",
     "skewed_surface_cases",
     "smooth_surface_cases",
     "surface_cases",

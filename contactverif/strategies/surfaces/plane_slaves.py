@@ -6,7 +6,7 @@ plane stays a plane, bit for bit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import ldexp
 
@@ -24,6 +24,8 @@ from contactverif.strategies.surfaces.surface_pairs import surface_pairs
 _SLOPES = st.sampled_from([0.0, 0.125, -0.125, 0.25, -0.25])
 _QUARTERS = st.integers(1, 4)  # The least depth, in sixteenths of the square.
 _PARTS = st.integers(-2, 2)
+# Heights of the lower side of a plate that is 1 thick. No depth reaches 1, so the master stays the nearest surface.
+_HEIGHTS = st.sampled_from([-3.0, 1.0, -5.0, 3.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,24 @@ def exact_space_turns() -> SearchStrategy[ExactSpaceTurn]:
 @on_own_meshes
 def tilted_plane_cases(draw: DrawFn) -> Case:
     """Return states of a plane slave that is tilted by up to 19° against a flat master, and wholly in contact."""
+    return _tilted_plane(draw)[0]
+
+
+@on_own_meshes
+def plane_cases_by_a_plate(draw: DrawFn) -> Case:
+    """Return states as `tilted_plane_cases` does, with a place for a plate behind the master or at the slave's back.
+
+    The parameter "behind" (8, 3) holds its corners, those of the lower side first, counter-clockwise from above.
+    """
+    case, turn = _tilted_plane(draw)
+    low = draw(_HEIGHTS)
+    square = np.array([[-1.0, -1], [2, -1], [2, 2], [-1, 2]])
+    plate = np.column_stack([np.vstack([square, square]), np.repeat([low, low + 1], 4)])
+    return replace(case, parameters={"behind": turn(plate)})
+
+
+def _tilted_plane(draw: DrawFn) -> tuple[Case, ExactSpaceTurn]:
+    """Return a case, and the similarity that took it where it is."""
     pair = draw(surface_pairs(same_domain=False, stretched=False, most=4))
     slopes, quarters = (draw(_SLOPES), draw(_SLOPES)), draw(_QUARTERS)
     turn, penalty, seed = draw(exact_space_turns()), draw(penalties()), draw(seeds())
@@ -75,4 +95,4 @@ def tilted_plane_cases(draw: DrawFn) -> Case:
     depth = (abs(slopes[0]) + abs(slopes[1])) / 2 + quarters / 16
     current[:n_slave, 2] = (plane[:n_slave] - domain.mean(axis=0)) @ slopes - depth
     reference = interface.at(interface.nodes * turn.scale)
-    return Case(reference, turn(current).reshape(-1), penalty, {}, seed)
+    return Case(reference, turn(current).reshape(-1), penalty, {}, seed), turn
