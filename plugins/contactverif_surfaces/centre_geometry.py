@@ -74,7 +74,7 @@ def _set_frame(room: Array, x: Array, slave: IntArray) -> float:
     a_x, a_y, a_z = room[FRAME, 0], room[FRAME, 1], room[FRAME, 2]
     b_x, b_y, b_z = room[FRAME + 1, 0], room[FRAME + 1, 1], room[FRAME + 1, 2]
     n_x, n_y, n_z = a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x
-    size = np.sqrt(n_x * n_x + n_y * n_y + n_z * n_z)
+    size: float = np.sqrt(n_x * n_x + n_y * n_y + n_z * n_z)
     n_x, n_y, n_z = n_x / size, n_y / size, n_z / size
     room[FRAME, 0], room[FRAME + 1, 0] = (b_y * n_z - b_z * n_y) / size, (n_y * a_z - n_z * a_y) / size
     room[FRAME, 1], room[FRAME + 1, 1] = (b_z * n_x - b_x * n_z) / size, (n_z * a_x - n_x * a_z) / size
@@ -150,7 +150,8 @@ def _set_slopes(room: Array) -> None:
 @compile_inline
 def master_shape(room: Array, j: int, s: float, t: float) -> float:
     """Return the shape function of master corner j > 0 at a place."""
-    return room[SLOPES + j, S] * (s - room[MASTER, S]) + room[SLOPES + j, T] * (t - room[MASTER, T])
+    shape: float = room[SLOPES + j, S] * (s - room[MASTER, S]) + room[SLOPES + j, T] * (t - room[MASTER, T])
+    return shape
 
 
 @compile_inline

@@ -25,8 +25,8 @@ class FacePairs:
     @classmethod
     def find(cls, interface: Interface, z: FloatArray) -> FacePairs:
         """Return the cells of an interface at a state z (n_unknowns,)."""
-        x, sides = np.array(z).reshape(-1, 3), (interface.slave, interface.master)
-        faces, codes = find_cells(x, *(side.faces for side in sides), *(longest_edges(side, x) for side in sides))
+        x, slave, master = np.array(z).reshape(-1, 3), interface.slave, interface.master
+        faces, codes = find_cells(x, slave.faces, master.faces, longest_edges(slave, x), longest_edges(master, x))
         return cls.of_arrays(interface, faces[:, 0], faces[:, 1], codes)
 
     @classmethod

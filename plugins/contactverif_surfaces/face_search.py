@@ -275,7 +275,7 @@ def is_thin(places: FloatArray, count: int, width: float) -> bool:
         x, y = places[v, 0] - places[0, 0], places[v, 1] - places[0, 1]
         area += (x * (places[w, 1] - places[0, 1]) - y * (places[w, 0] - places[0, 0])) / 2
         longest = max(longest, x * x + y * y)
-    return area <= np.sqrt(longest) * width
+    return bool(area <= np.sqrt(longest) * width)
 
 
 @compile_part

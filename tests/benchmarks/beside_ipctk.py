@@ -1,7 +1,8 @@
 """Race the kernels against ipctk: search, residual and tangent as CSR, per slave segment, beside the memory bound.
 
-    python tests/benchmarks/beside_ipctk.py                      # 1e3 to 1e6 segments, in some minutes
+    python tests/benchmarks/beside_ipctk.py                      # 1e3 to 1e6 segments and faces, in some minutes
     python tests/benchmarks/beside_ipctk.py --sizes 1e4 1e6 --only vts-ppt --out /tmp/race
+    python tests/benchmarks/beside_ipctk.py --only vts-cell-3d   # on faces alone
 
 `tox -e beside-ipctk` does the same with ipctk installed. ipctk is no requirement of the project.
 
@@ -11,6 +12,9 @@ partner. All run on one core, in turns, so that a slow moment of the machine hit
 turn. Seconds are those of the processor, since other programs may wait for the same core. The memory bound is the time
 to write as many bytes as the tangent has, past the caches. Peak memory is that of a process of its own, above what it
 needs for the mesh. Above 1e5 segments ours run alone.
+
+In space both get a wavy square of triangles over a larger one, whose nodes are moved at random; a gap is a twentieth of
+an edge, and ipctk's barrier acts from a tenth.
 
 Two threads are raced against one by the wall clock, on all cores. `steps.csv` says where the time of vts-ppt goes: each
 step of an evaluation in µs a segment, beside the memory bound.
@@ -46,7 +50,8 @@ from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.box3_tangent import add_forces_and_tangent
 
 OURS = ("vts-ppt", "vts-ppt, same pairing", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
-PEER = "ipctk"
+ON_FACES = ("vts-cell-3d", "vts-cell-3d, same pairing")
+PEER, PEER_ON_FACES = "ipctk", "ipctk on faces"
 SAME_PAIRING = ", same pairing"  # Behind the name of a formulation whose latest pattern is kept, as in Newton's method.
 PARTS = ("search", "residual and tangent", "CSR")
 TURNS = 9
@@ -57,6 +62,8 @@ LEAST_FOR_PEAK = 100_000  # Segments.
 LEAST_FOR_THREADS = 10_000  # Segments.
 MOST_FOR_PEER = 100_000  # Segments; ipctk needs 5 GB for 1e6.
 THREADED = ("vts-ppt", "vts-ppt-balanced")
+FACE_GAP = 0.05  # The penetration, or the gap, over the edge of a square of two triangles.
+FACE_REACH = 0.1  # The distance from which ipctk's barrier acts on faces, over the same edge.
 SHORTEST_TURN = 0.05  # Seconds: a call that is shorter is repeated within its turn.
 KILO = 1024  # Linux states the peak of a process in these bytes.
 STATUS, RESET_PEAK = Path("/proc/self/status"), Path("/proc/self/clear_refs")  # proc(5) says how to use them.
@@ -81,9 +88,28 @@ def wavy(n_slave: int, lift: float = 0.0) -> Interface:
     return Interface.from_chains(slave, np.column_stack([lower, 0.05 * np.sin(lower)])[::-1])
 
 
+def wavy_faces(n_slave: int, gap: float = -FACE_GAP) -> tuple[Interface, float]:
+    """Return a wavy square of about n_slave triangles over a larger one, and the edge of a square of two triangles.
+
+    The gap is in such edges.
+    """
+    random, count = np.random.default_rng(0), max(1, round((n_slave / 2) ** 0.5))
+    edge, sides = 12 / count, []
+    for n, size, lift in ((count, 12.0, gap * edge), (max(1, round(0.93 * count)), 12.4, 0.0)):
+        place = np.stack(np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij"), axis=-1)
+        place[1:-1, 1:-1] += random.uniform(-0.2, 0.2, (n - 1, n - 1, 2))
+        x, y = ((place / n - 0.5) * size).reshape(-1, 2).T
+        number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+        a, b, c, d = (part.reshape(-1) for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+        faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        sides.append((np.column_stack([x, y, lift + 0.05 * np.sin(x) * np.cos(y)]), faces))
+    (slave, slave_faces), (master, master_faces) = sides
+    return Interface.from_faces(slave, slave_faces[:, ::-1], master, master_faces), edge
+
+
 def our_racer(name: str, n_slave: int) -> Racer:
     """Return a formulation of ours as its plugin answers, without the checks of the harness."""
-    keeps, interface = name.endswith(SAME_PAIRING), wavy(n_slave)
+    keeps, interface = name.endswith(SAME_PAIRING), wavy_faces(n_slave)[0] if name in ON_FACES else wavy(n_slave)
     subject = load_formulation(name.removesuffix(SAME_PAIRING))
     assert isinstance(subject, Subject), subject
     plugin, z = subject.with_penalty(10.0).plugin, interface.nodes.ravel()
@@ -103,32 +129,37 @@ def our_racer(name: str, n_slave: int) -> Racer:
     return Racer(name, call)
 
 
-def peer_racer(n_slave: int) -> Racer:
+def peer_racer(name: str, n_slave: int) -> Racer:
     """Return ipctk: collisions by a bounding volume hierarchy, gradient and Hessian of its barrier."""
     import ipctk
 
     ipctk.set_num_threads(1)
-    interface = wavy(n_slave, LIFT)
-    edges = np.asfortranarray(np.vstack([interface.slave.segments, interface.master.segments]), dtype=np.int32)
+    interface, reach, faces = wavy(n_slave, LIFT), BARRIER_REACH, ()
+    if name == PEER_ON_FACES:
+        interface, edge = wavy_faces(n_slave, FACE_GAP)
+        reach = FACE_REACH * edge
+    cells = np.asfortranarray(np.vstack([interface.slave.faces, interface.master.faces]), dtype=np.int32)
+    if name == PEER_ON_FACES:
+        cells, faces = ipctk.edges(cells), (cells,)
     vertices = np.asfortranarray(interface.nodes)
-    mesh, barrier = ipctk.CollisionMesh(vertices, edges), ipctk.BarrierPotential(BARRIER_REACH, 10.0)
+    mesh, barrier = ipctk.CollisionMesh(vertices, cells, *faces), ipctk.BarrierPotential(reach, 10.0)
 
     def call() -> tuple[Any, tuple[float, ...]]:
         times = [process_time()]
         collisions = ipctk.NormalCollisions()
-        collisions.build(mesh, vertices, BARRIER_REACH, broad_phase=ipctk.LBVH())
+        collisions.build(mesh, vertices, reach, broad_phase=ipctk.LBVH())
         times.append(process_time())
         barrier.gradient(collisions, mesh, vertices)
         hessian = barrier.hessian(collisions, mesh, vertices)  # Compressed columns of a symmetric matrix: its CSR.
         times.append(process_time())
         return hessian, (*np.diff(times), 0.0)
 
-    return Racer(PEER, call)
+    return Racer(name, call)
 
 
 def make_racer(name: str, n_slave: int) -> Racer:
     """Return the racer of that name on that mesh."""
-    return peer_racer(n_slave) if name == PEER else our_racer(name, n_slave)
+    return peer_racer(name, n_slave) if name in (PEER, PEER_ON_FACES) else our_racer(name, n_slave)
 
 
 def time_writing(stream: Any) -> float:
@@ -159,7 +190,8 @@ def race(names: list[str], n_slave: int, turns: int) -> list[dict[str, Any]]:
 def _rows(names: list[str], n_slave: int, parts_of: Any, bound_of: Any) -> list[dict[str, Any]]:
     """Return the rows of times (turns, racers, parts) and memory bounds (turns, racers), all in seconds."""
     totals = parts_of.sum(axis=2)  # (turns, racers)
-    peer = totals[:, names.index(PEER)] if PEER in names else np.full(len(totals), np.nan)
+    peers = [totals[:, names.index(name)] for name in (PEER, PEER_ON_FACES) if name in names]
+    peer = peers[0] if peers else np.full(len(totals), np.nan)
     rows = []
     for number, name in enumerate(names):
         seconds, micro = totals[:, number], 1e6 / n_slave
@@ -268,7 +300,7 @@ def time_steps(n_slave: int, turns: int) -> dict[str, float]:
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
-    """Draw the cost of a segment against the number of segments, and the memory bound of vts-ppt."""
+    """Draw the cost of a segment or face against their number, and the memory bound of the first formulation."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
@@ -277,30 +309,48 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     for name in names:
         mine = sorted((row for row in rows if row["formulation"] == name), key=lambda row: row["segments"])
         n, (low, middle, high) = [row["segments"] for row in mine], ([row[key] for row in mine] for key in COLUMNS[2:5])
-        style = {"color": "black", "linestyle": "--"} if name == PEER else {}
+        style = {"color": "black", "linestyle": "--"} if name in (PEER, PEER_ON_FACES) else {}
         (line,) = axes.loglog(n, middle, marker="o", markersize=4, label=name, **style)
         axes.fill_between(n, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
         if name == names[0]:
             bound = [row["median / µs"] / row["over memory bound"] for row in mine]
             axes.loglog(n, bound, color="gray", linestyle=":", label=f"writing the tangent of {name}")
-    axes.set_xlabel("slave segments N")
-    axes.set_ylabel("search + residual + tangent, µs a slave segment")
+    unit = "face" if names[0] in ON_FACES else "segment"
+    axes.set_xlabel(f"slave {unit}s N")
+    axes.set_ylabel(f"search + residual + tangent, µs a slave {unit}")
     axes.set_title("Cost of one evaluation, one core (band: least to greatest)", fontsize=10)
     axes.grid(which="major", alpha=0.3)
     figure.legend(fontsize=8, ncols=4, loc="outside lower center")
     figure.savefig(path, metadata={"Date": None})
 
 
-def write(rows: list[dict[str, Any]], folder: Path) -> None:
-    """Write kernels.csv and kernels.svg."""
+def write(rows: list[dict[str, Any]], folder: Path, name: str) -> None:
+    """Write the table and the figure of that name."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "kernels.csv").open("w", newline="") as file:
+    with (folder / f"{name}.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(
             {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
         )
-    draw(rows, folder / "kernels.svg")
+    draw(rows, folder / f"{name}.svg")
+
+
+def run_course(names: list[str], peer: str, file: str, options: argparse.Namespace) -> None:
+    """Race some formulations and their peer at all sizes, print the table, and write it."""
+    if not names:
+        return
+    rows: list[dict[str, Any]] = []
+    racing = {n: [*names, peer] if n <= MOST_FOR_PEER else names for n in options.sizes}
+    peaks = {(name, n): peak_memory(name, n) / n for n in options.sizes for name in racing[n]}
+    print("  ".join(COLUMNS))
+    for n_slave in options.sizes:
+        for measured in race(racing[n_slave], n_slave, options.turns):
+            row = measured | {COLUMNS[-1]: peaks[measured["formulation"], n_slave]}
+            rows.append(row)
+            print("  ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
+        write(rows, options.out, file)  # After each size, so that a race that is stopped leaves what it measured.
+    print("exponent of the cost:", {name: round(slope, 3) for name, slope in exponents(rows).items()})
 
 
 def write_steps(steps: dict[int, dict[str, float]], folder: Path) -> None:
@@ -313,12 +363,12 @@ def write_steps(steps: dict[int, dict[str, float]], folder: Path) -> None:
 
 
 def main() -> None:
-    """Measure, print the table, and write kernels.csv and kernels.svg."""
+    """Measure, print the tables, and write kernels.csv, steps.csv, faces.csv and the figures."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument(
         "--sizes", nargs="+", type=lambda text: int(float(text)), default=[1000, 10_000, 100_000, 1_000_000]
     )
-    parser.add_argument("--only", nargs="+", default=list(OURS), help="formulations")
+    parser.add_argument("--only", nargs="+", default=[*OURS, *ON_FACES], help="formulations")
     parser.add_argument("--turns", type=int, default=TURNS)
     parser.add_argument("--out", type=Path, default=Path("reports/bench"))
     parser.add_argument("--core", type=int, default=0)
@@ -327,33 +377,25 @@ def main() -> None:
     if options.peak:
         print(json.dumps(_measure_peak(options.peak, options.sizes[0])))
         return
-    rows: list[dict[str, Any]] = []
-    names = [*options.only, PEER]
-    racing = {n: names if n <= MOST_FOR_PEER else list(options.only) for n in options.sizes}
-    peaks = {(name, n): peak_memory(name, n) / n for n in options.sizes for name in racing[n]}
+    plane = [name for name in options.only if name not in ON_FACES]
     speedups = {}
-    if (os.cpu_count() or 1) > 1:
+    if plane and (os.cpu_count() or 1) > 1:
         sizes = [n for n in options.sizes if n >= LEAST_FOR_THREADS]
         speedups = {(name, n): race_threads(name, n, options.turns) for name in THREADED for n in sizes}
     if hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {cores[options.core % len(cores)]})
-    print("  ".join(COLUMNS))
-    for n_slave in options.sizes:
-        for measured in race(racing[n_slave], n_slave, options.turns):
-            row = measured | {COLUMNS[-1]: peaks[measured["formulation"], n_slave]}
-            rows.append(row)
-            print("  ".join(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
-        write(rows, options.out)  # After each size, so that a race that is stopped leaves what it measured.
-    steps = {n: time_steps(n, options.turns) for n in options.sizes}
-    write_steps(steps, options.out)
-    for n_slave, step in steps.items():
-        print(n_slave, {name: float(f"{value:.3g}") for name, value in step.items()})
+    run_course(plane, PEER, "kernels", options)
+    run_course([name for name in options.only if name in ON_FACES], PEER_ON_FACES, "faces", options)
+    if plane:
+        steps = {n: time_steps(n, options.turns) for n in options.sizes}
+        write_steps(steps, options.out)
+        for n_slave, step in steps.items():
+            print(n_slave, {name: float(f"{value:.3g}") for name, value in step.items()})
     for (name, n_slave), spread in speedups.items():
         print(
             f"{name}, {n_slave}: two threads are {' / '.join(f'{value:.2f}' for value in spread)} times as fast as one"
         )
-    print("exponent of the cost:", {name: round(slope, 3) for name, slope in exponents(rows).items()})
 
 
 if __name__ == "__main__":
