@@ -169,11 +169,11 @@ def _differentiate_forces(
         rise_t += room[MASTER + j, H] * room[SLOPES + j, T]
     for j in range(3):
         for d in range(3):
-            column, own = 3 * j + d, shapes[3 + j] * point.share
-            by_share, by_s, by_t, r_s, r_t, by_gap = 0.0, 0.0, 0.0, 0.0, 0.0, own
+            column, weight = 3 * j + d, shapes[3 + j] * point.share
+            by_share, by_s, by_t, r_s, r_t, by_gap = 0.0, 0.0, 0.0, 0.0, 0.0, weight
             if d != H:
                 by_share, by_s, by_t = slopes[SHARE, 2 * j + d], slopes[PLACE_S, 2 * j + d], slopes[PLACE_T, 2 * j + d]
-                r_s, r_t = by_s - own * (d == S), by_t - own * (d == T)
+                r_s, r_t = by_s - weight * (d == S), by_t - weight * (d == T)
                 by_gap = rise_s * r_s + rise_t * r_t
             by_force = rate * by_gap + stress * by_share
             slopes[FORCE, column] = shapes[0] * by_force - stress * (by_s + by_t)

@@ -66,11 +66,11 @@ def _longest_edges(x: FloatArray, faces: IntArray, neighbours: IntArray) -> Floa
     for start in range(len(faces)):
         if longest[start] >= 0:
             continue
-        path[0], count, done, square = start, 1, 0, 0.0
+        path[0], count, n_visited, square = start, 1, 0, 0.0
         longest[start] = 0.0
-        while done < count:
-            face = path[done]
-            done += 1
+        while n_visited < count:
+            face = path[n_visited]
+            n_visited += 1
             for i in range(faces.shape[1]):
                 a, b, length = faces[face, i], faces[face, (i + 1) % faces.shape[1]], 0.0
                 for axis in range(3):
@@ -96,65 +96,104 @@ def find_face_cells(
     boxes: FloatArray,
 ) -> tuple[IntArray, IntArray]:
     """Return what `find_cells` does, from a tree of the master faces."""
-    room, count, n_slave, n_master = 4 * (len(slave) + len(master)), 0, slave.shape[1], master.shape[1]
+    room, count, longest = 4 * (len(slave) + len(master)), 0, 0.0
     faces, corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
-    seen_slave, seen_master = np.empty((n_slave, 3)), np.empty((n_master, 3))
-    axes, low, high, members = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(len(master), np.int64)
+    on_slave, on_master = np.empty((slave.shape[1], 3)), np.empty((master.shape[1], 3))
+    axes, question, members = np.empty((3, 3)), np.empty((2, 3)), np.empty(len(master), np.int64)
     places, codes = np.empty((2, 2 * MOST_CORNERS, 2)), np.empty((2, 2 * MOST_CORNERS, 3), np.int64)
-    table, longest = np.empty((len(master), N_COLUMNS)), master_edge.max()
+    table = np.empty((len(master), N_COLUMNS))
+    for m in range(len(master)):
+        longest = max(longest, master_edge[m])
     for s in range(len(slave)):
         set_axes(axes, x, slave[s])
         origin = x[slave[s, 0]]
-        view_face(seen_slave, x, slave[s], origin, axes, False)
-        for axis in range(2):
-            low[axis], high[axis] = seen_slave[:, axis].min(), seen_slave[:, axis].max()
-        high[2] = REACH * (slave_edge[s] + longest) + longest  # A cell's gap is that in its middle.
-        low[2] = -high[2]
-        n_members = collect_boxes(order, boxes, origin, axes, low, high, members)
-        n_facing = 0
-        for place in range(n_members):  # Sorted as they come.
-            m = members[place]
-            view_face(seen_master, x, master[m], origin, axes, True)
-            if may_overlap(low, high, seen_master):
-                i = n_facing
-                while i > 0 and members[i - 1] > m:
-                    members[i] = members[i - 1]
-                    i -= 1
-                members[i] = m
-                n_facing += 1
+        view_face(on_slave, x, slave[s], origin, axes, False)
+        set_question(question, on_slave, REACH * (slave_edge[s] + longest) + longest)
+        n_facing = collect_facing(members, on_master, x, master, origin, axes, question, order, boxes)
+        if count + n_facing > room:
+            room = 2 * (count + n_facing)
+            faces, corners = lengthen(faces, corners, room)
         first = count
         for place in range(n_facing):
             m = members[place]
-            view_face(seen_master, x, master[m], origin, axes, True)
-            if count == room:
-                room *= 2
-                faces, corners = lengthen(faces, corners, room)
-            n_corners = clip_face(seen_slave, seen_master, corners[count], places, codes)
-            if n_corners == 0:
-                continue
-            row = table[count - first]
-            set_plane(row, places[n_slave % 2], n_corners, seen_master)
-            gap = height_at(row, row[MIDDLE_X], row[MIDDLE_Y])
-            if abs(gap) <= REACH * (slave_edge[s] + master_edge[m]):
-                faces[count, 0], faces[count, 1] = s, m
-                count += 1
-        if count > first + 1:
-            count = drop_hidden(x, master, origin, axes, faces, corners, first, count, table, seen_master)
+            view_face(on_master, x, master[m], origin, axes, True)
+            n_corners = clip_face(on_slave, on_master, corners[count], places, codes)
+            if n_corners > 0:
+                row = table[count - first]
+                set_plane(row, places[len(on_slave) % 2], n_corners, on_master)
+                gap = height_at(row, row[MIDDLE_X], row[MIDDLE_Y])
+                if abs(gap) <= REACH * (slave_edge[s] + master_edge[m]):
+                    faces[count, 0], faces[count, 1] = s, m
+                    count += 1
+        count = drop_hidden(x, master, origin, axes, faces, corners, first, count, table, on_master)
     return faces[:count], corners[:count]
+
+
+@compile_part
+def set_question(question: FloatArray, on_slave: FloatArray, reach: float) -> None:
+    """Write the lower and the upper corner of the box over a slave face, seen along its axes.
+
+    It reaches farther than rule 4 by the longest edge of the master, since a cell's gap is that in its middle.
+    """
+    for axis in range(2):
+        question[0, axis], question[1, axis] = on_slave[0, axis], on_slave[0, axis]
+        for i in range(1, len(on_slave)):
+            question[0, axis] = min(question[0, axis], on_slave[i, axis])
+            question[1, axis] = max(question[1, axis], on_slave[i, axis])
+    question[0, 2], question[1, 2] = -reach, reach
+
+
+@compile_part
+def collect_facing(
+    members: IntArray,
+    on_master: FloatArray,
+    x: FloatArray,
+    master: IntArray,
+    origin: FloatArray,
+    axes: FloatArray,
+    question: FloatArray,
+    order: IntArray,
+    boxes: FloatArray,
+) -> int:
+    """Write the master faces that may overlap a slave face, in ascending order, and return how many."""
+    n_facing = 0
+    for place in range(collect_boxes(order, boxes, origin, axes, question[0], question[1], members)):
+        m = members[place]
+        view_face(on_master, x, master[m], origin, axes, True)
+        if may_overlap(question, on_master):
+            i = n_facing
+            while i > 0 and members[i - 1] > m:
+                members[i] = members[i - 1]
+                i -= 1
+            members[i] = m
+            n_facing += 1
+    return n_facing
 
 
 @compile_maker
 def lengthen(faces: IntArray, corners: IntArray, room: int) -> tuple[IntArray, IntArray]:
     """Return copies of both arrays with room for more cells."""
     more_faces, more_corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
-    more_faces[: len(faces)], more_corners[: len(corners)] = faces, corners
+    for cell in range(len(faces)):
+        copy_cell(more_faces, more_corners, cell, faces, corners, cell)
     return more_faces, more_corners
+
+
+@compile_part
+def copy_cell(
+    faces: IntArray, corners: IntArray, to: int, old_faces: IntArray, old_corners: IntArray, place: int
+) -> None:
+    """Copy the cell at a place of the old arrays to another one."""
+    for side in range(2):
+        faces[to, side] = old_faces[place, side]
+        for v in range(MOST_CORNERS):
+            corners[to, v, side] = old_corners[place, v, side]
 
 
 @compile_part
 def set_axes(axes: FloatArray, x: FloatArray, face: IntArray) -> None:
     """Write the axes (3, 3) of a slave face: along its first edge, across it in its plane, and its normal."""
-    along, across, normal = axes
+    along, across, normal = axes[0], axes[1], axes[2]
     first, last = (1, 2) if len(face) == 3 else (2, 3)
     start = 0 if len(face) == 3 else 1
     for axis in range(3):
@@ -190,24 +229,24 @@ def scale(vector: FloatArray) -> None:
 
 @compile_part
 def view_face(
-    seen: FloatArray, x: FloatArray, face: IntArray, origin: FloatArray, axes: FloatArray, reverse: bool
+    places: FloatArray, x: FloatArray, face: IntArray, origin: FloatArray, axes: FloatArray, reverse: bool
 ) -> None:
     """Write the components (n_corners, 3) of the corners of a face along the axes, seen from the origin."""
     for i in range(len(face)):
         node = face[len(face) - 1 - i if reverse else i]
         arm_x, arm_y, arm_z = x[node, 0] - origin[0], x[node, 1] - origin[1], x[node, 2] - origin[2]
         for row in range(3):
-            seen[i, row] = arm_x * axes[row, 0] + arm_y * axes[row, 1] + arm_z * axes[row, 2]
+            places[i, row] = arm_x * axes[row, 0] + arm_y * axes[row, 1] + arm_z * axes[row, 2]
 
 
 @compile_part
-def may_overlap(low: FloatArray, high: FloatArray, master: FloatArray) -> bool:
-    """Return whether the boxes of two faces, seen in the plane, overlap, and the master faces the slave."""
+def may_overlap(question: FloatArray, master: FloatArray) -> bool:
+    """Return whether the box of a master face, seen in the plane, meets that of the slave, and faces it."""
     for axis in range(2):
         first, last = master[0, axis], master[0, axis]
         for j in range(1, len(master)):
             first, last = min(first, master[j, axis]), max(last, master[j, axis])
-        if first > high[axis] or last < low[axis]:
+        if first > question[1, axis] or last < question[0, axis]:
             return False
     turn = 0.0
     for j in range(len(master)):
@@ -232,33 +271,8 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: 
         places[0, j, 0], places[0, j, 1] = master[j, 0], master[j, 1]
         codes[0, j, 0], codes[0, j, 1], codes[0, j, 2] = -1, j, j
     for i in range(len(slave)):
-        after = (i + 1) % len(slave)
-        along, across = slave[after, 0] - slave[i, 0], slave[after, 1] - slave[i, 1]
-        tie = TIE * size * np.sqrt(along * along + across * across)
-        n_left, new = 0, 1 - old
-        for v in range(count):
-            w = (v + 1) % count
-            here = along * (places[old, v, 1] - slave[i, 1]) - across * (places[old, v, 0] - slave[i, 0])
-            there = along * (places[old, w, 1] - slave[i, 1]) - across * (places[old, w, 0] - slave[i, 0])
-            if here >= -tie:
-                for axis in range(2):
-                    places[new, n_left, axis] = places[old, v, axis]
-                for part in range(3):
-                    codes[new, n_left, part] = codes[old, v, part]
-                if here <= tie and there < -tie:  # The corner is on the edge, which goes on from there.
-                    codes[new, n_left, 2] = -1 - i
-                n_left += 1
-            if (here > tie and there < -tie) or (here < -tie and there > tie):
-                share = here / (here - there)
-                for axis in range(2):
-                    step = places[old, w, axis] - places[old, v, axis]
-                    places[new, n_left, axis] = places[old, v, axis] + share * step
-                set_crossing(codes[new, n_left], i, codes[old, v, 2], len(slave))
-                codes[new, n_left, 2] = -1 - i if here > tie else codes[old, v, 2]
-                n_left += 1
-        if n_left < 3:
-            return 0
-        count, old = n_left, new
+        count = cut_by_edge(slave, i, TIE * size, places[old], codes[old], count, places[1 - old], codes[1 - old])
+        old = 1 - old
     if is_thin(places[old], count, TIE * size):
         return 0
     for v in range(len(corners)):
@@ -267,8 +281,43 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: 
 
 
 @compile_part
+def cut_by_edge(
+    slave: FloatArray,
+    i: int,
+    width: float,
+    places: FloatArray,
+    codes: IntArray,
+    count: int,
+    new_places: FloatArray,
+    new_codes: IntArray,
+) -> int:
+    """Write what lies within slave edge i of a cell of so many corners, and return the number of its corners."""
+    after, n_left = (i + 1) % len(slave), 0
+    along, across = slave[after, 0] - slave[i, 0], slave[after, 1] - slave[i, 1]
+    tie = width * np.sqrt(along * along + across * across)
+    for v in range(count):
+        w = (v + 1) % count
+        here = along * (places[v, 1] - slave[i, 1]) - across * (places[v, 0] - slave[i, 0])
+        there = along * (places[w, 1] - slave[i, 1]) - across * (places[w, 0] - slave[i, 0])
+        if here >= -tie:
+            new_places[n_left, 0], new_places[n_left, 1] = places[v, 0], places[v, 1]
+            # A corner on the edge goes on along it, if what follows lies beyond.
+            label = -1 - i if here <= tie and there < -tie else codes[v, 2]
+            new_codes[n_left, 0], new_codes[n_left, 1], new_codes[n_left, 2] = codes[v, 0], codes[v, 1], label
+            n_left += 1
+        if min(here, there) < -tie and max(here, there) > tie:
+            share = here / (here - there)
+            new_places[n_left, 0] = places[v, 0] + share * (places[w, 0] - places[v, 0])
+            new_places[n_left, 1] = places[v, 1] + share * (places[w, 1] - places[v, 1])
+            set_crossing(new_codes[n_left], i, codes[v, 2], len(slave))
+            new_codes[n_left, 2] = -1 - i if here > tie else codes[v, 2]
+            n_left += 1
+    return n_left
+
+
+@compile_part
 def is_thin(places: FloatArray, count: int, width: float) -> bool:
-    """Return whether the first corners (count, 2) of a cell enclose less than their longest distance × a width."""
+    """Return whether a cell of so many corners encloses less than their longest distance × a width."""
     area, longest = 0.0, 0.0
     for v in range(1, count):
         w = v + 1 if v + 1 < count else v
@@ -295,7 +344,7 @@ def set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArra
 
     The plane of a warped quadrilateral is that of its diagonals, through the mean of its corners.
     """
-    row[:] = 0.0
+    row[MIDDLE_X], row[MIDDLE_Y], row[HEIGHT] = 0.0, 0.0, 0.0
     for v in range(count):
         row[MIDDLE_X] += places[v, 0] / count
         row[MIDDLE_Y] += places[v, 1] / count
@@ -305,9 +354,9 @@ def set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArra
     b_x, b_y = master[last, 0] - master[start, 0], master[last, 1] - master[start, 1]
     b_z, turn = master[last, 2] - master[start, 2], a_x * b_y - a_y * b_x
     row[SLOPE_X], row[SLOPE_Y] = (a_z * b_y - a_y * b_z) / turn, (a_x * b_z - a_z * b_x) / turn
-    for corner in master:
-        rise = row[SLOPE_X] * corner[0] + row[SLOPE_Y] * corner[1]
-        row[HEIGHT] += (corner[2] - rise) / len(master)
+    for j in range(len(master)):
+        rise = row[SLOPE_X] * master[j, 0] + row[SLOPE_Y] * master[j, 1]
+        row[HEIGHT] += (master[j, 2] - rise) / len(master)
 
 
 @compile_part
@@ -327,27 +376,24 @@ def drop_hidden(
     first: int,
     count: int,
     table: FloatArray,
-    seen: FloatArray,
+    on_master: FloatArray,
 ) -> int:
     """Keep the cells, from the first one of a slave face on, in whose middle no other master face is nearer."""
     for other in range(first, count):
-        view_face(seen, x, master[faces[other, 1]], origin, axes, True)
+        view_face(on_master, x, master[faces[other, 1]], origin, axes, True)
         for cell in range(first, count):
             row = table[cell - first]
             x_m, y_m = row[MIDDLE_X], row[MIDDLE_Y]
-            if other == cell or not holds_place(seen, x_m, y_m):
+            if other == cell or not holds_place(on_master, x_m, y_m):
                 continue
             if abs(height_at(table[other - first], x_m, y_m)) < abs(height_at(row, x_m, y_m)):
                 faces[cell, 0] = -1
-    kept = first
+    n_left = first
     for cell in range(first, count):
         if faces[cell, 0] >= 0:
-            for side in range(2):
-                faces[kept, side] = faces[cell, side]
-                for v in range(MOST_CORNERS):
-                    corners[kept, v, side] = corners[cell, v, side]
-            kept += 1
-    return kept
+            copy_cell(faces, corners, n_left, faces, corners, cell)
+            n_left += 1
+    return n_left
 
 
 @compile_part

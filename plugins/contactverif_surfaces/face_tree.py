@@ -127,13 +127,13 @@ def _meets(
 @compile_maker
 def find_boxes_at(points: FloatArray, order: IntArray, boxes: FloatArray) -> tuple[IntArray, IntArray]:
     """Return pairs of points (n, 3) and boxes by their numbers, all where the point lies in the box and some more."""
-    axes, nowhere, members = np.eye(3), np.zeros(3), np.empty(len(order), np.int64)
+    axes, zeros, members = np.eye(3), np.zeros(3), np.empty(len(order), np.int64)
     counts = np.empty(len(points), np.int64)
     for i in range(len(points)):
-        counts[i] = collect_boxes(order, boxes, points[i], axes, nowhere, nowhere, members)
+        counts[i] = collect_boxes(order, boxes, points[i], axes, zeros, zeros, members)
     point, box, count = np.empty(counts.sum(), np.int64), np.empty(counts.sum(), np.int64), 0
     for i in range(len(points)):
-        for place in range(collect_boxes(order, boxes, points[i], axes, nowhere, nowhere, members)):
+        for place in range(collect_boxes(order, boxes, points[i], axes, zeros, zeros, members)):
             point[count], box[count] = i, members[place]
             count += 1
     return point, box

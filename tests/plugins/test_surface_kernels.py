@@ -65,13 +65,13 @@ def test_the_pattern_holds_the_nodes_of_cells_in_contact_and_no_other() -> None:
     for case in smooth_states()[:20]:
         pairing, interface = formulation.pair(case.interface, case.z), case.interface
         tangent = formulation.tangent(interface, pairing, case.z)
-        felt = np.zeros((interface.n_nodes, interface.n_nodes), bool)
+        coupled = np.zeros((interface.n_nodes, interface.n_nodes), bool)
         for cell in np.flatnonzero(pairing["active"]):
             slave = interface.slave.faces[pairing["slave_face"][cell]]
             nodes = np.concatenate([slave, interface.master.faces[pairing["master_face"][cell]]])
-            felt[np.ix_(nodes, nodes)] = True
-        assert tangent.nnz == 9 * felt.sum()
-        assert np.array_equal(np.sort(tangent.indices), np.sort(np.argwhere(np.kron(felt, np.ones((3, 3))))[:, 1]))
+            coupled[np.ix_(nodes, nodes)] = True
+        assert tangent.nnz == 9 * coupled.sum()
+        assert np.array_equal(np.sort(tangent.indices), np.sort(np.argwhere(np.kron(coupled, np.ones((3, 3))))[:, 1]))
 
 
 @pytest.mark.parametrize("strategy", [flat_surface_cases, surface_cases])

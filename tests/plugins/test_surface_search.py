@@ -99,7 +99,7 @@ def test_a_translation_changes_no_cell() -> None:
 
 
 def test_no_corner_of_a_cell_lies_outside_its_faces() -> None:
-    """Where a master edge runs along a slave edge within roundoff, a crossing could lie anywhere on that line."""
+    """A crossing of edges that coincide within roundoff could lie anywhere on their line."""
     for case in draw_cases(flat_surface_cases(), seed="surface search", examples=100).cases:  # type: ignore[arg-type]
         interface, x = case.interface, case.positions
         slave, master = interface.slave.faces, interface.master.faces
