@@ -27,9 +27,9 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 from contactverif_surfaces.face_search import MOST_CORNERS
 
-S, T, H = 0, 1, 2
-FRAME, MASTER, CORNERS, SLOPES = 0, 3, 6, 6 + MOST_CORNERS  # The rows of `room` at which each part of a cell begins.
-ROOM = SLOPES + 3
+S, T, H, REST = 0, 1, 2, 3  # The columns of a master corner; the last one is 1 − s − t.
+FRAME, MASTER, CORNERS, SLOPES = 0, 4, 7, 7 + MOST_CORNERS  # The rows of `room` at which each part of a cell begins.
+ROOM = SLOPES + 3, 4
 
 
 class CentrePoint(NamedTuple):
@@ -45,10 +45,10 @@ class CentrePoint(NamedTuple):
 
 @compile_part
 def place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes: IntArray) -> CentrePoint:
-    """Return the virtual slave node of a cell, and write all of its cell into `room` (ROOM, 3).
+    """Return the virtual slave node of a cell, and write all of its cell into `room`, an array of the shape `ROOM`.
 
-    Its rows are e^1, e^2, n, the master corners (s, t, h), the corners of the cell (s, t) and the slopes ∇λ_j.
-    Positions x are (n_nodes, 3); the nodes of both faces are (3,), the codes (MOST_CORNERS, 2).
+    Its rows are e^1, e^2, n, e^0, the master corners, the corners of the cell (s, t) and the slopes ∇λ_j. Positions x
+    are (n_nodes, 3); the nodes of both faces are (3,), the codes (MOST_CORNERS, 2).
     """
     size = _set_frame(room, x, slave)
     for j in range(3):
@@ -57,6 +57,9 @@ def place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes
             for axis in range(3):
                 arm = x[master[2 - j], axis] - x[slave[0], axis]
                 room[MASTER + j, row] += arm * room[FRAME + row, axis]
+        room[MASTER + j, REST] = 0.0
+        for axis in range(3):
+            room[MASTER + j, REST] += (x[master[2 - j], axis] - x[slave[1], axis]) * room[FRAME + 3, axis]
     n_corners = _place_corners(room, codes)
     share, s, t = _find_centroid(room, n_corners)
     _set_slopes(room)
@@ -67,7 +70,11 @@ def place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes
 
 @compile_inline
 def _set_frame(room: Array, x: Array, slave: IntArray) -> float:
-    """Write e^1, e^2 and n, and return J."""
+    """Write e^1, e^2, n and e^0 = −e^1 − e^2, and return J.
+
+    On a needle 1 − s − t, or the sum of e^1 and e^2, would lose all digits near the edge where it is 0: so a product of
+    its own has them.
+    """
     for axis in range(3):
         room[FRAME, axis] = x[slave[1], axis] - x[slave[0], axis]
         room[FRAME + 1, axis] = x[slave[2], axis] - x[slave[0], axis]
@@ -80,21 +87,19 @@ def _set_frame(room: Array, x: Array, slave: IntArray) -> float:
     room[FRAME, 1], room[FRAME + 1, 1] = (b_z * n_x - b_x * n_z) / size, (n_z * a_x - n_x * a_z) / size
     room[FRAME, 2], room[FRAME + 1, 2] = (b_x * n_y - b_y * n_x) / size, (n_x * a_y - n_y * a_x) / size
     room[FRAME + 2, 0], room[FRAME + 2, 1], room[FRAME + 2, 2] = n_x, n_y, n_z
+    c_x, c_y, c_z = x[slave[2], 0] - x[slave[1], 0], x[slave[2], 1] - x[slave[1], 1], x[slave[2], 2] - x[slave[1], 2]
+    room[FRAME + 3, 0] = (n_y * c_z - n_z * c_y) / size
+    room[FRAME + 3, 1] = (n_z * c_x - n_x * c_z) / size
+    room[FRAME + 3, 2] = (n_x * c_y - n_y * c_x) / size
     return size
-
-
-@compile_inline
-def across_edge(edge: int, s: float, t: float) -> float:
-    """Return the shape function that is 0 on an edge of the slave face, positive inside."""
-    return t if edge == 0 else (1 - s - t if edge == 1 else s)
 
 
 @compile_inline
 def crossing_of(room: Array, edge: int, j: int) -> tuple[float, float]:
     """Return where slave edge `edge` cuts the master edge from corner j on, in [0, 1], and how fast that leaves it."""
-    k = (j + 1) % 3
-    here = across_edge(edge, room[MASTER + j, S], room[MASTER + j, T])
-    there = across_edge(edge, room[MASTER + k, S], room[MASTER + k, T])
+    # The shape function that is 0 on the edge, positive inside.
+    column = T if edge == 0 else (REST if edge == 1 else S)
+    here, there = room[MASTER + j, column], room[MASTER + (j + 1) % 3, column]
     return here / (here - there), here - there
 
 

@@ -40,7 +40,7 @@ class CentreSprings:
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, interface.n_nodes, 3)
-        forces, room, shapes = np.zeros_like(x), np.empty((ROOM, 3), x.dtype), np.empty(6, x.dtype)
+        forces, room, shapes = np.zeros_like(x), np.empty(ROOM, x.dtype), np.empty(6, x.dtype)
         nodes = pairs.slave_nodes, pairs.master_nodes
         add_forces(forces, room, shapes, x, nodes, pairs.codes, pairing["active"], self.penalty)
         return forces.reshape(z.shape)
@@ -71,7 +71,7 @@ def _points(pairs: FacePairs, z: FloatArray) -> CellPoints:
     n_cells = len(pairs.codes)
     points, shapes = np.empty((n_cells, 5)), np.empty((n_cells, 6))
     nodes = pairs.slave_nodes, pairs.master_nodes
-    write_points(points, shapes, np.empty((ROOM, 3)), np.array(z).reshape(-1, 3), nodes, pairs.codes)
+    write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), nodes, pairs.codes)
     slave, master = shapes[:, None, :3], shapes[:, None, :2:-1]
     return CellPoints(slave, master, points[:, 1:2], points[:, :1], points[:, 2:])
 

@@ -56,7 +56,7 @@ def forces_and_tangent(
     starts = np.arange(0, members.size + 1, N_NODES)
     matrix = zero_matrix(len(x), 0, Couplings(members.reshape(-1), starts, starts[:-1]), per_node=3)
     forces = np.zeros(x.shape)
-    rooms = np.empty((ROOM, 3)), np.empty(N_NODES), np.empty((FORCE + N_NODES, 9)), np.empty((N_NODES, 3))
+    rooms = np.empty(ROOM), np.empty(N_NODES), np.empty((FORCE + N_NODES, 9)), np.empty((N_NODES, 3))
     csr = matrix.indptr, matrix.indices, matrix.data
     _add_springs(forces, csr, *rooms, x, members, codes, here, penalty)
     return forces, matrix

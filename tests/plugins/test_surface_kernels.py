@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from readable_cells import readable_vts_cell
 
-from contactverif import Case, Pairing, named_case
+from contactverif import Case, Interface, Pairing, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
@@ -83,6 +83,27 @@ def test_no_centroid_lies_outside_its_faces(strategy: object) -> None:
         points = formulation.contact_points(case.interface, pairing, case.z)
         assert points.slave_shape.min(initial=0.0) >= -1 / 8
         assert points.master_shape.min(initial=0.0) >= -1 / 8
+
+
+def test_edges_of_needles_that_coincide_within_roundoff_still_have_a_centroid() -> None:
+    """In coordinates of the face 1 − s − t lost all digits there: the crossing was 0/0, and the cell had no force."""
+    needle = np.array([[0.0, 0, 0], [0.21875000699323377, 0, 0], [0.21874999300675815, 5.5313108585336446e-05, 0]])
+    opposite = np.array(
+        [[0.21874998352170782, 9.282421955246478e-05], [0.21875000699323, 2.4841240175987878e-15],
+         [-0.1874999977033593, -3.2788307827005814e-05]]
+    )  # fmt: skip
+    random = np.random.default_rng(0)
+    for _ in range(200):  # Turns round the edges differently.
+        turn, _ = np.linalg.qr(random.normal(size=(3, 3)))
+        turn *= np.sign(np.linalg.det(turn))
+        slave, master = needle @ turn.T, np.column_stack([opposite, np.full(3, -(2.0**-20))]) @ turn.T
+        interface = Interface.from_faces(slave, [[0, 1, 2]], master, [[0, 1, 2]])
+        z, formulation = interface.nodes.reshape(-1), vts_cell_3d(penalty=2.0)
+        pairing = formulation.pair(interface, z)
+        points = formulation.contact_points(interface, pairing, z)
+        assert pairing["active"].tolist() == [True]
+        assert points.weight[0] == pytest.approx(6.04987144e-06, rel=1e-6)
+        assert points.slave_shape[0] == pytest.approx(np.full(3, 1 / 3), abs=1e-4)
 
 
 def test_a_cell_without_contact_is_not_in_the_tangent() -> None:
