@@ -106,6 +106,12 @@ def _both(differing: Differing, study: Study, plugins: Plugins) -> tuple[Propert
 def _show_study(study: Study, screen: ScreenOptions) -> None:
     """Show what differs in few lines, or all tables; and the meshes on which they differ, if the user wants them."""
     show(SideBySide(study) if screen.verbose else ComparisonScreen(study))
+    if study.apart:
+        reference = study.comparison.reference
+        show(
+            f"{', '.join(study.apart)} and {reference} are asked on different interfaces, in space and in the plane: "
+            "verdicts and promises can be compared; errors case by case, and times, cannot."
+        )
     if screen.verbose or screen.show == "all":
         for differing in study.differing:
             show_as_it_is(mesh_text(differing, study.comparison.reference))

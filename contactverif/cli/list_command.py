@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -53,24 +54,28 @@ def list_installed(
     """
     from contactverif.cli.console import plain_table, show
     from contactverif.contract.result import NotLoaded
+    from contactverif.contract.subject import Subject
     from contactverif.plugins.engines import describe_engines
     from contactverif.plugins.registry import load_formulations, load_problems, load_properties
 
-    table = plain_table("formulations", words=("name",))
+    table = plain_table("formulations", words=("name", "in"))
     table.add_column("promises")
     for item in load_formulations(isolation.limits()):
         if isinstance(item, NotLoaded):
-            table.add_row(item.formulation, _not_loaded(item))
+            table.add_row(item.formulation, "", _not_loaded(item))
         else:
-            table.add_row(item.name, _promises(item, traits))
+            dimensions = item.traits.abilities.dimensions if isinstance(item, Subject) else ()
+            table.add_row(item.name, _dimensions(dimensions), _promises(item, traits))
     show(table)
-    table = plain_table("properties", words=("id",))
+    table = plain_table("properties", words=("id", "in"))
     table.add_column("asks")
     for question in load_properties():
         if isinstance(question, NotLoaded):
-            table.add_row(question.formulation, _not_loaded(question))
+            table.add_row(question.formulation, "", _not_loaded(question))
         else:
-            table.add_row(question.id, question.summary)
+            table.add_row(
+                question.id, _dimensions((2,) if question.cases_in_space is None else (2, 3)), question.summary
+            )
     show(table)
     table = plain_table("problems", words=("name",))
     table.add_column("what bench solves")
@@ -82,6 +87,11 @@ def list_installed(
     for name, words in describe_engines().items():
         table.add_row(name, words)
     show(table)
+
+
+def _dimensions(dimensions: Iterable[int]) -> str:
+    """Return the numbers of coordinates in words, "2-D, 3-D"."""
+    return ", ".join(f"{dimension}-D" for dimension in dimensions)
 
 
 def _not_loaded(item: NotLoaded) -> Text:

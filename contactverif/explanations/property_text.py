@@ -69,6 +69,7 @@ def property_text(question: Property) -> str:
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     facts = [
         ("Cases", cases),
+        ("Dimensions", "in the plane" if question.cases_in_space is None else "in the plane and in space"),
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
     ]

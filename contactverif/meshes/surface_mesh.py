@@ -145,9 +145,9 @@ def _outward(argument: str, mesh: PlainMesh, faces: IntArray) -> IntArray:
                 argument, f"a face with cells on both sides, at {place}", "faces on the boundary of a body"
             )
         for number, cell in beside:
-            own = mesh.points[corners]
-            way = mesh.points[mesh.cells[number].data[cell]].mean(axis=0) - own.mean(axis=0)
-            signs[face] = -int(np.sign(turns_of(own[None]).sum(axis=1)[0] @ way))
+            places = mesh.points[corners]
+            way = mesh.points[mesh.cells[number].data[cell]].mean(axis=0) - places.mean(axis=0)
+            signs[face] = -int(np.sign(turns_of(places[None]).sum(axis=1)[0] @ way))
     return signs
 
 

@@ -482,8 +482,8 @@ def _check_place(subject: Subject, interface: Interface | None) -> None:
     corners = {side.faces.shape[1] for side in (interface.slave, interface.master)}
     takes = {SEGMENT} if abilities.in_plane else set(abilities.faces)  # A formulation of both is asked in the plane.
     if not corners <= takes:
-        found, needed = (" and ".join(_FACE_NAMES[count] for count in sorted(each)) for each in (corners, takes))
-        raise MisuseError("place", f"an interface of {found}", f"one of {needed}, on which {subject.name} is asked")
+        place, faces = (" and ".join(_FACE_NAMES[count] for count in sorted(each)) for each in (corners, takes))
+        raise MisuseError("place", f"an interface of {place}", f"one of {faces}, on which {subject.name} is asked")
 
 
 def _check_once(argument: str, names: Iterable[str]) -> None:

@@ -30,6 +30,7 @@ class Study:
     # The case of each property on which they differ most, the largest difference first.
     differing: tuple[Differing, ...]
     costs: tuple[Cost, ...]  # The times of an evaluation.
+    apart: tuple[str, ...] = ()  # The candidates with other cases: they are in space and the reference is not, or so.
 
 
 def run_comparison(
@@ -48,20 +49,25 @@ def run_comparison(
     result = run([reference, *candidates], properties, place=place, **options)
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    differing = _with_cases(find_differing(result, comparison), properties, result, place)
-    return Study(result, comparison, differing, measure_costs([reference, *loaded]))
+    in_plane = reference.traits.abilities.in_plane
+    apart = tuple(subject.name for subject in loaded if subject.traits.abilities.in_plane is not in_plane)
+    paired = {key: pair for key, pair in comparison.paired.items() if key[0] not in apart}
+    comparison = replace(comparison, paired=paired)
+    variants = [item.for_traits(reference.traits) for item in properties if isinstance(item, Property)]
+    differing = _with_cases(find_differing(result, comparison), variants, result, place)
+    return Study(result, comparison, differing, measure_costs([reference, *loaded]), apart)
 
 
 def _with_cases(
     every: Sequence[Differing],
-    properties: Sequence[Property | NotLoaded],
+    properties: Sequence[Property],
     result: Run,
     place: Interface | Case | None,
 ) -> tuple[Differing, ...]:
     """Return the differing outcomes with their cases; a run of many examples does not keep them all."""
     facts = result.provenance
     sampling = Sampling.at(place, int(facts["examples"]), int(facts["seed"]))
-    question_of = {question.id: question for question in properties if isinstance(question, Property)}
+    question_of = {question.id: question for question in properties}
     complete = []
     for differing in every:
         question, number = question_of[differing.info.id], differing.number

@@ -255,7 +255,7 @@ def test_the_list_has_what_does_not_load_too(ask: Ask) -> None:
     answer = ask("list")
     assert answer.status == 0
     assert re.search(r"absent +not loaded: ModuleNotFoundError", answer.out)
-    assert re.search(r"raising +nothing; not provided: pair, tangent, contact_points", answer.out)
+    assert re.search(r"raising +2-D +nothing; not provided: pair, tangent, contact_points", answer.out)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
