@@ -129,8 +129,8 @@ def projection_place(case: Case, subject: Subject) -> Measurement:
     of D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
 
     In space the shape functions of a foot take the place of ξ, times the longest edge of their face. The lengths are
-    2 (L + |P − A| + D + |gap| D/h) ℓ/h over the cosine, with the longest edge ℓ and the height h of a face: a foot is a
-    quotient by the area of its face.
+    2 (L + |P − A| + D + |gap| D/h) Π ℓ/h over the cosine, with the longest edge ℓ and the height h of both faces:
+    coordinates in a slave face round a place by ℓ/h, and shape functions of the master change over its height.
 
     **Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted
     node is a mean, and is not judged here.

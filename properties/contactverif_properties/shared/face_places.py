@@ -44,9 +44,10 @@ class FacePlaces:
     reported: ContactPoints
     exact: ExactFacePoints
     view: FaceView  # Of the reported master face, by the rule of the formulation.
-    # (n_points,) The length of which rounding is a share: 2 (L + |P − A| + D + |gap| D/h) ℓ/h over the cosine. L are
+    # (n_points,) The length of which rounding is a share: 2 (L + |P − A| + D + |gap| D/h) Π ℓ/h over the cosine. L are
     # the longest edges of both faces, |P − A| is the way from the point to a corner. Rounding the corners of a face at
-    # D turns it by D over its height h, and a foot is a quotient by the area of a face of length ℓ and height h.
+    # D turns it by D over its height h. Coordinates in a slave face of length ℓ and height h round a place by ℓ/h along
+    # it, and the shape functions of the master face change over its own height. So the product is over both faces.
     scale: FloatArray
     carrier_height: FloatArray  # (n_points,) The height of the face whose normal is taken.
     # (n_points,) The weight over the square of the lengths, 1 at most. A corner of a cell is a quotient by the width of
@@ -65,10 +66,12 @@ class FacePlaces:
         slave_height = each.interface.slave.heights(each.positions)[points.slave_segment]
         carrier = view.heights if rule == CLOSEST else slave_height
         edges, gap = _longest_edges(view.corners), np.abs(view.gap.floats())
-        size = edges + _longest_edges(carriers) + np.linalg.norm(view.corners, axis=2).max(axis=1, initial=0.0)
+        slave_edges = _longest_edges(carriers)
+        size = edges + slave_edges + np.linalg.norm(view.corners, axis=2).max(axis=1, initial=0.0)
         size += distant * (1 + gap / carrier)
         with np.errstate(divide="ignore"):
-            scale = 2 * size * edges / view.heights / np.maximum(view.cosine, 0.0)
+            slender = edges / view.heights * slave_edges / slave_height
+            scale = 2 * size * slender / np.maximum(view.cosine, 0.0)
         share = np.minimum(np.abs(points.weight) / size**2, 1.0)
         return cls(each.interface, lattice, points, exact, view, scale, carrier, share)
 
