@@ -49,13 +49,18 @@ def run_comparison(
     result = run([reference, *candidates], properties, place=place, **options)
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    in_plane = reference.traits.abilities.in_plane
-    apart = tuple(subject.name for subject in loaded if subject.traits.abilities.in_plane is not in_plane)
+    apart = _in_other_dimension(reference, loaded)
     paired = {key: pair for key, pair in comparison.paired.items() if key[0] not in apart}
     comparison = replace(comparison, paired=paired)
     variants = [item.for_traits(reference.traits) for item in properties if isinstance(item, Property)]
     differing = _with_cases(find_differing(result, comparison), variants, result, place)
     return Study(result, comparison, differing, measure_costs([reference, *loaded]), apart)
+
+
+def _in_other_dimension(reference: Subject, candidates: Sequence[Subject]) -> tuple[str, ...]:
+    """Return the names of candidates that are asked in space while the reference is asked in the plane, or reverse."""
+    in_plane = reference.traits.abilities.in_plane
+    return tuple(subject.name for subject in candidates if subject.traits.abilities.in_plane is not in_plane)
 
 
 def _with_cases(

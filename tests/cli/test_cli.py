@@ -128,7 +128,7 @@ def test_a_mistake_is_one_line_and_nothing_is_judged(
     [
         (["--case", "nts.patch.flat"], rf"--case: found 'nts.patch.flat'; needed an id like {CASE}"),
         (["--case", CASE, "--formulation", "vts-pt"], "formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
-        (["--case", CASE, "--out", "nts.xyz"], "--out: found 'nts.xyz'; needed a .* .png or .svg"),
+        (["--case", CASE, "--out", "nts.xyz"], "--out: found 'nts.xyz'; needed a .* .png, .svg or .vtu"),
         (["--case", CASE, "--out", "no/such/a.png"], "--out: found .* is no folder; needed a folder that exists"),
     ],
 )  # fmt: skip
