@@ -82,7 +82,9 @@ def _run_cells(
             number = process * n_cells + place
             words = f"{cell.scene}, mesh {cell.mesh}, instance {cell.instance}, process {process + 1}"
             progress(words, number, n_cells * plan.processes)
-            run = partial(run_cell, cell, loaded, plan.seed, solve=process == 0, lost=_lost(records[0], cell.scene))
+            run = partial(
+                run_cell, cell, loaded, plan.seed, solve=process == 0, dead=_find_dead(records[0], cell.scene)
+            )
             try:
                 records[-1][cell] = _run_unless_finished(journal, number, run)
             except MisuseError as error:  # The mistake of a problem.
@@ -91,7 +93,7 @@ def _run_cells(
     return records, failures
 
 
-def _lost(records: Mapping[Cell, CellRecord], scene: str) -> set[str]:
+def _find_dead(records: Mapping[Cell, CellRecord], scene: str) -> set[str]:
     """Return the names of the formulations that ended their process in all solutions of a cell of a scene."""
     of_scene = [record for cell, record in records.items() if cell.scene == scene]
     return {name for record in of_scene for name, run in record.runs.items() if run.is_lost}

@@ -46,7 +46,7 @@ class SolutionRecord:
     ended: bool = False  # The plugin ended its process.
 
 
-_NOT_ASKED = [
+_NOT_RUN = [
     SolutionRecord(remark="not asked: the plugin ended its process in all solutions of an earlier mesh", ended=True)
     for _ in VARIANTS
 ]
@@ -79,15 +79,15 @@ class CellRecord:
 
 
 def run_cell(
-    cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True, lost: Collection[str] = ()
+    cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True, dead: Collection[str] = ()
 ) -> CellRecord:
     """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns.
 
-    Those whose names are in `lost` are asked nothing.
+    Those whose names are in `dead` are asked nothing.
     """
     instances = [pose(cell, RULE.penalty, subject.traits, seed) for subject in subjects]
     whole = WholeScene.of_scene(instances[0].scene) if solve else None
-    runs = [RunRecord(_NOT_ASKED[:] if subject.name in lost else []) for subject in subjects]
+    runs = [RunRecord(_NOT_RUN[:] if subject.name in dead else []) for subject in subjects]
     for subject, instance, run in zip(subjects, instances, runs, strict=True):
         if whole is not None:
             _solve_variants(cell, subject, instance, seed, whole, run)
@@ -103,12 +103,12 @@ def _time_evaluations(
     subjects: Sequence[Subject], instances: Sequence[ProblemInstance], runs: Sequence[RunRecord]
 ) -> None:
     """Time one evaluation of each formulation that is not lost in turns, of which each begins with another one."""
-    asked = [number for number, run in enumerate(runs) if not run.is_lost]
+    running = [number for number, run in enumerate(runs) if not run.is_lost]
     gc.collect()
     with without_collector():
         for turn in range(TURNS):
-            for place in range(len(asked)):
-                number = asked[(place + turn) % len(asked)]
+            for place in range(len(running)):
+                number = running[(place + turn) % len(running)]
                 seconds = evaluate(subjects[number], instances[number], timed=True).seconds
                 runs[number].evaluation = float(np.fmin(runs[number].evaluation, seconds))
 
@@ -121,13 +121,13 @@ def _solve_variants(
         return
     for variant in VARIANTS:
         other = variant.penalty != RULE.penalty
-        posed = pose(cell, variant.penalty, subject.traits, seed) if other else instance
+        varied = pose(cell, variant.penalty, subject.traits, seed) if other else instance
         record = SolutionRecord()
         run.solutions.append(record)
         try:
-            trace = _solve(subject, posed, variant.start, record)
+            trace = _solve(subject, varied, variant.start, record)
             if variant == RULE and record.outcome == Outcome.SOLVED:
-                _measure_system(subject, posed, trace, whole, run)
+                _measure_system(subject, varied, trace, whole, run)
         except ContractError as error:
             record.remark, record.ended = str(error), isinstance(error, PluginError) and error.ended
     if not run.is_lost:
