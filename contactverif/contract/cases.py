@@ -124,8 +124,9 @@ class _OnFaces:
 
     @property
     def random_source(self) -> str:
-        """The stored name of the function; the same seed draws other faces from it."""
-        return name_of_source(self.make)
+        """The stored name of the function, if it has one, and the faces: these are other cases."""
+        name = name_of_source(self.make)
+        return name and f"{name} on faces of {' or '.join(map(str, self.faces))} corners"
 
 
 def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function]:
