@@ -164,7 +164,6 @@ CANNOT_JUDGE: Mapping[str, frozenset[str]] = {
     LINEAR: frozenset(WITHOUT_INTEGRAL),
     NODAL: FAILS.keys() - NODAL_SPRINGS,
     PUBLISHED: frozenset(WITHOUT_TABLE),
-    "patch.flat.quad": frozenset(FAILS),  # All of the table are asked in the plane.
     # Multipliers solve nothing on the way, and averaged normals and half passes state nothing.
     CONTINUITY: frozenset({*WITH_MULTIPLIERS, *WITHOUT_RULE}),
     LOCAL: frozenset(WITHOUT_EXACT_FORCES),

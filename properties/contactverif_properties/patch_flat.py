@@ -15,7 +15,6 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.errors import ContractError
-from contactverif.contract.faces import QUADRILATERAL
 from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
@@ -29,7 +28,6 @@ from contactverif.strategies.surfaces import (
     flat_surface_cases,
     matched_surface_cases,
     overhung_surface_cases,
-    skewed_surface_cases,
 )
 from contactverif_properties.shared import uniform_pressure
 from contactverif_properties.shared.frozen_state import FrozenState
@@ -84,43 +82,6 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     give the same gap.
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
-    """
-    return uniform_pressure.measure_transmission(FORCE, case, subject)
-
-
-SKEWED = Cases.random(skewed_surface_cases)
-
-
-def refuse_without_quadrilaterals(traits: Traits) -> str:
-    """Return why there are no quadrilaterals, or an empty string."""
-    if traits.abilities.in_plane:
-        return "the interfaces are in space, and the formulation is asked about the plane"
-    return "" if QUADRILATERAL in traits.abilities.faces else "the formulation takes no quadrilaterals"
-
-
-@_define(
-    id="patch.flat.quad",
-    quantities=(FORCE,),
-    cases=SKEWED,
-    cases_in_space=SKEWED,
-    promise=lambda traits: None,
-    applicable=refuse_without_quadrilaterals,
-    exact=uniform_pressure.forces_of_penetration,
-)
-def patch_flat_quad(case: Case, subject: Subject) -> Measurement:
-    """Measure the patch test on flat quadrilaterals of any shape, which no quadrature of their overlaps passes.
-
-    **Question.** Two flat surfaces with quadrilaterals of any convex shape penetrate each other by the same depth. By
-    how much do the nodal forces differ from the consistent ones?
-
-    **Why it matters.** Bilinear shape functions are polynomials of the place on a parallelogram alone. On any other
-    quadrilateral they are roots, so every rule of points on the overlaps has an error. It shrinks with the number of
-    points and with the distance from a parallelogram. An author wants to know its size.
-
-    **How it is judged.** The measured number is that of `patch.flat.transmission`, which asks triangles and rectangles
-    and takes the promise. Here nothing is promised, and nobody is accused.
-
-    **Undecided.** Never, as there.
     """
     return uniform_pressure.measure_transmission(FORCE, case, subject)
 

@@ -11,7 +11,7 @@ from contactverif import Case, Property, Subject, Verdict, judge_case
 from contactverif.plugins.registry import property_ids
 from contactverif.sampling.draw import Sampling, draw_cases
 
-FORMULATIONS = ("vts-ppt", "mortar-lm", "nts", "sts-3d")  # The first to which the property applies is judged.
+FORMULATIONS = ("vts-ppt", "mortar-lm", "nts")  # The first to which the property applies is judged.
 N_DRAWN = 4  # The first cases are the simplest; the last of these is judged.
 
 
