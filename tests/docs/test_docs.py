@@ -128,7 +128,8 @@ PYTHON = {
     "how-to/write-a-property.md": r"",
     "how-to/write-a-problem.md": r"converged",
     "concepts/promises.md": r"",
-    "tutorial/faces.md": "balance.force pass\nbalance.moment pass\npatch.flat.nodal pass\npatch.flat.normal fail\npatch.flat.transmission fail",
+    "tutorial/faces.md": "balance.force pass\nbalance.moment pass\npatch.flat.nodal pass\n"
+    "patch.flat.normal fail\npatch.flat.transmission fail",
 }
 
 
