@@ -8,7 +8,8 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface, Surface
 
 STEEPEST_FACING = 0.5  # The cosine of 60°: two surfaces whose normals differ more from opposite ones do not face.
-ONE_SIDED = 0.5  # The normals of a half disk have a mean of 0.64, those of a ring have none.
+# The normals of a half disk have a mean of 0.64, of half a sphere 0.5; those of a ring or a sphere have none.
+ONE_SIDED = 0.5
 
 
 def ways_to_master(interface: Interface) -> tuple[FloatArray, FloatArray]:

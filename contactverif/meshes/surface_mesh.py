@@ -14,12 +14,12 @@ from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import TRIANGLE, turns_of
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.ways import ONE_SIDED
 from contactverif.meshes.mesh_groups import Group, kinds_in, unknown_group_error
 from contactverif.meshes.plain_mesh import PlainMesh
 
 FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
 _CORNERS = {"triangle": 3, "quad": 4}  # Numbers of corners.
-_ONE_SIDED = 0.5  # The normals of half a sphere have a mean of 0.5, those of a sphere have none.
 
 
 def is_in_space(mesh: PlainMesh, groups: dict[str, Group], name: str) -> bool:
@@ -172,7 +172,7 @@ def _check_facing(interface: Interface) -> None:
         turns = turns_of(interface.nodes[surface.faces]).sum(axis=1)
         normals.append(turns.sum(axis=0) / np.linalg.norm(turns, axis=1).sum())
     slave, master = normals
-    if slave @ master < 0 or min(np.linalg.norm(normals, axis=1)) < _ONE_SIDED:
+    if slave @ master < 0 or min(np.linalg.norm(normals, axis=1)) < ONE_SIDED:
         return
     words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in normals]
     raise MisuseError(

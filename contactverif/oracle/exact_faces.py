@@ -84,7 +84,7 @@ class FaceView:
     def of_faces(cls, lattice: FaceLattice, points: ExactFacePoints, faces: IntArray, *, closest: bool) -> FaceView:
         """Return what points see of master faces (n_points,). One that is seen edge-on has infinite numbers."""
         nodes = lattice.nodes[lattice.master[faces]]
-        outward = _cross(nodes[:, 1] - nodes[:, 0], nodes[:, 2] - nodes[:, 0])
+        outward = _outward(nodes)
         direction = -outward if closest else points.outward
         weight = points.weight
         arms = weight[:, None, None] * nodes - points.place[:, None, :]  # (n_points, 3, 3), from the points.
@@ -113,6 +113,11 @@ class FaceView:
     def heights(self) -> FloatArray:
         """The least heights (n_points,) of the master triangles."""
         return measure_heights(self.corners)
+
+
+def _outward(corners: Integers) -> Integers:
+    """Return normals (n, 3), of any length, of triangles with corners (n, 3, 3)."""
+    return _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _cosines(outward: Integers, direction: Integers) -> FloatArray:
@@ -144,15 +149,13 @@ def covered_shares(lattice: FaceLattice) -> list[Fraction]:
 
     Master triangles behind one another count as often as they are there, so a share may be above 1.
     """
-    shares = []
-    outward = [_cross(nodes[:, 1] - nodes[:, 0], nodes[:, 2] - nodes[:, 0])
-               for nodes in (lattice.nodes[lattice.slave], lattice.nodes[lattice.master])]  # fmt: skip
-    for face, normal in zip(lattice.slave, outward[0], strict=True):
+    shares, front = [], _outward(lattice.nodes[lattice.master])
+    for face, normal in zip(lattice.slave, _outward(lattice.nodes[lattice.slave]), strict=True):
         first, second, third = lattice.nodes[face]
         arms, whole = lattice.nodes[lattice.master] - first, _dot(normal, normal)
         # The corners of the master in the plane of the triangle: 0 to `whole` along its first and its last edge.
         along, up = _dot(_cross(arms, third - first), normal), _dot(_cross(second - first, arms), normal)
-        near = _dot(outward[1], normal) < 0
+        near = _dot(front, normal) < 0
         near &= (along.min(axis=1) < whole) & (up.min(axis=1) < whole) & (along.max(axis=1) > 0) & (up.max(axis=1) > 0)
         share = Fraction(0)
         for corners in np.stack([along, up], axis=-1)[near][:, ::-1].tolist():

@@ -25,11 +25,12 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
-from contactverif_surfaces.face_search import MOST_CORNERS
+from contactverif_surfaces.face_search import MOST_CORNERS, set_axes, view_face
 
 S, T, H, REST = 0, 1, 2, 3  # The columns of a master corner; the last one is 1 − s − t.
 FRAME, MASTER, CORNERS, SLOPES = 0, 4, 7, 7 + MOST_CORNERS  # The rows of `room` at which each part of a cell begins.
-ROOM = SLOPES + 3, 4
+AXES, PLACES = SLOPES + 3, SLOPES + 6  # The axes of `face_search`, and along them the corners of slave and master.
+ROOM = PLACES + 6, 4
 
 
 class CentrePoint(NamedTuple):
@@ -47,10 +48,13 @@ class CentrePoint(NamedTuple):
 def place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes: IntArray) -> CentrePoint:
     """Return the virtual slave node of a cell, and write all of its cell into `room`, an array of the shape `ROOM`.
 
-    Its rows are e^1, e^2, n, e^0, the master corners, the corners of the cell (s, t) and the slopes ∇λ_j. Positions x
-    are (n_nodes, 3); the nodes of both faces are (3,), the codes (MOST_CORNERS, 2).
+    Its rows are e^1, e^2, n, e^0, the master corners, the corners of the cell (s, t), the slopes ∇λ_j, and what the
+    search sees. Positions x are (n_nodes, 3); the nodes of both faces are (3,), the codes (MOST_CORNERS, 2).
     """
     size = _set_frame(room, x, slave)
+    set_axes(room[AXES : AXES + 3], x, slave)
+    view_face(room[PLACES : PLACES + 3], x, slave, x[slave[0]], room[AXES:], False)
+    view_face(room[PLACES + 3 :], x, master, x[slave[0]], room[AXES:], True)
     for j in range(3):
         for row in range(3):
             room[MASTER + j, row] = 0.0
@@ -65,6 +69,8 @@ def place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes
     _set_slopes(room)
     m_1, m_2 = master_shape(room, 1, s, t), master_shape(room, 2, s, t)
     gap = (1 - m_1 - m_2) * room[MASTER, H] + m_1 * room[MASTER + 1, H] + m_2 * room[MASTER + 2, H]
+    # The normal of a needle is rounded, so the slave's corners have heights. They take its tilt away from the others.
+    gap = gap - (s * room[PLACES + 1, H] + t * room[PLACES + 2, H])
     return CentrePoint(size, share, s, t, gap, n_corners)
 
 
@@ -96,11 +102,17 @@ def _set_frame(room: Array, x: Array, slave: IntArray) -> float:
 
 @compile_inline
 def crossing_of(room: Array, edge: int, j: int) -> tuple[float, float]:
-    """Return where slave edge `edge` cuts the master edge from corner j on, in [0, 1], and how fast that leaves it."""
-    # The shape function that is 0 on the edge, positive inside.
-    column = T if edge == 0 else (REST if edge == 1 else S)
-    here, there = room[MASTER + j, column], room[MASTER + (j + 1) % 3, column]
-    return here / (here - there), here - there
+    """Return where slave edge `edge` cuts the master edge from corner j on, in [0, 1], and how fast that leaves it.
+
+    Where edges nearly coincide, the place is a quotient of small numbers. So these are the numbers by which the search
+    decided which corners the cell has: others would put this corner elsewhere.
+    """
+    start, end, before, behind = PLACES + edge, PLACES + (edge + 1) % 3, PLACES + 3 + j, PLACES + 3 + (j + 1) % 3
+    along, across = room[end, 0] - room[start, 0], room[end, 1] - room[start, 1]
+    here = along * (room[before, 1] - room[start, 1]) - across * (room[before, 0] - room[start, 0])
+    there = along * (room[behind, 1] - room[start, 1]) - across * (room[behind, 0] - room[start, 0])
+    column = T if edge == 0 else (REST if edge == 1 else S)  # The shape function that is 0 on the edge.
+    return here / (here - there), room[MASTER + j, column] - room[MASTER + (j + 1) % 3, column]
 
 
 @compile_inline

@@ -138,7 +138,7 @@ def projection_place(case: Case, subject: Subject) -> Measurement:
     tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
     if case.interface.dim != PLANE:
         on_faces, idle = place_errors(case, subject)
-        return Measurement(check_all(dict(zip(_ROUNDINGS, on_faces.values(), strict=True)), tolerances), idle=idle)
+        return Measurement(check_all(dict(zip(_ROUNDINGS, on_faces, strict=True)), tolerances), idle=idle)
     reported = Reported.from_case(case, subject)
     values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
     for each in reported.passes:

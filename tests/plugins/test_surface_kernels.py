@@ -8,8 +8,10 @@ from readable_cells import readable_vts_cell
 
 from contactverif import Case, Interface, Pairing, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF
+from contactverif.oracle.exact_faces import FaceLattice, covered_shares
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
+from contactverif.strategies.surfaces.space_motions import SpaceMotion
 from contactverif_surfaces import vts_cell_3d
 
 
@@ -113,3 +115,33 @@ def test_a_cell_without_contact_is_not_in_the_tangent() -> None:
     forces, tangent = vts_cell_3d(penalty=2.0).residual_and_tangent(case.interface, nothing, case.z)
     assert not forces.any()
     assert tangent.nnz == 0
+
+
+def test_edges_that_nearly_coincide_are_cut_where_the_search_saw_it() -> None:
+    """The two long edges turn by 1e-6 against each other and cross at a slave corner, which the cell does not list."""
+    left, high, end = 0.34635448455810547, 0.17317724227905273, 0.5130205154418945
+    slave = [[left, high, -0.03125], [end, high, -0.03125], [left, 0.08984375, -0.03125]]
+    master = [[0.3046875, 0.06901025772094727, 0], [0.47135448455810547, 0.15234375, 0], [0.3046875, 0.15234375, 0]]
+    meshes = Interface.from_faces(slave, [[0, 1, 2]], master, [[0, 1, 2]])
+    z = meshes.nodes.reshape(-1)
+    formulation = vts_cell_3d(penalty=1.0)
+    (weight,) = formulation.contact_points(meshes, formulation.pair(meshes, z), z).weight
+    (share,) = covered_shares(FaceLattice.from_state(meshes, z))
+    area = meshes.slave.measures(meshes.nodes)[0]
+    assert abs(weight - float(share) * area) <= 16 * UNIT_ROUNDOFF * area
+
+
+def test_the_gap_over_a_needle_is_no_worse_than_its_positions() -> None:
+    """The computed normal of a needle tilts by u ℓ/h, which moves a far corner by more than rounding of positions."""
+    needle = np.array([[0.0, 0, 0], [1, 2.0**-11, 0], [0.97, 0.0, 0]])
+    errors = []
+    for case in range(60):
+        motion = SpaceMotion((1 + case % 5, case % 7 - 3, case % 3 - 1, case % 4 - 2))
+        depth = 2.0**-30
+        slave, master = motion(needle[[0, 1, 2]] - [0, 0, depth]), motion(needle[[0, 2, 1]])
+        meshes = Interface.from_faces(slave, [[0, 1, 2]], master, [[0, 1, 2]])
+        z, formulation = meshes.nodes.reshape(-1), vts_cell_3d(penalty=1.0)
+        gaps = formulation.contact_points(meshes, formulation.pair(meshes, z), z).gap
+        errors += [abs(abs(gap) - depth) for gap in gaps]
+    assert len(errors) >= 60
+    assert max(errors) <= 8 * UNIT_ROUNDOFF

@@ -107,10 +107,10 @@ def _longest_edges(corners: FloatArray) -> FloatArray:
     return longest
 
 
-def place_errors(case: Case, subject: Subject) -> tuple[dict[str, float], bool]:
+def place_errors(case: Case, subject: Subject) -> tuple[list[float], bool]:
     """Return the largest errors of gap, foot, normal and position, and whether no point is active."""
     reported = Reported.from_case(case, subject)
-    values = dict.fromkeys(("gap", "foot", "normal", "position"), 0.0)
+    values = np.zeros(4)
     for each in reported.passes:
         places = FacePlaces.from_pass(each, subject.traits.rules.gap, reported.distant)
         points, view, facing = places.reported, places.view, np.isfinite(places.scale)
@@ -118,19 +118,13 @@ def place_errors(case: Case, subject: Subject) -> tuple[dict[str, float], bool]:
         turned = 1 + reported.distant / places.carrier_height
         foot = np.abs(view.shape.errors(points.master_shape)).max(axis=1, initial=0.0) * edges
         normal = np.linalg.norm(view.normal.errors(points.normal), axis=1)
-        here = view_positions(each)
-        for name, errors in (
-            ("gap", np.abs(view.gap.errors(points.gap)) / places.scale),
-            ("foot", foot / places.scale),
-            ("normal", normal / turned),
-        ):
-            values[name] = float(np.maximum(values[name], largest(_of_active(errors, points)[facing])))
-        far = reported.state.largest_coordinate
-        values["position"] = float(np.maximum(values["position"], largest(here / far)))
-    return values, not reported.points.active.any()
+        errors = np.abs(view.gap.errors(points.gap)) / places.scale, foot / places.scale, normal / turned
+        on_faces = [largest(_of_active(error, points)[facing]) for error in errors]
+        values = np.maximum(values, [*on_faces, largest(_position_errors(each) / reported.state.largest_coordinate)])
+    return values.tolist(), not reported.points.active.any()
 
 
-def view_positions(each: Pass) -> FloatArray:
+def _position_errors(each: Pass) -> FloatArray:
     """Return the errors of the reported positions (n_points,) of all points that name a place, a length."""
     points = each.points.select(name_places(each.points))
     lattice = FaceLattice.from_state(each.interface, each.z)
