@@ -58,7 +58,8 @@ def list_installed(
     from contactverif.plugins.engines import describe_engines
     from contactverif.plugins.registry import load_formulations, load_problems, load_properties
 
-    table = plain_table("formulations", words=("name", "in"))
+    table = plain_table("formulations", words=("name",))
+    table.add_column("in")  # It gives way on a narrow screen, and names do not.
     table.add_column("promises")
     for item in load_formulations(isolation.limits()):
         if isinstance(item, NotLoaded):
@@ -67,7 +68,8 @@ def list_installed(
             dimensions = item.traits.abilities.dimensions if isinstance(item, Subject) else ()
             table.add_row(item.name, _dimensions(dimensions), _promises(item, traits))
     show(table)
-    table = plain_table("properties", words=("id", "in"))
+    table = plain_table("properties", words=("id",))
+    table.add_column("in")
     table.add_column("asks")
     for question in load_properties():
         if isinstance(question, NotLoaded):
