@@ -109,8 +109,8 @@ def _show_study(study: Study, screen: ScreenOptions) -> None:
     if study.apart:
         reference = study.comparison.reference
         show(
-            f"{', '.join(study.apart)} and {reference} are asked on different interfaces, in space and in the plane: "
-            "verdicts and promises can be compared; errors case by case, and times, cannot."
+            f"{', '.join(study.apart)} and {reference} are asked on different interfaces, of other dimension or faces: "
+            "verdicts and promises can be compared, errors only on cases that both have, and times cannot."
         )
     if screen.verbose or screen.show == "all":
         for differing in study.differing:

@@ -30,7 +30,7 @@ class Study:
     # The case of each property on which they differ most, the largest difference first.
     differing: tuple[Differing, ...]
     costs: tuple[Cost, ...]  # The times of an evaluation.
-    apart: tuple[str, ...] = ()  # The candidates with other cases: they are in space and the reference is not, or so.
+    apart: tuple[str, ...] = ()  # The candidates with other cases: of another dimension, or on other faces.
 
 
 def run_comparison(
@@ -49,18 +49,19 @@ def run_comparison(
     result = run([reference, *candidates], properties, place=place, **options)
     comparison = Comparison.from_run(result, reference.name)
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    apart = _in_other_dimension(reference, loaded)
-    paired = {key: pair for key, pair in comparison.paired.items() if key[0] not in apart}
-    comparison = replace(comparison, paired=paired)
+    apart = _on_other_faces(reference, loaded)
     variants = [item.for_traits(reference.traits) for item in properties if isinstance(item, Property)]
     differing = _with_cases(find_differing(result, comparison), variants, result, place)
     return Study(result, comparison, differing, measure_costs([reference, *loaded]), apart)
 
 
-def _in_other_dimension(reference: Subject, candidates: Sequence[Subject]) -> tuple[str, ...]:
-    """Return the names of candidates that are asked in space while the reference is asked in the plane, or reverse."""
-    in_plane = reference.traits.abilities.in_plane
-    return tuple(subject.name for subject in candidates if subject.traits.abilities.in_plane is not in_plane)
+def _on_other_faces(reference: Subject, candidates: Sequence[Subject]) -> tuple[str, ...]:
+    """Return the names of candidates that are asked in another dimension than the reference, or on other faces."""
+    faces, *others = (
+        () if subject.traits.abilities.in_plane else subject.traits.abilities.faces
+        for subject in (reference, *candidates)
+    )
+    return tuple(subject.name for subject, there in zip(candidates, others, strict=True) if there != faces)
 
 
 def _with_cases(

@@ -21,14 +21,21 @@ def test_the_list_and_an_explanation_say_dimensions(ask: Ask) -> None:
 def test_a_comparison_across_dimensions_says_what_it_cannot_compare(ask: Ask) -> None:
     answer = ask("compare", "nts-3d", "--against", "vts-ppt", *TRANSMISSION)
     words = " ".join(answer.out.split())
-    assert "nts-3d and vts-ppt are asked on different interfaces, in space and in the plane: verdicts and" in words
+    assert "nts-3d and vts-ppt are asked on different interfaces, of other dimension or faces: verdicts and" in words
     assert "--show all" not in words  # There is no case on which both were judged.
 
 
 def test_a_comparison_in_space_draws_the_mesh_in_space(ask: Ask) -> None:
-    answer = ask("compare", "nts-3d", "--against", "sts-3d", "--show", "all", *TRANSMISSION)
+    answer = ask("compare", "nts-3d", "--against", "vts-cell-3d", "--show", "all", *TRANSMISSION)
     assert "different interfaces" not in answer.out
     assert " master triangle" in answer.out
+
+
+def test_a_formulation_of_other_faces_is_compared_on_equal_cases_alone(ask: Ask) -> None:
+    answer = ask("compare", "vts-cell-3d", "--against", "sts-3d", *TRANSMISSION, "-p", "patch.tilted.nodal")
+    words = " ".join(answer.out.split())
+    assert "vts-cell-3d and sts-3d are asked on different interfaces" in words
+    assert "patch.tilted.nodal" in words  # Both are asked about the same triangles there.
 
 
 def test_a_stored_case_in_space_is_written_for_paraview(ask: Ask, tmp_path: Path) -> None:

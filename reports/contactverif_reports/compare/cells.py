@@ -147,7 +147,9 @@ class Paired:
         """Compare cells over the same cases; further cases of the longer one are left out."""
         n_cases = min(len(candidate.verdicts), len(reference.verdicts))
         a, b = candidate.standing[:n_cases], reference.standing[:n_cases]
-        both = ~(np.isnan(a) | np.isnan(b))
+        # In other dimensions, or on faces that one of them does not take, the cases are others.
+        alike = (candidate.kinds[:n_cases] == reference.kinds[:n_cases]).all(axis=1)
+        both = alike & ~(np.isnan(a) | np.isnan(b))
         fails_a, fails_b = a > 1, b > 1
         apart = both & (fails_a != fails_b)
         with np.errstate(invalid="ignore"):  # ∞ − ∞
