@@ -18,6 +18,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
+from contactverif.problems.flat_faces import grid, rotation
 
 FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0
@@ -34,6 +35,35 @@ class Part:
     master: FloatArray
     inward: FloatArray  # (n_slave, 2) The unit vectors along which the slave's points penetrate the master.
     closed: bool = False  # The last point of each chain is joined to its first.
+
+
+@cache
+def long_face_states() -> tuple[Case, ...]:
+    """Return the states in space: triangles on a wave, few on many, and many on few."""
+    sizes = {
+        "wavy-faces-128": (8, 5, 1 / 16),
+        "few-faces-on-many-128": (2, 8, 0.0),
+        "many-faces-on-few-128": (8, 2, 0.0),
+    }
+    return tuple(_case_of_faces(name, number, *size) for number, (name, size) in enumerate(sizes.items()))
+
+
+def _case_of_faces(name: str, number: int, slave_cells: int, master_cells: int, amplitude: float) -> Case:
+    """Return a slave grid over the middle of a wider master grid, both on a wave and turned."""
+    slave, master = (
+        grid(_places(2 * number + side, cells).tolist(), _places(2 * number + side + 20, cells).tolist())
+        for side, cells in enumerate((slave_cells, master_cells))
+    )
+    upper, lower = np.array(slave.points), 1.1 * np.array(master.points) - [0.05, 0.05, 0.0]
+    upper[:, 2], lower[:, 2] = (
+        amplitude * np.cos(7 * points[:, 0]) * np.cos(5 * points[:, 1]) for points in (upper, lower)
+    )
+    interface = Interface.from_faces(upper, [face[::-1] for face in slave.faces], lower, master.faces)
+    least = min(surface.heights(interface.nodes).min() for surface in (interface.slave, interface.master))
+    upper[:, 2] -= amplitude / 8 + least * np.random.default_rng(number).uniform(0.5, 1.5, len(upper)) * _DEPTH
+    matrix, size = rotation((3, 1, 2, 1 + number))
+    current = np.vstack([upper, lower]) @ (np.array(matrix).T / size)
+    return Case(interface, current.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
 
 
 @cache

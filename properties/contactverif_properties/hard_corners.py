@@ -20,10 +20,12 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.problems.flat_faces import touching_face_states
 from contactverif.problems.flat_states import touching_states
 from contactverif.problems.hard_corner_states import (
     concave_corner_states,
@@ -34,7 +36,7 @@ from contactverif.problems.hard_corner_states import (
 from contactverif_properties.shared.applicability import knows_total, may_act_twice
 from contactverif_properties.shared.frozen_state import FrozenState
 from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
-from contactverif_properties.shared.uniform_pressure import pushing_forces, uniform_state
+from contactverif_properties.shared.uniform_pressure import normal_of, pushing_forces, uniform_state
 
 _TOLERANCE = "u(8X/min(|g|, ℓ) + 4N)"
 DIRECTION = Quantity("part outside the normals", _TOLERANCE, SEGMENT_REASON)
@@ -205,27 +207,29 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
     family="hard",
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
     cases=Cases.from_list(touching_states),
+    cases_in_space=Cases.from_list(touching_face_states),
     promise=lambda traits: True,
 )
 def hard_touch(case: Case, subject: Subject) -> Measurement:
     """Surfaces that touch, or miss each other by 1e-16, give neither a force nor a wrong stiffness.
 
-    **Question.** Flat surfaces touch: the gap is exactly 0 at 1000 angles, or 1e-16 open or closed at 24. Is the force
-    no more than roundoff makes it, and is the tangent that of a spring across the surface, or of none?
+    **Question.** Flat surfaces touch: the gap is exactly 0 at 1000 angles, or 1e-16 open or closed at 24. In space they
+    do at some 160 rotations, and 17. Is the force no more than roundoff makes it, and is the tangent that of a spring
+    across the surface, or of none?
 
     **Why it matters.** A normal that is computed as the difference of point and foot over their distance is 0/0 in
     touch, and has any direction at 1e-16. The force is tiny then, and the tangent is as wrong as can be: Newton's
     method slides the bodies.
 
     **How it is judged.** The first number is the largest nodal force over ε̂ h, a length, in units of the largest
-    coordinate X, h the longest slave segment: at most 4 (8u + |g|/X), since a gap is rounded to 8uX, and springs act in
-    two passes at most. With an exact tangent, the slave is moved across its surface. It meets between no resistance
-    (open) and that of all springs, s ε̂ L:
+    coordinate X, h the longest slave segment, and in space the slave's area: at most 4 (8u + |g|/X), since a gap is
+    rounded to 8uX, and springs act in two passes at most. With an exact tangent, the slave is moved across its surface.
+    It meets between no resistance (open) and that of all springs, s ε̂ L:
 
     - Where `penalty` and `area` are stated, the areas add up to L, so s = 1.
     - Other distributed springs may act on both surfaces, so s = 1 + L_master/L.
     - A nodal spring has the stiffness ε̂ L/n for n slave segments. So s is the number of slave nodes over n, (n + 1)/n
-      for one chain. Where they are `unbiased`, the nodes of the master count too.
+      for one chain. In space n counts the slave nodes. Where they are `unbiased`, the nodes of the master count too.
     - Where the unit of the penalty is not stated, ε̂ may be that of a node, and the largest of these counts.
 
     A tangent is exact if differences confirm it, so s is allowed to be larger by their 30 (uX/ℓ)^(2/3), as in
@@ -238,14 +242,15 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never: contact may be active or not, and the numbers allow for both.
     """
     state = FrozenState.with_multiplier(subject.for_case(case), case, 0.0)
-    longest = float(case.interface.slave.lengths(case.positions).max())
+    plane = case.interface.dim == PLANE
+    around = float(case.interface.slave.lengths(case.positions).max()) if plane else case.slave_measure
     size, gap = case.largest_coordinate, abs(case.parameter("shift"))
-    values = {FORCE: float(np.abs(state.forces).max()) / (case.penalty * longest * size)}
+    values = {FORCE: float(np.abs(state.forces).max()) / (case.penalty * around * size)}
     tolerances = {FORCE: 4 * (8 * UNIT_ROUNDOFF + gap / size)}
     if "tangent" in subject.provides and subject.traits.promises.tangent == "exact":
         n = case.interface.n_unknowns
-        tangent, (along, across) = state.tangent[:n, :n], _motions(case)
-        resistance = float(across @ tangent @ across) / (case.penalty * case.slave_length)
+        tangent, (ways, across) = state.tangent[:n, :n], _motions(case)
+        resistance = float(across @ tangent @ across) / (case.penalty * case.slave_measure)
         values |= {PRESSING: resistance, PULLING: -resistance}
         roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
         accuracy = 30 * (UNIT_ROUNDOFF * size / case.shortest_segment) ** (2 / 3)
@@ -255,7 +260,8 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
             z = state.case.z.copy()
             z[:n] -= depth * across
             tangent = FrozenState.at(state.formulation, replace(state.case, z=z)).tangent[:n, :n]
-            values[SLIDING] = float(np.abs(tangent @ along).max()) / (case.penalty * longest)
+            sliding = max(float(np.abs(tangent @ way).max()) for way in ways)
+            values[SLIDING] = sliding / (case.penalty * around)
             tolerances[SLIDING] = roundoff + 4 * depth / case.shortest_segment
     return Measurement(check_all(values, tolerances))
 
@@ -266,17 +272,21 @@ def _all_springs(case: Case, traits: Traits) -> float:
     if knows_total(traits):
         return 1.0
     n_nodes = interface.n_nodes if may_act_twice(traits) else interface.n_slave_nodes
-    nodal = n_nodes / len(interface.slave)
-    distributed = 1 + float(interface.master.lengths(case.positions).sum()) / case.slave_length
+    nodal = n_nodes / (len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes)
+    distributed = 1 + float(interface.master.measures(case.positions).sum()) / case.slave_measure
     # Without a unit the penalty ε̂ may be taken for the stiffness of a node.
-    unstated = max(distributed, interface.n_nodes / case.slave_length)
+    unstated = max(distributed, interface.n_nodes / case.slave_measure)
     return {"nodal": nodal, "distributed": distributed, None: unstated}[rules.penalty]
 
 
-def _motions(case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return the motions (n_unknowns,) of the slave by a unit along and across its surfaces."""
-    directions = case.parameters["directions"]
+def _motions(case: Case) -> tuple[list[FloatArray], FloatArray]:
+    """Return the motions (n_unknowns,) of the slave by a unit along its surfaces, in space two, and across them."""
+    directions, interface = case.parameters["directions"], case.interface
+    on_slave = (np.arange(interface.n_nodes) < interface.n_slave_nodes)[:, None]
+    if interface.dim != PLANE:
+        ways, across = [np.where(on_slave, way, 0.0) for way in directions], np.where(on_slave, normal_of(case), 0.0)
+        return [way.reshape(-1) for way in ways], across.reshape(-1)
     along = directions / np.hypot(directions[:, :1], directions[:, 1:])  # Integers, whose length is near 1, are exact.
-    along[case.interface.n_slave_nodes :] = 0.0
+    along[interface.n_slave_nodes :] = 0.0
     across = np.column_stack([-along[:, 1], along[:, 0]])
-    return along.reshape(-1), across.reshape(-1)
+    return [along.reshape(-1)], across.reshape(-1)

@@ -15,10 +15,17 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.problems.flat_faces import (
+    deep_face_states,
+    node_hit_face_states,
+    offset_face_states,
+    search_face_states,
+)
 from contactverif.problems.flat_states import (
     deep_states,
     equal_length_states,
@@ -55,8 +62,8 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     slave = uniform_pressure.pushing_forces(uniform_pressure.uniform_state(case, subject))[
         : case.interface.n_slave_nodes
     ]
-    along, normal = case.parameters["direction"], uniform_pressure.normal_of(case)
-    numbers = [ALONG.check(ratio(abs(float((slave @ along).sum())), float(np.abs(slave).sum())), tolerance)]
+    normal = uniform_pressure.normal_of(case)
+    numbers = [ALONG.check(ratio(_force_along(case, slave), float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken, finding = "" if push > 0 else "nothing pushes the slave out of the master", None
     if knows_total(traits):
@@ -69,8 +76,14 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     return Measurement(numbers, broken=broken, finding=finding)
 
 
+def _force_along(case: Case, forces: FloatArray) -> float:
+    """Return the size of the sum of forces (n, dim) along the surface, in space over both tangents."""
+    tangents = case.parameters["direction" if case.interface.dim == PLANE else "directions"]
+    return float(np.hypot.reduce(np.abs(np.atleast_1d((forces @ tangents.T).sum(axis=0)))))
+
+
 def exact_forces(case: Case) -> FloatArray:
-    """Return the exact forces (n_nodes, 2) of the pressure ε̂ |g| that push the nodes of a flat state."""
+    """Return the exact forces (n_nodes, dim) of the pressure ε̂ |g| that push the nodes of a flat state."""
     if "weights" not in case.parameters:  # There is no other surface than the flat one.
         return uniform_pressure.forces_of_penetration(case)
     return uniform_pressure.push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
@@ -81,7 +94,7 @@ _define = partial(
 )
 
 
-@_define(id="hard.offset", cases=Cases.from_list(offset_states))
+@_define(id="hard.offset", cases=Cases.from_list(offset_states), cases_in_space=Cases.from_list(offset_face_states))
 def hard_offset(case: Case, subject: Subject) -> Measurement:
     """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
 
@@ -105,7 +118,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(id="hard.deep", cases=Cases.from_list(deep_states))
+@_define(id="hard.deep", cases=Cases.from_list(deep_states), cases_in_space=Cases.from_list(deep_face_states))
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
 
@@ -123,7 +136,9 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(id="hard.node-hit", cases=Cases.from_list(node_hit_states))
+@_define(
+    id="hard.node-hit", cases=Cases.from_list(node_hit_states), cases_in_space=Cases.from_list(node_hit_face_states)
+)
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
 
@@ -141,7 +156,7 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(id="hard.search", cases=Cases.from_list(search_states))
+@_define(id="hard.search", cases=Cases.from_list(search_states), cases_in_space=Cases.from_list(search_face_states))
 def hard_search(case: Case, subject: Subject) -> Measurement:
     """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
 

@@ -17,7 +17,7 @@ from contactverif.contract.cases import Cases
 from contactverif.contract.measurement import Finding, Measurement
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Subject
-from contactverif.problems.long_states import long_states
+from contactverif.problems.long_states import long_face_states, long_states
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases
 from contactverif_properties.shared.applicability import promise_exact_tangent
@@ -76,12 +76,13 @@ def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     return measure_blocks(case, subject)
 
 
-@_define(id="tangent.long", cases=Cases.from_list(long_states))
+@_define(id="tangent.long", cases=Cases.from_list(long_states), cases_in_space=Cases.from_list(long_face_states))
 def tangent_long(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent of a long interface is the derivative of the residual.
 
     **Question.** Six interfaces have 104 to 200 segments on one side: wavy, graded, a ring, three chains, many segments
-    on few, and few on many. Is each block of the tangent the derivative of the residual?
+    on few, and few on many. In space three have 128 triangles. Is each block of the tangent the derivative of the
+    residual?
 
     **Why it matters.** Some errors need size: a table that is too short, a block of rows that is forgotten behind the
     hundredth segment, a wrong entry among a hundred thousand. A norm of the whole matrix loses that entry, and the more

@@ -5,6 +5,7 @@ from functools import cache
 import pytest
 from mutate import Mutant
 from subjects import load_subject
+from wrong_hard_surfaces import MUTANTS as HARD
 from wrong_surface_contact import MUTANTS as CONTACT
 from wrong_surfaces import MUTANTS as CELLS
 from wrong_surfaces import RIGHT
@@ -12,8 +13,9 @@ from wrong_surfaces import RIGHT
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
 from contactverif.sampling.draw import Sampling, draw_cases
 
-MUTANTS = CELLS + CONTACT
+MUTANTS = CELLS + CONTACT + HARD
 EXAMPLES = 60
+FEW = {"tangent.long": 1}  # States of a right formulation, where it is not 4.
 
 
 @cache
@@ -24,8 +26,11 @@ def properties_in_space() -> dict[str, Property]:
 
 @cache
 def cases(question: Property) -> tuple[Case, ...]:
+    named = question.cases(None)
+    if isinstance(named, tuple):
+        return named
     key = Sampling(examples=EXAMPLES, seed=0).key(question)
-    return draw_cases(question.cases(None), seed=key, examples=EXAMPLES).cases
+    return draw_cases(named, seed=key, examples=EXAMPLES).cases
 
 
 def first_accusation(question: Property, subject: Subject, examples: int) -> str:
@@ -57,4 +62,4 @@ def test_every_property_in_space_has_its_mutant() -> None:
 def test_no_right_formulation_is_accused(name: str) -> None:
     subject = load_subject(name)
     for question in properties_in_space().values():
-        assert not first_accusation(question, subject, 4), question.id
+        assert not first_accusation(question, subject, FEW.get(question.id, 4)), question.id

@@ -26,7 +26,8 @@ STATED_GAP_REASON = (
 SEGMENT_TOLERANCE = "u(8X/min(g, ℓ) + 4N)"
 SEGMENT_REASON = (
     "A gap is a difference of coordinates, each rounded to uX, and N forces are summed. "
-    "Rounding the ends of a segment turns the segment and its force by uX/ℓ."
+    "Rounding the ends of a segment turns the segment and its force by uX/ℓ. "
+    "8 is the number of coordinates of two segments; two triangles have 18, two quadrilaterals 24."
 )
 COORDINATE_ROUNDING = 64 * UNIT_ROUNDOFF  # A motion rounds each coordinate a few times; this times X bounds the move.
 
@@ -80,9 +81,11 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
     The residual (n_unknowns,) tells the mean penetration. Where nothing is in contact the value is 0 or infinite, and
     any tolerance serves.
     """
+    interface = case.interface
+    coordinates: int = interface.dim * (interface.slave.faces.shape[1] + interface.master.faces.shape[1])
     penetration = mean_penetration(case, forces)
     reach = min(penetration, case.resolution) if penetration > 0 else case.resolution
-    return UNIT_ROUNDOFF * (8 * largest / reach + 4 * case.n_segments)
+    return UNIT_ROUNDOFF * (coordinates * largest / reach + 4 * case.n_segments)
 
 
 def ratio(part: float, whole: float) -> float:

@@ -1,0 +1,76 @@
+"""Formulations on faces that are wrong far away, at a node, in touch, beside another surface, or on many faces."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from mutate import Mutant, wrap
+from wrong_surface_contact import NTS_AR
+from wrong_surfaces import STS, changes_points
+
+from contactverif import Pairing
+from contactverif_surfaces.cell_points import CellPoints, SlaveView
+
+LONGEST = 100  # More nodes than a random mesh has.
+
+
+def _lose_nodes_on_edges(right: Any, interface: Any, z: Any) -> Pairing:
+    """Take a foot on an edge of the master for one on neither face."""
+    pairing = right(interface, z)
+    points = NTS_AR(penalty=1.0).contact_points(interface, pairing, z)
+    home = pairing["home"].copy()
+    home[np.flatnonzero(home >= 0)[points.master_shape.min(axis=1) < 1e-12]] = -1
+    return Pairing({"home": home, "active": pairing["active"] & (home >= 0)})
+
+
+def _see_near_faces(right: Any, interface: Any, z: Any) -> Pairing:
+    """Take a penetration of two fifths of an edge or more for the other side of the body."""
+    pairing = right(interface, z)
+    points = NTS_AR(penalty=1.0).contact_points(interface, pairing, z)
+    corners = z.reshape(-1, 3)[interface.slave.faces]
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    active = pairing["active"].copy()
+    active[np.flatnonzero(pairing["home"] >= 0)] &= points.gap > -0.4 * edge
+    return Pairing({"home": pairing["home"], "active": active})
+
+
+def _round_far_away(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Form points at sixteen times their distance from the origin."""
+    far = 16 * np.abs(z).max()
+    return right(interface, pairing, (z + far) - far)
+
+
+def _look_at_nearest_node(right: Any, interface: Any, z: Any) -> Pairing:
+    """Keep a cell only if its master face has the node that is nearest to the middle of the slave face."""
+    pairing, x = right(interface, z), z.reshape(-1, 3)
+    middles = x[interface.slave.faces].mean(axis=1)
+    nodes = np.unique(interface.master.faces)
+    nearest = nodes[np.linalg.norm(middles[:, None] - x[nodes], axis=-1).argmin(axis=1)]
+    near = (interface.master.faces[pairing["master_face"]] == nearest[pairing["slave_face"]][:, None]).any(axis=1)
+    return Pairing({name: array[near] for name, array in pairing.items()})
+
+
+def _press_in_touch(points: CellPoints, view: SlaveView) -> CellPoints:
+    """Take a gap of 1e-12 edges for none."""
+    edge = view.slave[..., 1, :] - view.slave[..., 0, :]
+    return replace(points, gap=points.gap - 1e-12 * np.sqrt((edge * edge).sum(axis=-1))[..., None])
+
+
+def _forget_rows(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    tangent = right(interface, pairing, z).toarray()
+    tangent[3 * LONGEST :] = 0.0
+    return tangent
+
+
+MUTANTS = (
+    Mutant("node lost on an edge of the master", "hard.node-hit",
+           lambda *, penalty: wrap(penalty, NTS_AR, pair=_lose_nodes_on_edges)),
+    Mutant("gap formed far away", "hard.offset", lambda *, penalty: wrap(penalty, STS, residual=_round_far_away)),
+    Mutant("deep nodes taken for the other side", "hard.deep",
+           lambda *, penalty: wrap(penalty, NTS_AR, pair=_see_near_faces)),
+    Mutant("faces sought at the nearest node alone", "hard.search",
+           lambda *, penalty: wrap(penalty, STS, pair=_look_at_nearest_node)),
+    Mutant("a touch that presses", "hard.touch", changes_points(_press_in_touch)),
+    Mutant("rows of the tangent forgotten behind the hundredth node", "tangent.long",
+           lambda *, penalty: wrap(penalty, STS, tangent=_forget_rows)),
+)  # fmt: skip
