@@ -201,16 +201,24 @@ class CheckedFormulation:
         return self._counts[id(interface)][1]
 
     def _count_multipliers(self, interface: Interface) -> int:
-        dimensions = self._traits.abilities.dimensions
-        if interface.dim not in dimensions:
-            needed = f"{' or '.join(map(str, dimensions))}, which the formulation takes"
-            raise MisuseError("interface", f"nodes with {interface.dim} coordinates", needed)
+        self._check_kind(interface)
         count = self._call_n_multipliers(interface)
         if (count > 0) is not (self._traits.rules.enforcement == "multiplier"):
             needed = '"multiplier"' if count else "n_multipliers(interface) ≥ 1"
             trait = f"{count} of them, with the trait enforcement {self._traits.rules.enforcement!r}"
             raise ContractError(f"n_multipliers: {trait}; needed {needed}")
         return count
+
+    def _check_kind(self, interface: Interface) -> None:
+        """Refuse what the formulation does not take: a kernel may read past the corners of a face that it expects."""
+        abilities = self._traits.abilities
+        if interface.dim not in abilities.dimensions:
+            needed = f"{' or '.join(map(str, abilities.dimensions))}, which the formulation takes"
+            raise MisuseError("interface", f"nodes with {interface.dim} coordinates", needed)
+        for side in (interface.slave, interface.master) if interface.dim != PLANE else ():
+            if (corners := side.faces.shape[1]) not in abilities.faces:
+                needed = f"{' or '.join(map(str, abilities.faces))}, which the formulation takes"
+                raise MisuseError("interface", f"faces with {corners} corners", needed)
 
     def _call_n_multipliers(self, interface: Interface) -> int:
         count = _call_plugin("n_multipliers", getattr, self.plugin, "n_multipliers", None)

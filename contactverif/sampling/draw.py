@@ -81,8 +81,12 @@ class Sampling:
 
 
 def strategy_name(question: Property) -> str:
-    """Return the stored name of the strategy of a property (`random_source`), or else the id of the property."""
-    return name_of_source(question.cases) or question.id
+    """Return the stored name of the strategy of a property (`random_source`), or else the id of the property.
+
+    A run draws the cases of a name once, and those in space are others.
+    """
+    in_space = question.cases is question.cases_in_space
+    return name_of_source(question.cases) or f"{question.id}{' in space' if in_space else ''}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.arrays import Array, FloatArray, IntArray
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty
@@ -41,8 +43,7 @@ class CentreSprings:
         """Compute the forces (..., n_unknowns)."""
         pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, interface.n_nodes, 3)
         forces, room, shapes = np.zeros_like(x), np.empty(ROOM, x.dtype), np.empty(6, x.dtype)
-        nodes = pairs.slave_nodes, pairs.master_nodes
-        add_forces(forces, room, shapes, x, nodes, pairs.codes, pairing["active"], self.penalty)
+        add_forces(forces, room, shapes, x, _nodes(pairs), pairs.codes, pairing["active"], self.penalty)
         return forces.reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
@@ -54,8 +55,7 @@ class CentreSprings:
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
         pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, 3)
-        nodes = pairs.slave_nodes, pairs.master_nodes
-        forces, tangent = forces_and_tangent(x, nodes, pairs.codes, pairing["active"], self.penalty)
+        forces, tangent = forces_and_tangent(x, _nodes(pairs), pairs.codes, pairing["active"], self.penalty)
         return forces.reshape(-1), tangent
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
@@ -66,12 +66,19 @@ class CentreSprings:
         return report_points(pairs, points, pairs.corners_at(z), pressure, active)
 
 
+def _nodes(pairs: FacePairs) -> tuple[IntArray, IntArray]:
+    """Return the nodes of both faces of each cell (n_cells, 3); the kernels would read past other faces."""
+    for nodes in (pairs.slave_nodes, pairs.master_nodes):
+        if nodes.shape[1] != TRIANGLE:
+            raise MisuseError("interface", f"faces with {nodes.shape[1]} corners", "triangles")
+    return pairs.slave_nodes, pairs.master_nodes
+
+
 def _points(pairs: FacePairs, z: FloatArray) -> CellPoints:
     """Return the points of all cells, one each."""
     n_cells = len(pairs.codes)
     points, shapes = np.empty((n_cells, 5)), np.empty((n_cells, 6))
-    nodes = pairs.slave_nodes, pairs.master_nodes
-    write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), nodes, pairs.codes)
+    write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), _nodes(pairs), pairs.codes)
     slave, master = shapes[:, None, :3], shapes[:, None, :2:-1]
     return CellPoints(slave, master, points[:, 1:2], points[:, :1], points[:, 2:])
 

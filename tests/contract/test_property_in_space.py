@@ -3,10 +3,12 @@
 import pickle
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from subjects import load_property, load_subject
 
-from contactverif import MisuseError, Property, Subject, Traits, Verdict, load_properties, named_case
+import contactverif_surfaces
+from contactverif import Interface, MisuseError, Property, Subject, Traits, Verdict, load_properties, named_case
 from contactverif.contract.cases import name_of_source
 from contactverif.run.run import run
 
@@ -46,11 +48,23 @@ def test_quadrilaterals_have_a_source_of_their_own() -> None:
 
 
 def test_cases_in_space_have_stored_names_of_their_own() -> None:
-    both = [question for question in loaded_properties() if question.cases is not question.cases_in_space]
+    drawn = [question for question in loaded_properties() if not question.cases.is_list]
+    both = [question for question in drawn if question.cases is not question.cases_in_space]
     plane = {name_of_source(question.cases) for question in both}
-    space = {name_of_source(question.cases_in_space) for question in loaded_properties() if question.cases_in_space}
+    space = {name_of_source(question.cases_in_space) for question in drawn if question.cases_in_space}
     assert "" not in space
     assert not plane & space
+
+
+def test_lists_in_space_are_asked_beside_those_of_the_plane() -> None:
+    questions = [load_property(name) for name in ("hard.deep", "hard.search")]
+    rows = run([load_subject("vts-ppt"), load_subject("vts-cell-3d")], questions, examples=1, seed=1).rows
+    assert {(row.formulation, row.property_id): row.judged for row in rows} == {
+        ("vts-ppt", "hard.deep"): 6,
+        ("vts-ppt", "hard.search"): 14,
+        ("vts-cell-3d", "hard.deep"): 6,
+        ("vts-cell-3d", "hard.search"): 15,
+    }
 
 
 def test_a_question_about_the_plane_alone_is_not_applicable_in_space() -> None:
@@ -101,6 +115,16 @@ def test_an_interface_of_another_dimension_is_refused_before_a_plugin_sees_it(
         MisuseError, match=f"interface: found nodes with {dimension} coordinates; needed {5 - dimension}"
     ):
         load_subject(name).for_case(state).pair(state.interface, state.z)
+
+
+def test_faces_that_a_formulation_does_not_take_are_refused_before_a_kernel_reads_past_their_corners() -> None:
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    interface = Interface.from_faces(square - [0, 0, 0.1], [[3, 2, 1, 0]], square, [[0, 1, 2, 3]])
+    cells = load_subject("vts-cell-3d").with_penalty(1.0)
+    with pytest.raises(MisuseError, match="interface: found faces with 4 corners; needed 3, which the formulation"):
+        cells.pair(interface, interface.nodes.reshape(-1))
+    with pytest.raises(MisuseError, match="interface: found faces with 4 corners; needed triangles"):
+        contactverif_surfaces.vts_cell_3d(penalty=1.0).pair(interface, interface.nodes.reshape(-1))
 
 
 def test_a_witness_of_another_dimension_is_refused_by_its_name() -> None:

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from readable_cells import centre_points
 from subjects import load_property, load_subject
-from wrong_surfaces import CELL, STS, by_rule
+from wrong_surfaces import STS, by_rule
 
 from contactverif import Case, Subject
 from contactverif.sampling.draw import draw_cases
@@ -56,7 +57,7 @@ def test_more_points_are_nearer_to_exact_on_skewed_quadrilaterals() -> None:
     No quadrature of overlaps is exact there, so no property asks for it.
     """
     cases = draw_cases(skewed_surface_cases(faces=(4,)), seed="errors", examples=40).cases
-    rules = {6: STS, 3: by_rule(partial(gauss_points, n_points=3)), 1: CELL}
+    rules = {6: STS, 3: by_rule(partial(gauss_points, n_points=3)), 1: by_rule(centre_points)}
     worst = {count: max(error(case, make) for case in cases) for count, make in rules.items()}
     print(worst)
     assert worst[6] < worst[3] / 4 < worst[1] / 16

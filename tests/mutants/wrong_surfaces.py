@@ -293,7 +293,7 @@ MUTANTS = (
     Mutant("cells said to be symmetric", "symmetric", says(STS, symmetric=True)),
     Mutant("cells said to be unbiased", "swap", says(CELL, unbiased=True)),
     Mutant("quarters said to balance past the border", FORCE, says(QUARTERS, conserves_force=True)),
-    Mutant("one point a cell said to be exact on rectangles", TRANSMISSION, says(CELL, faces=(3, 4))),
+    Mutant("one point a cell said to be exact on rectangles", TRANSMISSION, by_rule(centre_points)),
     Mutant("layers of the master touched at any distance", "remote",
            lambda *, penalty: wrap(penalty, STS, pair=_touches_all_layers)),
     Mutant("nodes said to pass the patch test", TRANSMISSION,
