@@ -46,8 +46,8 @@ from contactverif.plugins.registry import load_properties, property_ids
 from contactverif.run.run import run
 
 SEED = 0  # The profile `ci` has the same, so these are the first cases of `contactverif verify --all --profile ci`.
-EXAMPLES, EXAMPLES_SLOW = 100, 40  # `tox -e trust` asks with further seeds.
-SLOW = ("continuity", "nodal-push", "purity")  # Properties that solve bodies are slow, too.
+EXAMPLES, EXAMPLES_SLOW = 40, 16  # `tox -e trust` asks many more, with further seeds.
+SLOW = ("continuity", "purity")  # Properties that solve bodies are slow, too.
 EXAMPLES_FAILING = 10  # One failure decides a row. Its witness fails too, as the statement needs.
 
 
@@ -109,7 +109,8 @@ def _complaint(row: Row, name: str, property_id: str) -> str:
     promises = (None, verdict is Verdict.PASS) if unstated else (verdict is Verdict.PASS,)
     if row.promise not in promises:
         return f"the promise is {row.promise}"
-    if row.planned != planned or row.judged < 0.9 * planned:
+    least = 0.9 if verdict is Verdict.PASS else 0.5  # One failure decides a row, and few cases vary.
+    if row.planned != planned or row.judged < least * planned:
         return f"{row.judged} of {row.planned} judged, of {planned}"
     return ""
 
