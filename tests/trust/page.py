@@ -5,6 +5,7 @@ from collections import defaultdict
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from face_page import FILES, faces
 from option_names import is_pair
 from options import SEED, SLOW
 from stranger_cases import EXAMPLES, SEEDS, UNSTATED
@@ -21,6 +22,7 @@ _TABLES = (
     "smallest_cases.csv",
     "smallest_errors.csv",
     "curved_damage.csv",
+    *FILES,
 )
 COUNTS = ("cases", "accusations", "undecided", "idle")
 
@@ -355,7 +357,7 @@ def page() -> str:
         f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in _TABLES
     )
     return INTRODUCTION.format(commits=commits) + "\n".join(
-        [campaign(), strangers(), options(), kills(), unseen(), small_cases(), smallest(), damage()]
+        [campaign(), strangers(), options(), kills(), faces(), unseen(), small_cases(), smallest(), damage()]
     )
 
 
