@@ -8,8 +8,8 @@ import sys
 from functools import cache
 
 from campaign import NUMBERS, Count
-from face_page import FACES, KILLS
 from face_killing import MUTANTS, first_accused, properties_in_space
+from face_page import FACES, KILLS
 from tables import fill
 
 from contactverif import Case, Subject, load_formulation
