@@ -317,10 +317,10 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
             axes.loglog(n, bound, color="gray", linestyle=":", label=f"writing the tangent of {name}")
     unit = "face" if names[0] in ON_FACES else "segment"
     axes.set_xlabel(f"slave {unit}s N")
-    axes.set_ylabel(f"search + residual + tangent, µs a slave {unit}")
+    axes.set_ylabel(f"search + residual + tangent, µs a slave {unit}", fontsize=9)
     axes.set_title("Cost of one evaluation, one core (band: least to greatest)", fontsize=10)
     axes.grid(which="major", alpha=0.3)
-    figure.legend(fontsize=8, ncols=4, loc="outside lower center")
+    figure.legend(fontsize=8, ncols=3, loc="outside lower center")
     figure.savefig(path, metadata={"Date": None})
 
 

@@ -72,6 +72,28 @@ def test_the_table_of_the_race_is_that_of_the_file() -> None:
     assert PEER in names
 
 
+def test_the_table_of_the_race_on_faces_is_that_of_the_file() -> None:
+    race = {(row["formulation"], row["segments"]): row for row in rows("faces.csv")}
+    names = list(dict.fromkeys(row["formulation"] for row in rows("faces.csv")))
+    *ours, (peer, *_, peers_time, peers_bytes) = table("| on faces |")
+    assert len(ours) == len(names) - 1
+    assert [peer] == [PEER]
+    for name, (words, *ratios, time, size) in zip(names, ours, strict=False):
+        assert words.replace("`", "") == name
+        for cell, segments in zip(ratios, ("1000", "10000", "100000"), strict=True):
+            median, least, greatest = (
+                f"{float(race[name, segments][f'faster{each}']):.1f}"
+                for each in (", median", " than ipctk, least", ", greatest")
+            )
+            assert cell == f"{median} ({least} to {greatest})"
+        assert time == f"{float(race[name, '10000']['median / µs']):.1f}"
+        assert size == f"{float(race[name, '100000']['peak / bytes']):.0f}"
+    ratio = float(race[names[0], "1000000"]["median / µs"]) / float(race[names[0], "10000"]["median / µs"])
+    assert f"to the power {1 + log(ratio) / log(100):.2f}." in HOW_TO
+    assert peers_time == f"{float(race[names[-1], '10000']['median / µs']):.1f}"
+    assert peers_bytes == f"{float(race[names[-1], '100000']['peak / bytes']):.0f}"
+
+
 def test_the_table_of_fine_waves_is_that_of_the_file() -> None:
     expected = [[row["formulation"], row["forces"], row["systems"]] for row in rows("fine_waves.csv")]
     assert table("| | error of the forces |") == expected[: len(table("| | error of the forces |"))]
