@@ -17,8 +17,10 @@ are caught by that property alone.
 
 
 def faces() -> str:
-    """Return the part of the page."""
+    """Return the part of the page, nothing before the campaign has run."""
     rows, kills = read(FACES), read(KILLS)
+    if not (rows and kills):
+        return ""
     groups = defaultdict[str, list[dict[str, str]]](list)
     for row in rows:
         groups[row["formulation/property"].partition("/")[0]].append(row)

@@ -18,7 +18,7 @@ from contactverif.sampling.draw import draw_cases
 
 FORMULATIONS = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "nts-3d", "nts-ar-3d")
 EXAMPLES = 700  # Random cases of each property and formulation.
-MEANT, OTHERS = 300, 20  # Cases of the property that is meant to catch a mutant, and of each other one.
+MEANT, OTHERS = 300, 5  # Cases of the property that is meant to catch a mutant, and of each other one.
 LONG = ("tangent.long", "hard.touch")  # Properties that are asked about mutants that are meant for them alone.
 
 

@@ -356,9 +356,8 @@ def page() -> str:
     commits = ", ".join(
         f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in _TABLES
     )
-    return INTRODUCTION.format(commits=commits) + "\n".join(
-        [campaign(), strangers(), options(), kills(), faces(), unseen(), small_cases(), smallest(), damage()]
-    )
+    parts = [campaign(), strangers(), options(), kills(), faces(), unseen(), small_cases(), smallest(), damage()]
+    return INTRODUCTION.format(commits=commits) + "\n".join(filter(None, parts))
 
 
 def draw() -> None:
