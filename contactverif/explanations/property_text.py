@@ -55,6 +55,9 @@ def promised_by(question: Property) -> str:
     return "no trait"
 
 
+_BOTH = "in the plane, and in space, where a segment is a face"
+
+
 def _words_of_traits(values: Mapping[str, object]) -> str:
     return " with ".join(f"`{name}={values[name]!r}`" for name in sorted(values))
 
@@ -69,7 +72,7 @@ def property_text(question: Property) -> str:
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     facts = [
         ("Cases", cases),
-        ("Dimensions", "in the plane" if question.cases_in_space is None else "in the plane and in space"),
+        ("Dimensions", "in the plane" if question.cases_in_space is None else _BOTH),
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
     ]

@@ -14,7 +14,7 @@ def test_the_list_and_an_explanation_say_dimensions(ask: Ask) -> None:
     assert " nts 2-D fails the flat patch test" in words
     assert " hard.c 2-D Cases C" in words
     assert " balance.force 2-D, 3-D The forces" in words
-    assert "Dimensions: in the plane and in space" in ask("explain", "balance.force").out
+    assert "Dimensions: in the plane, and in space, where a segment is a face" in ask("explain", "balance.force").out
     assert "Dimensions: in the plane\n" in ask("explain", "hard.c").out
 
 
