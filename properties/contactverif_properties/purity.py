@@ -18,11 +18,10 @@ from contactverif.problems.named_states import named_case
 from contactverif.strategies.surfaces import surface_cases
 from contactverif_properties.shared import interleaved_calls
 from contactverif_properties.shared.any_state import any_cases, prepare_state
-from contactverif_properties.shared.roundoff import ratio
+from contactverif_properties.shared.roundoff import pair_coordinates, ratio, slenderness
 
 NEAR = 2.0**-12  # The way to another state in a batch: near, and yet twelve binary digits of its answers differ.
-BATCH_ROUNDINGS = 8.0  # A batch may round a position a few times where a loop does not.
-TANGENT_ROUNDINGS = 4 * BATCH_ROUNDINGS  # An entry of a tangent has four factors, each with roundings of its own.
+FACTORS = 4  # An entry of a tangent has four factors, each with roundings of its own.
 REASON = "The same operations on the same numbers give the same bits."
 REPEATED = Quantity("entries that change in a repeated call", "0", REASON)
 REORDERED = Quantity("entries that change with the order of calls", "0", REASON)
@@ -91,8 +90,11 @@ def purity(case: Case, subject: Subject) -> Measurement:
     instance are what they were. A batch may round otherwise, as if nodes had moved by uX. That changes a force by uX (k
     + |R|/ℓ): k is the stiffness, and a segment turns by uX/ℓ. Summing N forces adds uN|R|. Each state of the batch has
     its own |R|, and k is the larger of ε̂L and the change of the residual from one state to the other over the way
-    between them. A pairing that differs, or an interface that was changed, fails in words. A pairing with a handle is
-    made twice at one state, with another state in between: it must have the same entries and give the same answers.
+    between them. Each coordinate of two segments may be rounded, so the tolerance is 8u; two triangles have 18. In
+    space |R|/ℓ counts as often as a face is slender, by its longest edge over its least height: places along it are
+    rounded by so much more. A pairing that differs, or an interface that was changed, fails in words. A pairing with a
+    handle is made twice at one state, with another state in between: it must have the same entries and give the same
+    answers.
 
     A plugin that lives in a process of its own is asked in a second process too, which differs in what no answer may
     depend on: the seed of hashes, and the state that was asked first. The pairing is the same, and the residual is held
@@ -143,7 +145,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
         TANGENT.check(changes["tangent"], 0.0),
         POINTS.check(changes["contact_points"], 0.0),
     ]
-    bound, bound_of_tangent = (count * UNIT_ROUNDOFF for count in (BATCH_ROUNDINGS, TANGENT_ROUNDINGS))
+    bound = pair_coordinates(state) * UNIT_ROUNDOFF
     forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
     if subject.traits.rules.enforcement == "penalty":
         broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
@@ -169,7 +171,7 @@ def purity(case: Case, subject: Subject) -> Measurement:
         numbers += [
             IN_ONE_CALL.check(changes[interleaved_calls.BOTH], 0.0),
             ONE_RESIDUAL.check(difference, bound),
-            ONE_TANGENT.check(of_tangents, bound_of_tangent),
+            ONE_TANGENT.check(of_tangents, FACTORS * bound),
         ]
     if (_fingerprint(interface), _fingerprint(other)) != before:
         broken.append("the interface was changed")
@@ -246,11 +248,12 @@ def _compare_first(first: FirstAnswers, subject: Subject, random: np.random.Gene
     forces = ask("residual")
     then = np.array([first.residual, forces[1]])
     difference = compare_batch(case, near, forces, np.array([then, then[::-1]]))
-    numbers = [FIRST_RESIDUAL.check(difference, BATCH_ROUNDINGS * UNIT_ROUNDOFF)]
+    bound = pair_coordinates(case) * UNIT_ROUNDOFF
+    numbers = [FIRST_RESIDUAL.check(difference, bound)]
     if first.tangent is not None:
         tangents = ask("tangent")
         difference = compare_tangents(case, near, tangents, np.array([first.tangent, tangents[1]]))
-        numbers.append(FIRST_TANGENT.check(difference, TANGENT_ROUNDINGS * UNIT_ROUNDOFF))
+        numbers.append(FIRST_TANGENT.check(difference, FACTORS * bound))
     return numbers
 
 
@@ -277,7 +280,8 @@ def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> 
     stiffness = max(case.penalty * case.slave_measure, slope)  # The slope counts where the law is stiffer than ε̂.
     largest = np.abs(forces).max(axis=-1)
     # Each state has its own size: where one of the two just touches, its forces say nothing about those of the other.
-    moved = case.largest_coordinate * (stiffness + largest / case.resolution) + case.n_segments * largest
+    turned = slenderness(case) * largest / case.resolution
+    moved = case.largest_coordinate * (stiffness + turned) + case.n_segments * largest
     differences = np.maximum(np.abs(batch[0] - forces), np.abs(batch[1] - forces[::-1])[::-1]).max(axis=-1)
     return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
 
@@ -290,7 +294,8 @@ def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_
     way = float(np.abs(near - case.z).max())
     slope = float(np.abs(tangents[1] - tangents[0]).max()) / way if way > 0 else 0.0
     largest = np.abs(tangents).max(axis=(1, 2))
-    moved = case.largest_coordinate * np.maximum(slope, largest / case.resolution) + case.n_segments * largest
+    turned = slenderness(case) * largest / case.resolution
+    moved = case.largest_coordinate * np.maximum(slope, turned) + case.n_segments * largest
     differences = np.abs(in_one_call - tangents).max(axis=(1, 2))
     return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array
 from contactverif.contract.case import ACTIVATION, Case
+from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Quantity
 from contactverif.contract.traits import Traits
 
@@ -81,11 +82,29 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
     The residual (n_unknowns,) tells the mean penetration. Where nothing is in contact the value is 0 or infinite, and
     any tolerance serves.
     """
-    interface = case.interface
-    coordinates: int = interface.dim * (interface.slave.faces.shape[1] + interface.master.faces.shape[1])
     penetration = mean_penetration(case, forces)
     reach = min(penetration, case.resolution) if penetration > 0 else case.resolution
-    return UNIT_ROUNDOFF * (coordinates * largest / reach + 4 * case.n_segments)
+    return UNIT_ROUNDOFF * (pair_coordinates(case) * largest / reach + 4 * case.n_segments)
+
+
+def pair_coordinates(case: Case) -> int:
+    """Return the number of coordinates of a slave and a master face, each of which is rounded: 8 of two segments."""
+    interface = case.interface
+    return int(interface.dim * (interface.slave.faces.shape[1] + interface.master.faces.shape[1]))
+
+
+def slenderness(case: Case) -> float:
+    """Return the longest edge of a face over its least height, the largest of both sides; 1 in the plane.
+
+    Rounding its corners moves a place along a face by so many times uX, as it does where two edges cross at a small
+    angle. So shape functions change by uX/ℓ times that.
+    """
+    interface, largest = case.interface, 1.0
+    for side in (interface.slave, interface.master) if interface.dim != PLANE else ():
+        corners = case.positions[side.faces]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        largest = max(largest, float((edges / side.heights(case.positions)).max()))
+    return largest
 
 
 def ratio(part: float, whole: float) -> float:
