@@ -290,11 +290,12 @@ def lacks_witness(subject: Subject, question: Property, sampling: Sampling) -> b
 
 
 def _traits_of_promise(question: Property, subject: Subject) -> str:
-    """Return the traits from which a promise to pass follows, in words."""
+    """Return the traits from which a promise to pass follows, in words; of a table, as published forces, its name."""
     if not question.promise(subject.traits):
         return ""
     traits = traits_behind(question.promise, subject.traits)
-    return ", ".join(f"{name}={value!r}" for name, value in traits.items() if value is not False)
+    stated = {name: value for name, value in traits.items() if value is not False}
+    return ", ".join(name if isinstance(value, Mapping) else f"{name}={value!r}" for name, value in stated.items())
 
 
 def row_of_case(question: Property, subject: Subject, outcome: Outcome) -> Row:

@@ -286,3 +286,10 @@ def test_the_report_names_the_compiled_code_of_the_process_and_not_that_of_the_j
     names = [entry.split()[0] for entry in facts["libraries"].split("; ")]
     assert any(name.startswith("_curses") for name in names)
     assert not any("_multiarray_umath" in name for name in names)
+
+
+def test_a_row_says_by_which_traits_it_is_promised_in_the_same_words_wherever_the_plugin_lives() -> None:
+    """Found by the hostile campaign: a table of forces was written with the name of its class, which differs."""
+    for place in ("inline", "process"):
+        (row,) = verify("nts", "patch.flat.published", examples=1, isolation=place).rows
+        assert row.promised_by == "published_forces", place
