@@ -48,10 +48,10 @@ def test_quadrilaterals_have_a_source_of_their_own() -> None:
 
 
 def test_cases_in_space_have_stored_names_of_their_own() -> None:
-    drawn = [question for question in loaded_properties() if not question.cases.is_list]
-    both = [question for question in drawn if question.cases is not question.cases_in_space]
+    random = [question for question in loaded_properties() if not question.cases.is_list]
+    both = [question for question in random if question.cases is not question.cases_in_space]
     plane = {name_of_source(question.cases) for question in both}
-    space = {name_of_source(question.cases_in_space) for question in drawn if question.cases_in_space}
+    space = {name_of_source(question.cases_in_space) for question in random if question.cases_in_space}
     assert "" not in space
     assert not plane & space
 

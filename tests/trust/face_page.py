@@ -27,9 +27,9 @@ def faces() -> str:
     lines = []
     for name, members in groups.items():
         nearest = max(members, key=lambda row: float(row["nearest"]))
-        where = nearest["formulation/property"].partition("/")[2]
+        question = nearest["formulation/property"].partition("/")[2]
         counts = [f"{sum(int(row[count]) for row in members):,}" for count in COUNTS]
-        lines.append([f"`{name}`", *counts, nearest["nearest"], f"`{where}`"])
+        lines.append([f"`{name}`", *counts, nearest["nearest"], f"`{question}`"])
     cases = sorted(int(row["first case"]) for row in kills)
     text = TEXT.format(
         **{count: sum(int(row[count]) for row in rows) for count in COUNTS[:3]},

@@ -18,7 +18,7 @@ from contactverif.sampling.draw import draw_cases
 
 FORMULATIONS = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "nts-3d", "nts-ar-3d")
 EXAMPLES = 700  # Random cases of each property and formulation.
-MEANT, OTHERS = 300, 5  # Cases of the property that is meant to catch a mutant, and of each other one.
+INTENDED, OTHERS = 300, 5  # Cases of the property that is meant to catch a mutant, and of each other one.
 LONG = ("tangent.long", "hard.touch")  # Properties that are asked about mutants that are meant for them alone.
 
 
@@ -44,11 +44,11 @@ def kill(name: str) -> list[str]:
     subject = Subject(mutant.name, mutant.make)
     first, others = "", []
     for property_id, question in properties_in_space().items():
-        meant = property_id == mutant.caught_by
-        if property_id in LONG and not meant:
+        intended = property_id == mutant.caught_by
+        if property_id in LONG and not intended:
             continue
-        number = first_accused(question, subject, MEANT if meant else OTHERS)[0]
-        if meant:
+        number = first_accused(question, subject, INTENDED if intended else OTHERS)[0]
+        if intended:
             first = str(number)
         elif number:
             others.append(property_id)

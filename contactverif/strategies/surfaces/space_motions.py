@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.problems.flat_faces import rotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +30,8 @@ class SpaceMotion:
     @property
     def matrix(self) -> FloatArray:
         """The rotation Q (3, 3), each entry a rational rounded once."""
-        a, b, c, d = self.quaternion
-        rows = [
-            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
-        ]
-        return np.array(rows) / (a * a + b * b + c * c + d * d)
+        rows, size = rotation(self.quaternion)
+        return np.array(rows) / size
 
     @property
     def normal(self) -> FloatArray:
@@ -44,10 +40,9 @@ class SpaceMotion:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
-        a, b, c, d = self.quaternion
-        rows = self.matrix * (a * a + b * b + c * c + d * d)  # Integers again, exactly.
-        turned = points.astype(np.longdouble) @ np.round(rows).T.astype(np.longdouble)
-        moved = turned / np.longdouble(a * a + b * b + c * c + d * d) + np.array(self.shift, dtype=np.longdouble)
+        rows, size = rotation(self.quaternion)
+        turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
+        moved = turned / np.longdouble(size) + np.array(self.shift, dtype=np.longdouble)
         return (moved * self.scale).astype(np.float64)
 
 
