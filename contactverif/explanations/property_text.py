@@ -55,9 +55,6 @@ def promised_by(question: Property) -> str:
     return "no trait"
 
 
-_BOTH = "in the plane, and in space, where a segment is a face"
-
-
 def _words_of_traits(values: Mapping[str, object]) -> str:
     return " with ".join(f"`{name}={values[name]!r}`" for name in sorted(values))
 
@@ -70,9 +67,10 @@ def property_text(question: Property) -> str:
     """Return in Markdown all that is known of a property without the formulations that are installed."""
     cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
+    in_space = ", and in space, where a segment is a face" if question.cases_in_space else ""
     facts = [
         ("Cases", cases),
-        ("Dimensions", "in the plane" if question.cases_in_space is None else _BOTH),
+        ("Dimensions", f"in the plane{in_space}"),
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
     ]

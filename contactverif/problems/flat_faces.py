@@ -120,7 +120,6 @@ def flat_face_state(
     *,
     turn: Quaternion = UPRIGHT,
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    penalty: float = _PENALTY,
 ) -> Case:
     """Return a flat slave that penetrates the flat faces of a master by the same depth everywhere.
 
@@ -144,7 +143,7 @@ def flat_face_state(
         "directions": np.array(matrix, dtype=np.float64).T[:2] / size,
         "weights": _weights(below, flat, [place[:2] for place in frame], count),
     }
-    return Case(interface, nodes.reshape(-1), penalty, parameters, name=name)
+    return Case(interface, nodes.reshape(-1), _PENALTY, parameters, name=name)
 
 
 def read_frame(nodes: FloatArray, matrix: list[list[int]], size: int, origin: FloatArray) -> list[list[Fraction]]:
