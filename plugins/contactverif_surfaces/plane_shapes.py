@@ -1,8 +1,7 @@
 """Shape functions of plane faces at points of their plane: linear on a triangle, bilinear on a quadrilateral.
 
-The place of a point on a quadrilateral is the root of two quadratic equations. Newton's method starts from the middle
-and takes a fixed number of steps, so that real and complex positions take the same path. On a parallelogram one step is
-exact.
+The place of a point on a quadrilateral is the root of a quadratic equation in each coordinate, for real and complex
+positions alike.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ TRIANGLE = 3
 # A foot past the border of a face by this share of it still counts, since one on an edge between two faces must stand
 # on one of them. Shape functions are rounded by 2⁻⁵³ × how slender a face is: enough for faces of 1 : 10⁶.
 PAST_BORDER = 2.0**-30
-N_STEPS = 12  # Steps of Newton's method; on convex faces it converges to roundoff in six or fewer.
 
 
 def cross_plane(first: Array, second: Array) -> Array:
@@ -40,14 +38,22 @@ def evaluate_shapes(corners: Array, points: Array) -> Array:
 
 
 def _find_place(corners: Array, arm: Array) -> tuple[Array, Array]:
-    """Return the place (s, t) of points at an arm (..., n_points, 2) from corner 0 of quadrilaterals (..., 4, 2)."""
-    a, b, c, d = (corners[..., i : i + 1, :] for i in range(4))
-    along, up, twist = b - a, d - a, (a - b) + (c - d)
-    s = np.full(np.broadcast_shapes(arm.shape, along.shape)[:-1], 0.5, np.result_type(arm, corners))
-    t = s.copy()
-    for _ in range(N_STEPS):
-        rest = arm - s[..., None] * along - t[..., None] * up - (s * t)[..., None] * twist
-        by_s, by_t = along + t[..., None] * twist, up + s[..., None] * twist
-        area = cross_plane(by_s, by_t)
-        s, t = s + cross_plane(rest, by_t) / area, t + cross_plane(by_s, rest) / area
-    return s, t
+    """Return the place (s, t) of points at an arm (..., n_points, 2) from corner 0 of quadrilaterals (..., 4, 2).
+
+    With edges a and b at corner 0 and the twist w, a point is at p = s a + t b + s t w. Its cross product with b + s w
+    leaves s alone, that with a + t w leaves t. The root of the discriminant of both is the Jacobian at the point. It
+    has the sign of the face's area, and so has what it is added to: nothing cancels where the twist is small, or 0.
+    """
+    first, second, third, last = (corners[..., i : i + 1, :] for i in range(4))
+    a, b, w = second - first, last - first, (first - second) + (third - last)
+    area, turn = cross_plane(a, b), cross_plane(arm, w)
+    by_s, by_t = cross_plane(arm, b), cross_plane(a, arm)
+    jacobian_s = _root((area - turn) ** 2 + 4 * cross_plane(a, w) * by_s, area)
+    jacobian_t = _root((area + turn) ** 2 + 4 * cross_plane(w, b) * by_t, area)
+    return 2 * by_s / (area - turn + jacobian_s), 2 * by_t / (area + turn + jacobian_t)
+
+
+def _root(square: Array, sign: Array) -> Array:
+    """Return the root with a sign; 0 for a negative number, since far outside of a face a point has no place."""
+    root = np.sqrt(np.where(square.real > 0, square, 0.0))
+    return np.where(sign.real < 0, -root, root)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -52,6 +52,7 @@ GROWTH = Quantity(
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 HALF = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
 PULL_OF_NODE = Quantity("pull of a node", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
+Direction = tuple[float, ...]  # A unit vector, which a set holds once.
 
 
 @random_source("contactverif_properties.shared.openings.pushing_cases")
@@ -341,14 +342,14 @@ def release_some(state: Case) -> FloatArray:
     return state.multipliers * (pressing if pressing.any() else 1)
 
 
-def allowed_pushes(state: FrozenState) -> tuple[dict[int, list[FloatArray]], FloatArray]:
+def allowed_pushes(state: FrozenState) -> tuple[dict[int, set[Direction]], FloatArray]:
     """Return the directions in which each node may be pushed, and the force (n_nodes,) by which it may be pulled."""
     interface, positions = state.case.interface, state.case.positions
-    normals: dict[int, list[FloatArray]] = defaultdict(list)
+    normals: dict[int, set[Direction]] = defaultdict(set)
     allowance = np.zeros(interface.n_nodes)
     for side in (interface.slave, interface.master):
         for node, normal in _inward_normals(side, positions):
-            normals[node].append(normal)
+            normals[node].add(normal)
     if not state.has_points:
         _allow_everything(state.case, normals)
         return normals, allowance
@@ -357,7 +358,7 @@ def allowed_pushes(state: FrozenState) -> tuple[dict[int, list[FloatArray]], Flo
     return normals, allowance
 
 
-def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, FloatArray]]:
+def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, Direction]]:
     """Return (node, unit normal into its own body) of all corners of every segment or face.
 
     The body is on the left of a segment; a face lists its corners counter-clockwise, seen from outside.
@@ -368,32 +369,40 @@ def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, Flo
     else:
         inward = -turns_of(positions[side.faces]).sum(axis=1)
         inward /= np.linalg.norm(inward, axis=1)[:, None]
-    return [(node, normal) for corners, normal in zip(side.faces.tolist(), inward, strict=True) for node in corners]
+    directions = map(tuple, inward.tolist())
+    return [(node, normal) for corners, normal in zip(side.faces.tolist(), directions, strict=True) for node in corners]
 
 
-def _allow_everything(state: Case, normals: dict[int, list[FloatArray]]) -> None:
+def _turn_round(directions: Iterable[Direction]) -> set[Direction]:
+    """Return directions turned round."""
+    return {tuple(-component for component in direction) for direction in directions}
+
+
+def _allow_everything(state: Case, normals: dict[int, set[Direction]]) -> None:
     """Allow each node all normals of both surfaces that push it out of the other one."""
-    interface = state.interface
-    on_slave = [normal for _, normal in _inward_normals(interface.slave, state.positions)]
-    on_master = [normal for _, normal in _inward_normals(interface.master, state.positions)]
-    for node in range(interface.n_nodes):
-        sign = 1 if node < interface.n_slave_nodes else -1
-        normals[node] += [sign * normal for normal in on_slave] + [-sign * normal for normal in on_master]
+    on_slave, on_master = (
+        {normal for _, normal in _inward_normals(side, state.positions)}
+        for side in (state.interface.slave, state.interface.master)
+    )
+    out_of_master, out_of_slave = on_slave | _turn_round(on_master), on_master | _turn_round(on_slave)
+    for node in range(state.interface.n_nodes):
+        normals[node] |= out_of_master if node < state.interface.n_slave_nodes else out_of_slave
 
 
-def _allow_points(each: Pass, normals: dict[int, list[FloatArray]], allowance: FloatArray) -> None:
+def _allow_points(each: Pass, normals: dict[int, set[Direction]], allowance: FloatArray) -> None:
     """Add what the points of a pass allow to the nodes that carry them and to the nodes opposite."""
     directed: BoolArray = np.asarray(np.isfinite(each.points.normal).all(axis=1))
     points = each.points.select(directed)
     slave, master = each.interface.slave.faces, each.interface.master.faces
     node_of = _nodes_of_points(each.interface, points)
-    for segment, number, normal in zip(points.slave_segment.tolist(), node_of.tolist(), points.normal, strict=True):
+    directions = map(tuple, points.normal.tolist())
+    for segment, number, normal in zip(points.slave_segment.tolist(), node_of.tolist(), directions, strict=True):
         for node in _carriers(slave, segment, number):
-            normals[int(each.numbers[node])].append(normal)
+            normals[int(each.numbers[node])].add(normal)
     carriers = slave[points.slave_segment[points.slave_segment >= 0]].reshape(-1)
-    pushing = [normal for node in np.unique(each.numbers[carriers]) for normal in normals[int(node)]]
+    pushing = _turn_round(normal for node in np.unique(each.numbers[carriers]) for normal in normals[int(node)])
     for node in np.unique(each.numbers[master]):
-        normals[int(node)] += [-normal for normal in pushing]
+        normals[int(node)] |= pushing
     for segment, pull in zip(points.master_segment.tolist(), _pull_past_ends(points), strict=True):
         if segment >= 0:
             allowance[each.numbers[master[segment]]] += pull
@@ -432,9 +441,8 @@ def _pull_past_ends(points: ContactPoints) -> FloatArray:
     return np.where(counted, past * np.abs(points.pressure * points.weight), 0.0)
 
 
-def _distance_from_cone(normals: list[FloatArray], force: FloatArray) -> float:
+def _distance_from_cone(normals: set[Direction], force: FloatArray) -> float:
     """Return the distance of a force from the sums of non-negative multiples of the normals."""
     from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
 
-    different = sorted(set(map(tuple, np.array(normals).tolist())))
-    return float(nnls(np.array(different).T, force)[1]) if normals else float(np.linalg.norm(force))
+    return float(nnls(np.array(sorted(normals)).T, force)[1]) if normals else float(np.linalg.norm(force))
