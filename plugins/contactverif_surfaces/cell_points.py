@@ -39,9 +39,8 @@ class CellPoints:
         A positive force (..., n_cells, n_points) presses the faces apart.
         """
         normal = self.normal[..., None, :]
-        slave = (self.slave_shape * force[..., None]).sum(axis=-2)[..., None] * normal
-        master = (self.master_shape * force[..., None]).sum(axis=-2)[..., None] * normal
-        return slave, -master
+        slave, master = (force[..., None, :] @ shape for shape in (self.slave_shape, self.master_shape))
+        return np.swapaxes(slave, -2, -1) * normal, -np.swapaxes(master, -2, -1) * normal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,12 +64,11 @@ class SlaveView:
     def points_at(self, places: Array, weight: Array) -> CellPoints:
         """Return the points at places (..., n_cells, n_points, 2) of the plane, with their areas."""
         slave, master = evaluate_shapes(self.slave, places), evaluate_shapes(self.master, places)
-        gap = (master * self.master_height[..., None, :]).sum(axis=-1)
-        gap = gap - (slave * self.slave_height[..., None, :]).sum(axis=-1)
+        gap = (master @ self.master_height[..., None] - slave @ self.slave_height[..., None])[..., 0]
         return CellPoints(slave, master, weight, gap, self.normal)
 
     def cell_corners(self, codes: IntArray) -> Array:
-        """Return the corners (..., n_cells, MOST_CORNERS, 2) with these codes (n_cells, MOST_CORNERS, 2)."""
+        """Return the corners (..., n_cells, most_corners, 2) with these codes (n_cells, most_corners, 2)."""
         n_slave, n_master = self.slave.shape[-2], self.master.shape[-2]
         i, j = codes[..., 0], codes[..., 1]
         reverse = self.master[..., ::-1, :]
@@ -119,7 +117,7 @@ def gauss_points(view: SlaveView, codes: IntArray, n_points: int) -> CellPoints:
     following = np.roll(corners, -1, axis=-2)
     middle = np.broadcast_to(_middle(corners, following), corners.shape)
     triangles = np.stack([middle, corners, following], axis=-2)
-    points = np.einsum("qc,...tcd->...tqd", places, triangles)
+    points = places @ triangles
     count = points.shape[-3] * n_points
     area = _areas(triangles)[..., None] * weights
     return view.points_at(points.reshape(*points.shape[:-3], count, 2), area.reshape(*area.shape[:-2], count))
@@ -145,7 +143,7 @@ def _areas(triangles: Array) -> Array:
 
 def _dot(arms: Array, axis: Array) -> Array:
     """Return the products (..., n_cells, n_corners) of arms (..., n_cells, n_corners, 3) and axes (..., n_cells, 3)."""
-    product: Array = (arms * axis[..., None, :]).sum(axis=-1)
+    product: Array = (arms @ axis[..., None])[..., 0]
     return product
 
 

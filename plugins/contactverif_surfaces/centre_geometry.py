@@ -49,7 +49,7 @@ def place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes
     """Return the virtual slave node of a cell, and write all of its cell into `room`, an array of the shape `ROOM`.
 
     Its rows are e^1, e^2, n, e^0, the master corners, the corners of the cell (s, t), the slopes ∇λ_j, and what the
-    search sees. Positions x are (n_nodes, 3); the nodes of both faces are (3,), the codes (MOST_CORNERS, 2).
+    search sees. Positions x are (n_nodes, 3); the nodes of both faces are (3,), the codes (most_corners, 2).
     """
     size = _set_frame(room, x, slave)
     set_axes(room[AXES : AXES + 3], x, slave)
@@ -119,7 +119,7 @@ def crossing_of(room: Array, edge: int, j: int) -> tuple[float, float]:
 def _place_corners(room: Array, codes: IntArray) -> int:
     """Write the corners of the cell, and return how many there are."""
     n_corners = 1
-    while n_corners < MOST_CORNERS and (
+    while n_corners < len(codes) and (
         codes[n_corners, 0] != codes[n_corners - 1, 0] or codes[n_corners, 1] != codes[n_corners - 1, 1]
     ):
         n_corners += 1

@@ -18,7 +18,7 @@ class FacePairs:
 
     slave_face: IntArray  # (n_cells,)
     master_face: IntArray  # (n_cells,)
-    codes: IntArray  # (n_cells, MOST_CORNERS, 2) See `face_search`.
+    codes: IntArray  # (n_cells, most_corners, 2) See `face_search`.
     slave_nodes: IntArray  # (n_cells, n_slave_corners) The nodes of the slave face of each cell.
     master_nodes: IntArray  # (n_cells, n_master_corners)
 

@@ -72,7 +72,7 @@ class PartCells:
     """The cells of parts of slave faces with the master faces under them."""
 
     shares: FloatArray  # (n, corners of a part, n_slave_corners) The corners of the part as shares of the face's.
-    codes: IntArray  # (n, MOST_CORNERS, 2) See `face_search`.
+    codes: IntArray  # (n, most_corners, 2) See `face_search`.
     master_nodes: IntArray  # (n, n_master_corners)
     nodes: IntArray  # (n, n_corners) The nodes of the slave face, then these.
 

@@ -41,11 +41,15 @@ MIDDLE_X, MIDDLE_Y, HEIGHT, SLOPE_X, SLOPE_Y, N_COLUMNS = range(6)
 def find_cells(
     x: FloatArray, slave: IntArray, master: IntArray, slave_edge: FloatArray, master_edge: FloatArray
 ) -> tuple[IntArray, IntArray]:
-    """Return the faces (n_cells, 2) and the corners (n_cells, MOST_CORNERS, 2) of all cells, in ascending order.
+    """Return the faces (n_cells, 2) and the corners (n_cells, most_corners, 2) of all cells, in ascending order.
 
-    Positions x are (n_nodes, 3). The last corner of a cell is repeated. The edges are those of `longest_edges`.
+    Positions x are (n_nodes, 3). The last corner of a cell is repeated as often as the fullest cell has more corners.
+    The edges are those of `longest_edges`.
     """
-    return find_face_cells(x, slave, master, slave_edge, master_edge, *tree_of_faces(x, master))
+    faces, corners = find_face_cells(x, slave, master, slave_edge, master_edge, *tree_of_faces(x, master))
+    is_another = (corners[:, 1:] != corners[:, :-1]).any(axis=2)
+    most_corners = 1 + int(is_another.sum(axis=1).max(initial=0))
+    return faces, np.ascontiguousarray(corners[:, :most_corners])
 
 
 def tree_of_faces(x: FloatArray, faces: IntArray) -> Tree:

@@ -108,7 +108,7 @@ def _local_sums(n_slave: int, corners: Array, codes: IntArray) -> Array:
     """Return ∫ N_i g and ∫ N_i of each cell, (..., n_cells, 2, n_slave_corners)."""
     points = _points(n_slave, corners, codes)
     weights = np.stack([points.weight * points.gap, points.weight], axis=-2)  # (..., n_cells, 2, n_points)
-    sums: Array = np.einsum("...kq,...qa->...ka", weights, points.slave_shape)
+    sums: Array = weights @ points.slave_shape
     return sums
 
 
@@ -122,7 +122,7 @@ def _node_sums(pairs: FacePairs, z: Array, n_nodes: int) -> tuple[Array, Array]:
 def _forces(n_slave: int, corners: Array, codes: IntArray, pressure: Array) -> Array:
     """Return the residuals (..., n_cells, n_corners · 3) of pressures (..., n_cells, n_slave_corners) there."""
     points = _points(n_slave, corners, codes)
-    force = (points.slave_shape * pressure[..., None, :]).sum(axis=-1) * points.weight
+    force = (points.slave_shape @ pressure[..., None])[..., 0] * points.weight
     return flatten_pushes(*points.push(force))
 
 

@@ -15,7 +15,7 @@ from readable_cells import centre_points
 import contactverif_surfaces
 from contactverif import Pairing
 from contactverif_surfaces.cell_points import CellPoints, SlaveView, gauss_points, unit_vectors
-from contactverif_surfaces.face_search import find_cells
+from contactverif_surfaces.face_search import MOST_CORNERS, find_cells
 
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT, TANGENT, OBJECTIVITY = "balance.force", "balance.moment", "tangent.directional", "objectivity"
@@ -242,7 +242,8 @@ def _touches_all_layers(right: Any, interface: Any, z: Any) -> Any:
     parts = []
     for m in range(len(master)):
         faces, codes = find_cells(x, slave, master[m : m + 1], np.full(len(slave), np.inf), np.array([np.inf]))
-        parts.append((faces[:, 0], np.full(len(faces), m), codes))
+        all_codes = np.pad(codes, ((0, 0), (0, MOST_CORNERS - codes.shape[1]), (0, 0)), mode="edge")
+        parts.append((faces[:, 0], np.full(len(faces), m), all_codes))
     slave_face, master_face, codes = (np.concatenate(each) for each in zip(*parts, strict=True))
     view = SlaveView.of_corners(x[slave[slave_face]], x[master[master_face]])
     active = right_rule(view, codes).gap < 0
