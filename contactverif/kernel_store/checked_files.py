@@ -7,6 +7,9 @@ numba trusts its files. A truncated one raises an error where a kernel is called
 changed one may crash the process. Here each file ends with a digest. A file whose digest is wrong counts as absent: the
 kernel is compiled again and the file is replaced. A store that cannot be written is no error either.
 
+numba compiles a kernel again if its own file has changed. The code of all that it calls is stored with it, and so are
+the numbers of modules that it reads; a change of these counts here, too.
+
 Rule for the next editor: only this file knows the inside of numba's cache. Where a version of numba has another inside,
 kernels are stored as numba does it, unchecked.
 """
@@ -16,12 +19,15 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
 import numba
+import numpy as np
 from numba.core import caching
 from numba.core.caching import IndexDataCacheFile
+from numba.core.registry import CPUDispatcher
 
 _DIGEST = 32  # Bytes at the end of a file.
 
@@ -29,10 +35,19 @@ _DIGEST = 32  # Bytes at the end of a file.
 class CheckedFiles(IndexDataCacheFile):
     """The files of one kernel: an index and a file for each signature, each with its digest at the end.
 
-    `usual` are the files in the stores that are read if a signature is not in this one.
+    `function` is the Python function of the kernel. `usual` are the files in the stores that are read if a signature is
+    not in this one.
     """
 
+    function: Callable[..., Any]
     usual: tuple[CheckedFiles, ...] = ()
+
+    @cached_property
+    def stamp(self) -> tuple[Any, ...]:
+        """What is stored with the kernel, as it is when the kernel is first called: by then all it calls is there."""
+        parts: set[Any] = set()
+        _add_parts(parts, self.function)
+        return self._source_stamp, *sorted(parts)
 
     def load(self, key: Any) -> Any:
         """Return what is stored for a signature; None if there is nothing, or it is damaged."""
@@ -52,11 +67,11 @@ class CheckedFiles(IndexDataCacheFile):
     def _load_index(self) -> dict[Any, str]:
         """Return {signature: name of its file}; nothing if the index is damaged or of another source."""
         index = _unpickle(Path(self._index_path))
-        is_current = isinstance(index, tuple) and index[:2] == (self._version, self._source_stamp)
+        is_current = isinstance(index, tuple) and index[:2] == (self._version, self.stamp)
         return index[2] if is_current else {}
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
-        self._write(self._index_path, pickle.dumps((self._version, self._source_stamp, overloads)))
+        self._write(self._index_path, pickle.dumps((self._version, self.stamp, overloads)))
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), self._dump(data))  # type: ignore[no-untyped-call]
@@ -76,6 +91,7 @@ def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
     if type(files) is IndexDataCacheFile:
         files.__class__ = CheckedFiles
         assert isinstance(files, CheckedFiles)
+        files.function = function
         files.usual = _usual_files(function, files) if cast(Any, numba.config).CACHE_DIR else ()
     return dispatcher
 
@@ -87,7 +103,27 @@ def _usual_files(function: Callable[..., Any], files: Any) -> tuple[CheckedFiles
     kinds = [getattr(caching, name, None) or getattr(caching, f"_{name}") for name in names]
     locators = (kind(function, function.__code__.co_filename) for kind in kinds)
     folders = [locator.get_cache_path() for locator in locators]
-    return tuple(CheckedFiles(folder, base, stamp) for folder in folders)  # type: ignore[no-untyped-call]
+    usual = tuple(CheckedFiles(folder, base, stamp) for folder in folders)  # type: ignore[no-untyped-call]
+    for each in usual:
+        each.function = function
+    return usual
+
+
+def _add_parts(parts: set[Any], function: Callable[..., Any]) -> None:
+    """Add the names, with time and size of their files, of all functions that one calls, and the numbers it reads."""
+    code, names = function.__code__, function.__globals__
+    file = Path(code.co_filename)
+    stamp = (file.stat().st_mtime, file.stat().st_size) if file.exists() else None
+    part = f"{function.__module__}.{function.__qualname__}", repr(stamp)
+    if part in parts:
+        return
+    parts.add(part)
+    for name in code.co_names:
+        value = names.get(name)
+        if isinstance(value, CPUDispatcher):
+            _add_parts(parts, value.py_func)
+        elif isinstance(value, int | float | np.number):
+            parts.add((f"{part[0]}: {name}", repr(value)))
 
 
 def _unpickle(path: Path) -> Any:

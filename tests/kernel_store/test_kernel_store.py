@@ -4,6 +4,7 @@ import importlib.util
 import os
 import random
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,51 @@ def test_a_file_of_numba_without_a_digest_counts_as_absent(tmp_path: Path) -> No
     assert _hits(_load(tmp_path)) == 0
     (tmp_path / "stored_kernel.py").write_text(SOURCE)
     assert [_hits(_load(tmp_path)) for _ in range(2)] == [0, 1]
+
+
+CALLED = """
+from contactverif.geometry.compiled import compile_part
+
+@compile_part
+def double(a):
+    return 2 * a
+"""
+CALLING = """
+from called_kernel import double
+from contactverif.kernel_store.checked_files import compile_stored
+from number_of_kernel import NUMBER
+
+def _take_back(a):
+    return a - NUMBER // 2
+
+def add(a, b):
+    return _take_back(double(a) + b)
+
+add = compile_stored(add, nogil=True)
+_take_back = compile_stored(_take_back)
+"""
+
+
+def test_a_kernel_is_compiled_again_where_what_it_calls_or_a_number_that_it_reads_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    called, number = tmp_path / "called_kernel.py", tmp_path / "number_of_kernel.py"
+
+    def hits() -> int:
+        for name in ("called_kernel", "number_of_kernel"):
+            sys.modules.pop(name, None)
+        return _hits(_load(tmp_path))
+
+    (tmp_path / "stored_kernel.py").write_text(CALLING)
+    called.write_text(CALLED)
+    number.write_text("NUMBER = 2")
+    assert [hits() for _ in range(2)] == [0, 1]
+    called.write_text(CALLED.replace("2 * a", "a + a"))
+    importlib.invalidate_caches()
+    assert [hits() for _ in range(2)] == [0, 1]
+    number.write_text("NUMBER = 3 ")
+    assert [hits() for _ in range(2)] == [0, 1]
 
 
 def test_without_a_folder_to_write_to_kernels_are_compiled_each_time(
