@@ -47,9 +47,7 @@ def find_cells(
     The edges are those of `longest_edges`.
     """
     faces, corners = find_face_cells(x, slave, master, slave_edge, master_edge, *tree_of_faces(x, master))
-    is_another = (corners[:, 1:] != corners[:, :-1]).any(axis=2)
-    most_corners = 1 + int(is_another.sum(axis=1).max(initial=0))
-    return faces, np.ascontiguousarray(corners[:, :most_corners])
+    return faces, np.ascontiguousarray(corners)
 
 
 def tree_of_faces(x: FloatArray, faces: IntArray) -> Tree:
@@ -100,7 +98,7 @@ def find_face_cells(
     boxes: FloatArray,
 ) -> tuple[IntArray, IntArray]:
     """Return what `find_cells` does, from a tree of the master faces."""
-    room, count, longest = 4 * (len(slave) + len(master)), 0, 0.0
+    room, count, most_corners, longest = 4 * (len(slave) + len(master)), 0, 1, 0.0
     faces, corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
     on_slave, on_master = np.empty((slave.shape[1], 3)), np.empty((master.shape[1], 3))
     axes, question, members = np.empty((3, 3)), np.empty((2, 3)), np.empty(len(master), np.int64)
@@ -128,9 +126,9 @@ def find_face_cells(
                 gap = height_at(row, row[MIDDLE_X], row[MIDDLE_Y])
                 if abs(gap) <= REACH * (slave_edge[s] + master_edge[m]):
                     faces[count, 0], faces[count, 1] = s, m
-                    count += 1
+                    count, most_corners = count + 1, max(most_corners, n_corners)
         count = drop_hidden(x, master, origin, axes, faces, corners, first, count, table, on_master)
-    return faces[:count], corners[:count]
+    return faces[:count], corners[:count, :most_corners]
 
 
 @compile_part
