@@ -60,8 +60,8 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
     Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is asked only where the
     slave faces one master chain as above, since cells of averaged normals overlap where a master folds back.
 
-    In space a weight is an area, negative by rounding at most, and areas have no ends. The sums are over the area's
-    root and the diameter. Closest points add up to the slave's area where they are all its nodes.
+    In space a weight is an area, negative by rounding at most, and areas have no ends. The sums are over the diameter
+    and the longest edge, or the area's root. Closest points add up to the slave's area where they are all its nodes.
 
     **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is
     deeper than two lengths, is not measured. A nodal penalty has no areas and is not asked.

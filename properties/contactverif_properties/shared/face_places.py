@@ -175,10 +175,11 @@ def area_error(each: Pass, rule: str | None, areas: FloatArray, distant: float) 
     """Return the error of the sums of weights over the scale of areas, face by face where points lie on one.
 
     The slave faces have the areas (n_faces,) in the configuration of the trait `area`. An area is a product of lengths
-    of which each is rounded at D, so its scale is √A D.
+    of which each is rounded at D, so its scale is L D; on needles the longest edge is more than √A.
     """
     points, whole = each.points.select(name_places(each.points)), float(areas.sum())
-    scale = len(areas) * sqrt(whole) * (sqrt(whole) + distant)
+    length = max(sqrt(whole), _longest_edges(each.positions[each.interface.slave.faces]).max())
+    scale = len(areas) * length * (length + distant)
     if rule is None:
         return (float(points.weight.sum()) - whole) / scale
     if rule == CLOSEST:
