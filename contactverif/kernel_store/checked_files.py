@@ -44,7 +44,7 @@ class CheckedFiles(IndexDataCacheFile):
 
     @cached_property
     def stamp(self) -> tuple[Any, ...]:
-        """What is stored with the kernel, as it is when the kernel is first called: by then all it calls is there."""
+        """The files and numbers that a kernel is compiled from, when it is first called: by then all it calls is there."""
         parts: set[Any] = set()
         _add_parts(parts, self.function)
         return self._source_stamp, *sorted(parts)
