@@ -20,11 +20,11 @@ import hashlib
 import pickle
 from collections.abc import Callable
 from functools import cached_property
+from numbers import Number
 from pathlib import Path
 from typing import Any, cast
 
 import numba
-import numpy as np
 from numba.core import caching
 from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
@@ -44,7 +44,7 @@ class CheckedFiles(IndexDataCacheFile):
 
     @cached_property
     def stamp(self) -> tuple[Any, ...]:
-        """The files and numbers that a kernel is compiled from, when it is first called: by then all it calls is there."""
+        """The files and numbers that a kernel is compiled from. At its first call all that it calls is there."""
         parts: set[Any] = set()
         _add_parts(parts, self.function)
         return self._source_stamp, *sorted(parts)
@@ -122,7 +122,7 @@ def _add_parts(parts: set[Any], function: Callable[..., Any]) -> None:
         value = names.get(name)
         if isinstance(value, CPUDispatcher):
             _add_parts(parts, value.py_func)
-        elif isinstance(value, int | float | np.number):
+        elif isinstance(value, Number):
             parts.add((f"{part[0]}: {name}", repr(value)))
 
 
