@@ -178,7 +178,7 @@ def area_error(each: Pass, rule: str | None, areas: FloatArray, distant: float) 
     of which each is rounded at D, so its scale is L D; on needles the longest edge is more than √A.
     """
     points, whole = each.points.select(name_places(each.points)), float(areas.sum())
-    length = max(sqrt(whole), _longest_edges(each.positions[each.interface.slave.faces]).max())
+    length = max(sqrt(whole), float(_longest_edges(each.positions[each.interface.slave.faces]).max()))
     scale = len(areas) * length * (length + distant)
     if rule is None:
         return (float(points.weight.sum()) - whole) / scale
