@@ -19,7 +19,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache, cached_property
 from numbers import Number
 from pathlib import Path
 from typing import Any, cast
@@ -110,11 +110,9 @@ def _usual_files(function: Callable[..., Any], files: Any) -> tuple[CheckedFiles
 
 
 def _add_parts(parts: set[Any], function: Callable[..., Any]) -> None:
-    """Add the names, with time and size of their files, of all functions that one calls, and the numbers it reads."""
+    """Add the names of all functions that one calls, with digests of their files, and the numbers that it reads."""
     code, names = function.__code__, function.__globals__
-    file = Path(code.co_filename)
-    stamp = (file.stat().st_mtime, file.stat().st_size) if file.exists() else None
-    part = f"{function.__module__}.{function.__qualname__}", repr(stamp)
+    part = f"{function.__module__}.{function.__qualname__}", _digest_file(Path(code.co_filename))
     if part in parts:
         return
     parts.add(part)
@@ -138,3 +136,17 @@ def _unpickle(path: Path) -> Any:
         return pickle.loads(content[:-_DIGEST])
     except Exception:  # What was stored refers to a module that is not there any more.
         return None
+
+
+def _digest_file(path: Path) -> str:
+    """Return the digest of a file, which is read again where its time or size has changed; empty for no file."""
+    try:
+        status = path.stat()
+    except OSError:
+        return ""
+    return _digest_content(path, status.st_mtime_ns, status.st_size)
+
+
+@cache
+def _digest_content(path: Path, _time: int, _size: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
