@@ -3,6 +3,7 @@
 import csv
 import subprocess
 from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -36,8 +37,9 @@ def fill(
     missing = [key for key in keys if key not in lines]
     if missing:
         keep_commit(name)
-    with get_context("spawn").Pool(processes) as pool:
-        for number, (key, line) in enumerate(zip(missing, pool.imap(cells, missing), strict=True), 1):
+    # A process that dies ends this one, too; a `multiprocessing.Pool` would wait for its line for ever.
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for number, (key, line) in enumerate(zip(missing, pool.map(cells, missing), strict=True), 1):
             lines[key] = [key, *line]
             _write(name, heads, lines, keys)
             print(f"{number} of {len(missing)}: {key}", flush=True)
