@@ -10,9 +10,9 @@ COUNTS = ("cases", "accusations", "undecided", "idle")
 TEXT = """## In space
 
 Six formulations on faces were asked every property that has cases in space: {cases:,} cases, {accusations} of them
-accusations, {undecided} undecided. *Nearest* is as above, but for `hard.touch`, whose number is its limit for whoever is
-right. {mutants} formulations on faces are wrong on purpose. Each is caught by the property that is meant to: {first} by its
-first case, and all by its case {last} at the latest. {alone} are caught by that property alone.
+accusations, {undecided} undecided. *Nearest* is as above, but for `hard.touch`, whose number is its limit for whoever
+is right. {mutants} formulations on faces are wrong on purpose. Each is caught by the property that is meant to: {first}
+by its first case, and all by its case {last} at the latest. {alone} are caught by that property alone.
 
 """
 
