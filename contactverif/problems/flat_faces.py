@@ -76,6 +76,12 @@ def fan(centre: tuple[float, float], low: float, high: float, parts: int = 1) ->
     return Sheet([(*centre, 0.0), *((x, y, 0.0) for x, y in border)], faces)
 
 
+def shuffle(sheet: Sheet) -> Sheet:
+    """Return the same triangles in a random order, the same at each call."""
+    order = np.random.default_rng(len(sheet.faces)).permutation(len(sheet.faces))
+    return Sheet(sheet.points, [sheet.faces[k] for k in order])
+
+
 def plate(top: Sheet, thickness: float, below: tuple[float, float]) -> Sheet:
     """Return a closed plate under a flat sheet; its lower side is a fan around the node `below`."""
     edges = {edge for face in top.faces for edge in zip(face, [*face[1:], face[0]], strict=True)}
@@ -177,10 +183,11 @@ _MASTER = grid([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
 def node_hit_face_states() -> tuple[Case, ...]:
     """Return flat states in which a node of the master lies under a node, an edge or a centre, or a rounding beside.
 
-    Under a slave node it has four edges, two of which lie under edges of the slave, or 32.
+    Under a slave node it has four edges, two of which lie under edges of the slave, or 32. In the last states it is the
+    slave node that has 32.
     """
     cases = []
-    slave = grid([0.0, 3.0, 6.0], [0.0, 3.0, 6.0])
+    slave, below = grid([0.0, 3.0, 6.0], [0.0, 3.0, 6.0]), grid([-3.0, 3.0, 9.0], [-3.0, 3.0, 9.0])
     places = {"node": (3.0, 3.0, 1), "node, fan of 32": (3.0, 3.0, 8), "edge": (4.5, 3.0, 1)}
     places |= {"diagonal": (1.5, 1.5, 1), "centre": (2.0, 1.0, 1)}
     steps = {"on it": (0, 0), "one rounding left": (-1, 0), "one rounding right": (1, 0), "one rounding up": (0, 1)}
@@ -190,6 +197,9 @@ def node_hit_face_states() -> tuple[Case, ...]:
         rounding = 2.0**-50 if turn is UPRIGHT else 2.0**-47  # Turned nodes have up to three bits more.
         master = fan((x + step[0] * rounding, y + step[1] * rounding), -3.0, 9.0, parts)
         cases.append(flat_face_state(f"{place} {label}{turn_label}", slave, master, 2.0**-4, turn=turn))
+        if place == "node, fan of 32":
+            above = fan((x + step[0] * rounding, y + step[1] * rounding), 0.0, 6.0, parts)
+            cases.append(flat_face_state(f"slave fan of 32 {label}{turn_label}", above, below, 2.0**-4, turn=turn))
     return tuple(cases)
 
 
@@ -220,16 +230,21 @@ def deep_face_states() -> tuple[Case, ...]:
 
 @cache
 def search_face_states() -> tuple[Case, ...]:
-    """Return states on which a search is known to go wrong: the flat part is right, and something else is near."""
+    """Return states on which a search is known to go wrong: something else is near the flat part, or faces are many.
+
+    Many faces are numbered at random, as a mesh generator may do.
+    """
     big, cells = grid([0.0, 8.0], [0.0, 8.0]), grid([0.0, 2.5, 5.0, 8.0], [0.0, 4.0, 8.0])
     slave, beside = grid([3.0, 3.5, 4.0], [3.0, 3.5, 4.0]), grid([1.0, 2.0, 3.5], [2.0, 4.0, 4.5])
     lower = grid([-1.0, 3.5, 9.0], [-1.0, 3.5, 9.0], -0.75)
+    many = shuffle(grid([-0.5 + 0.75 * i for i in range(12)], [-0.25 + 0.75 * i for i in range(13)]))
     states = {
         "nearest node not on the nearest face": (slave, plate(big, 0.5, (3.5, 3.5))),
         "a thin plate": (beside, plate(cells, 0.125, (3.0, 3.0))),
         "master angle of 37°": (beside, wedge(0.75)),
         "master angle of 14°": (beside, wedge(0.25)),
         "a second body behind the first": (beside, plate(cells, 0.5, (3.0, 3.0)) + lower),
+        "264 master faces": (shuffle(grid([0.0, 1.0, 3.0, 5.0, 7.5], [0.0, 2.5, 4.0, 7.0])), many),
     }
     return tuple(
         flat_face_state(f"{name}{label}", here, master, 2.0**-5, turn=turn)

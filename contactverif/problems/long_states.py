@@ -39,16 +39,20 @@ class Part:
 
 @cache
 def long_face_states() -> tuple[Case, ...]:
-    """Return the states in space: triangles on a wave, few on many, and many on few."""
+    """Return the states in space: triangles on a wave, few on many, many on few, and nearly flat and hardly in touch.
+
+    In the last one the tangent is nearly symmetric, as it is in everyday use.
+    """
     sizes = {
-        "wavy-faces-128": (8, 5, 1 / 16),
-        "few-faces-on-many-128": (2, 8, 0.0),
-        "many-faces-on-few-128": (8, 2, 0.0),
+        "wavy-faces-128": (8, 5, 1 / 16, _DEPTH),
+        "few-faces-on-many-128": (2, 8, 0.0, _DEPTH),
+        "many-faces-on-few-128": (8, 2, 0.0, _DEPTH),
+        "shallow-faces-128": (4, 8, 0.0, _DEPTH / 64),
     }
     return tuple(_case_of_faces(name, number, *size) for number, (name, size) in enumerate(sizes.items()))
 
 
-def _case_of_faces(name: str, number: int, slave_cells: int, master_cells: int, amplitude: float) -> Case:
+def _case_of_faces(name: str, number: int, slave_cells: int, master_cells: int, amplitude: float, depth: float) -> Case:
     """Return a slave grid over the middle of a wider master grid, both on a wave and turned."""
     slave, master = (
         grid(_places(2 * number + side, cells).tolist(), _places(2 * number + side + 20, cells).tolist())
@@ -60,7 +64,7 @@ def _case_of_faces(name: str, number: int, slave_cells: int, master_cells: int, 
     )
     interface = Interface.from_faces(upper, [face[::-1] for face in slave.faces], lower, master.faces)
     least = min(surface.heights(interface.nodes).min() for surface in (interface.slave, interface.master))
-    upper[:, 2] -= amplitude / 8 + least * np.random.default_rng(number).uniform(0.5, 1.5, len(upper)) * _DEPTH
+    upper[:, 2] -= amplitude / 8 + least * np.random.default_rng(number).uniform(0.5, 1.5, len(upper)) * depth
     matrix, size = rotation((3, 1, 2, 1 + number))
     current = np.vstack([upper, lower]) @ (np.array(matrix).T / size)
     return Case(interface, current.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])

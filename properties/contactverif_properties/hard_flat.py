@@ -143,7 +143,8 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
 
     **Question.** A slave node, a quarter point or the middle of a slave segment lies over a master node exactly, or one
-    rounding to its left or right. So ξ is 0, 1, −u or 1 + u. Are the forces as if nothing were special there?
+    rounding to its left or right. So ξ is 0, 1, −u or 1 + u. Are the forces as if nothing were special there? In space
+    a master node lies so under a node, an edge or the middle of a slave face, and up to 32 faces meet in either node.
 
     **Why it matters.** A point that belongs to both segments is counted twice by one code, and lost by another. Meshes
     of two bodies share lines more often than not, so this is the normal case.
@@ -162,7 +163,8 @@ def hard_search(case: Case, subject: Subject) -> Measurement:
 
     **Question.** The slave lies on a flat part of the master. Something else is near: a node that is nearer than those
     of the right segment, the other side of a thin plate or of a sharp wedge, a second body behind the first, or the
-    place where a closed chain begins. Are the forces those of the flat part alone?
+    place where a closed chain begins. In space there are also 264 faces, numbered at random. Are the forces those of the
+    flat part alone?
 
     **Why it matters.** These are the named failures of projection in the manuals of contact codes. A search that starts
     from the nearest node ends on the wrong side of a plate, and pulls where it should push.

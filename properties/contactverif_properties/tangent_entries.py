@@ -81,7 +81,7 @@ def tangent_long(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent of a long interface is the derivative of the residual.
 
     **Question.** Six interfaces have 104 to 200 segments on one side: wavy, graded, a ring, three chains, many segments
-    on few, and few on many. In space three have 128 triangles. Is each block of the tangent the derivative of the
+    on few, and few on many. In space four have 128 triangles. Is each block of the tangent the derivative of the
     residual?
 
     **Why it matters.** Some errors need size: a table that is too short, a block of rows that is forgotten behind the

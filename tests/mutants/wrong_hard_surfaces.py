@@ -62,6 +62,49 @@ def _forget_rows(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     return tangent
 
 
+def _share_keys(right: Any, interface: Any, z: Any) -> Pairing:
+    """Keep one cell for each number 100 × slave face + master face."""
+    pairing = right(interface, z)
+    key = 100 * pairing["slave_face"] + pairing["master_face"]
+    first = np.sort(np.unique(key, return_index=True)[1])
+    return Pairing({name: array[first] for name, array in pairing.items()})
+
+
+def _follow_front(right: Any, interface: Any, z: Any) -> Pairing:
+    """Find the cells that hang together with the first one, by nodes of both sides."""
+    pairing = right(interface, z)
+    slave = interface.slave.faces[pairing["slave_face"]]
+    master = interface.master.faces[pairing["master_face"]]
+    found = np.arange(len(slave)) == 0
+    while True:
+        near = np.isin(slave, slave[found]).any(axis=1) & np.isin(master, master[found]).any(axis=1)
+        if not (near & ~found).any():
+            return Pairing({name: array[found] for name, array in pairing.items()})
+        found |= near
+
+
+def _symmetrise(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Make a tangent symmetric that is so to a thousandth of its largest entry."""
+    tangent = right(interface, pairing, z)
+    skew = (tangent - tangent.T) / 2
+    return (tangent - skew).tocsr() if abs(skew).max() <= 1e-3 * abs(tangent).max() else tangent
+
+
+def _know_eight_faces(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+    """Give a node the areas of its first eight faces alone."""
+    faces, forces = interface.slave.faces, right(interface, pairing, z)
+    corners = z.reshape(-1, 3)[faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    whole, first = np.zeros(interface.n_nodes), np.zeros(interface.n_nodes)
+    counts = np.zeros(interface.n_nodes, int)
+    for face, area in zip(faces, areas, strict=True):
+        whole[face] += area
+        first[face] += np.where(counts[face] < 8, area, 0.0)
+        counts[face] += 1
+    share = np.where(whole > 0, first / np.where(whole > 0, whole, 1.0), 1.0)
+    return (forces.reshape(-1, 3) * share[:, None]).reshape(-1)
+
+
 MUTANTS = (
     Mutant("node lost on an edge of the master", "hard.node-hit",
            lambda *, penalty: wrap(penalty, NTS_AR, pair=_lose_nodes_on_edges)),
@@ -73,4 +116,11 @@ MUTANTS = (
     Mutant("a touch that presses", "hard.touch", changes_points(_press_in_touch)),
     Mutant("rows of the tangent forgotten behind the hundredth node", "tangent.long",
            lambda *, penalty: wrap(penalty, STS, tangent=_forget_rows)),
+    Mutant("one cell for each hundred of slave face and master face", "hard.search",
+           lambda *, penalty: wrap(penalty, STS, pair=_share_keys)),
+    Mutant("a front that starts once", "remote", lambda *, penalty: wrap(penalty, STS, pair=_follow_front)),
+    Mutant("tangent made symmetric where it nearly is", "tangent.long",
+           lambda *, penalty: wrap(penalty, STS, tangent=_symmetrise)),
+    Mutant("areas of eight faces a node", "hard.node-hit",
+           lambda *, penalty: wrap(penalty, NTS_AR, residual=_know_eight_faces)),
 )  # fmt: skip
