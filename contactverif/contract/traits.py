@@ -123,7 +123,8 @@ class Rules:
         penetration. For multipliers it says what a multiplier is: a nodal force, or a pressure.
     area : Literal['reference', 'current'] | None
         The configuration in which areas of competence are measured. They add up to the slave's length there, so that a
-        uniform penetration gives the total force ε̂ |gap| × that length. ``None`` where springs act twice (two-pass).
+        uniform penetration gives the total force ε̂ |gap| × that length. ``None`` where springs act twice (two-pass),
+        or where a pressure is no multiple of its gap.
     gap : Literal['closest point', 'slave normal', 'cells', 'cells and nodes'] | None
         The rule by which a contact point gets its master segment, ξ, normal and gap. ``"closest point"``: the nearest
         closed master segment, ξ and gap along that segment's normal. ``"slave normal"``: the line through the point

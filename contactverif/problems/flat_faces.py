@@ -27,7 +27,7 @@ Faces = Sequence[Sequence[int]]
 UPRIGHT, TURNED, STEEP = (1, 0, 0, 0), (1, 1, 1, 0), (1, 2, -1, 1)
 _TURNS = {"": UPRIGHT, ", turned by thirds": TURNED, ", turned by sevenths": STEEP}
 _TWO_TURNS = {"": UPRIGHT, ", turned by thirds": TURNED}
-_PENALTY = 16.0
+_PENALTY = 50 / 3  # No number of single precision, in which all penalties of random cases are exact.
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,7 +98,7 @@ def _area_breach(reported: Reported, *, fits: bool) -> str:
         return "a weight is negative or NaN"
     length = sum(float(_lengths(each, reported.traits)[0].sum()) for each in reported.passes)
     if not fits and points.active.all() and float(points.weight.sum()) < length:
-        return "every reported point is active, and a length is missing: report all contact points, active or not"
+        return "every reported point is active, and a part of the slave is missing: report idle points, find all cells"
     return ""
 
 

@@ -111,6 +111,7 @@ MUTANTS = (
     Mutant("gap formed far away", "hard.offset", lambda *, penalty: wrap(penalty, STS, residual=_round_far_away)),
     Mutant("deep nodes taken for the other side", "hard.deep",
            lambda *, penalty: wrap(penalty, NTS_AR, pair=_see_near_faces)),
+    Mutant("penalty in single precision", "hard.deep", lambda *, penalty: wrap(float(np.float32(penalty)), STS)),
     Mutant("faces sought at the nearest node alone", "hard.search",
            lambda *, penalty: wrap(penalty, STS, pair=_look_at_nearest_node)),
     Mutant("a touch that presses", "hard.touch", changes_points(_press_in_touch)),

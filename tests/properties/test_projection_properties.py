@@ -162,7 +162,7 @@ def test_who_reports_only_active_points_is_told_so_in_words() -> None:
             points = super().contact_points(*state)
             return points.select(points.active)
 
-    case, reason = over_a_vertex(0.0, place=1.0), "every reported point is active, and a length is missing"
+    case, reason = over_a_vertex(0.0, place=1.0), "every reported point is active, and a part of the slave is missing"
     for heights in ([-0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]):
         positions = case.positions.copy()
         positions[:2, 1] = heights
