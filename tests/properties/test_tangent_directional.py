@@ -14,6 +14,7 @@ from contactverif_properties.shared.any_state import random_directions
 from contactverif_properties.tangent_directional import (
     CENTRAL,
     COMPLEX,
+    NOT_ANALYTIC,
     SLOPE,
     TAYLOR,
     defect_directions,
@@ -131,6 +132,17 @@ def test_a_complex_step_finds_what_a_central_difference_cannot() -> None:
     assert judge_case(tangent_directional, case(), subject(Smooth, error=wrong)).verdict is Verdict.PASS
     outcome = judge_as(Verdict.FAIL, tangent_directional, case(), subject(Smooth, error=wrong, takes_complex=True))
     assert outcome.reason.startswith(COMPLEX.name)
+    assert NOT_ANALYTIC not in outcome.reason
+
+
+def test_a_residual_that_no_complex_number_can_take_is_told_from_a_wrong_tangent() -> None:
+    class Lengths(Smooth):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z) * (1 + z**2) / np.abs(1 + z**2)
+
+    outcome = judge_as(Verdict.FAIL, tangent_directional, case(), subject(Lengths, takes_complex=True))
+    assert outcome.reason.startswith(COMPLEX.name)
+    assert NOT_ANALYTIC in outcome.reason
 
 
 def test_a_tangent_of_nothing_is_nothing() -> None:
