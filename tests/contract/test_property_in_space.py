@@ -63,7 +63,7 @@ def test_lists_in_space_are_asked_beside_those_of_the_plane() -> None:
         ("vts-ppt", "hard.deep"): 6,
         ("vts-ppt", "hard.search"): 14,
         ("vts-cell-3d", "hard.deep"): 6,
-        ("vts-cell-3d", "hard.search"): 15,
+        ("vts-cell-3d", "hard.search"): 18,
     }
 
 
