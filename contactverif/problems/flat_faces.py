@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise, product
+from itertools import accumulate, pairwise, product
 from operator import mul
 
 import numpy as np
@@ -226,6 +226,23 @@ def deep_face_states() -> tuple[Case, ...]:
         flat_face_state(f"{name}{label}", _SLAVE, _MASTER, depth, turn=turn)
         for (name, depth), (label, turn) in product({"h/2": 0.5, "2h": 2.0}.items(), _TURNS.items())
     )
+
+
+@cache
+def equal_area_states() -> tuple[Case, ...]:
+    """Return flat states whose slave has as much area as nodes, and a master with as many nodes on that area.
+
+    So it does not matter whether the unit of the penalty is stated, and two passes have twice the springs. The master
+    reaches farther by more than a length, and no node of it faces the border of the slave.
+    """
+    cases = []
+    for n, depth, penalty in ((5, 2.0**-4, _PENALTY), (5, 2.0**-12, 2.0**-4), (12, 2.0**-4, _PENALTY)):
+        places = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])]
+        below = [-1.375 + k for k in range(n + 4)]
+        slave, master = shuffle(grid(places, places)), shuffle(grid(below, below))
+        name = f"{n * n} nodes" + ("" if penalty == _PENALTY else ", soft and shallow")
+        cases.append(replace(flat_face_state(name, slave, master, depth), penalty=penalty))
+    return tuple(cases)
 
 
 @cache

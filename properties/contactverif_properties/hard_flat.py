@@ -22,6 +22,7 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems.flat_faces import (
     deep_face_states,
+    equal_area_states,
     node_hit_face_states,
     offset_face_states,
     search_face_states,
@@ -199,6 +200,7 @@ PUSH = Quantity(
     family="patch",
     quantities=(MOST, LEAST, PUSH),
     cases=Cases.from_list(equal_length_states),
+    cases_in_space=Cases.from_list(equal_area_states),
     promise=lambda traits: True,
     asks=frozenset({"penalty"}),
 )
@@ -219,14 +221,15 @@ def scale(case: Case, subject: Subject) -> Measurement:
     number of a segment that overflows shows. Nodal springs of ε̂ L/n at n + 1 nodes give 1 + 1/n. A node that faces the
     end of the master exactly may be lost to roundoff, which takes no more than 1/n either. Segments have the mean
     length 1, so that it does not matter whether the unit of the penalty is stated. A factor of 2 on one pass looks like
-    two passes, so the row says that the springs are 2 ε̂ L, unless the traits say `unbiased`.
+    two passes, so the row says that the springs are 2 ε̂ L, unless the traits say `unbiased`. In space L is the area,
+    and n is the number of slave nodes, 25 or 144; each has the mean area 1.
 
     A law that is not linear has no stiffness. The state is asked again at half the depth, and where the number changes
     by more than u(8Z/|g| + 4N), it is kept as a detail and not judged.
 
     **Undecided.** Never.
     """
-    n, traits, depth = len(case.interface.slave), subject.traits, case.parameter("penetration")
+    n, traits, depth = _count_springs(case), subject.traits, case.parameter("penetration")
     away = np.zeros_like(case.positions)
     away[: case.interface.n_slave_nodes] = depth / 2 * uniform_pressure.normal_of(case)
     parameters = {**case.parameters, "penetration": np.array(depth / 2)}
@@ -261,10 +264,17 @@ def _say(springs: float, remark: str) -> str:
 def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
     """Return the forces that push the slave out of the master, and the master out of the slave, over ε̂ |g| L.
 
-    The third number is the largest force on a node over that of a slave segment of mean length.
+    The third number is the largest force on a node over that of a slave segment of mean length, or of the mean area of
+    a slave node.
     """
     pushes = -uniform_pressure.uniform_state(case, subject).forces @ uniform_pressure.normal_of(case)
-    size = case.penalty * case.parameter("penetration") * case.slave_length
+    size = case.penalty * case.parameter("penetration") * case.slave_measure
     slave, master = np.split(pushes / size, [case.interface.n_slave_nodes])
-    largest = float(np.abs(pushes).max()) / size * len(case.interface.slave)
+    largest = float(np.abs(pushes).max()) / size * _count_springs(case)
     return float(slave.sum()), -float(master.sum()), largest
+
+
+def _count_springs(case: Case) -> int:
+    """Return the number of slave segments, or of slave nodes in space."""
+    interface = case.interface
+    return len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes

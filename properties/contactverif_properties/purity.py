@@ -9,7 +9,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
@@ -198,6 +198,7 @@ def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) ->
     family="invariants",
     quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
     cases=Cases.from_list(lambda: (named_case("offset-c"),)),
+    cases_in_space=Cases.from_list(lambda: (named_case("tilted-faces"),)),
     promise=lambda traits: True,
     asks=WITH_BARRIER,
 )
@@ -216,14 +217,15 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
     entries of repeated answers that differ; the tolerance is 0. A pairing that differs fails in words. The other two
     compare the first residual and the first tangent of the process with those that it gives now, each as `purity`
     compares a batch with a loop. A run notes the first answers where it calls a formulation for the first time, on case
-    C′, in a process of its own or in that of the harness. They are only compared to roundoff, since a process may
-    compile in its first calls and add in another order later.
+    C′ or on two pairs of triangles, in a process of its own or in that of the harness. They are only compared to
+    roundoff, since a process may compile in its first calls and add in another order later.
 
     **Undecided.** Never.
     """
     first = subject.first_answers
     if first is None:
-        first = ask_first(subject, fit_to_traits(named_case("c-prime"), subject.traits)[0], subject.provides)
+        name = "c-prime" if case.interface.dim == PLANE else "crossed-diagonals"
+        first = ask_first(subject, fit_to_traits(named_case(name), subject.traits)[0], subject.provides)
     formulation, state = prepare_state(case, subject)
     random = np.random.default_rng(state.seed)
     moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.resolution

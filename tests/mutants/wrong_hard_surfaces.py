@@ -105,6 +105,23 @@ def _know_eight_faces(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
     return (forces.reshape(-1, 3) * share[:, None]).reshape(-1)
 
 
+def _stiffen(*, penalty: float) -> Any:
+    """Return springs that are too stiff, and state neither area nor unit nor what they transmit."""
+    springs = STS(penalty=1.05 * penalty)
+    traits = springs.traits.revise(penalty=None, area=None, flat=None, normal=None, integrates_linear_gap=None)
+    return replace(springs, traits=traits)
+
+
+def _tire(*, penalty: float) -> Any:
+    calls: list[None] = []
+
+    def residual(right: Any, *arguments: Any) -> Any:
+        calls.append(None)
+        return right(*arguments) * (1 if len(calls) < 900 else 1 + 2.0**-40)
+
+    return wrap(penalty, STS, residual=residual)
+
+
 MUTANTS = (
     Mutant("node lost on an edge of the master", "hard.node-hit",
            lambda *, penalty: wrap(penalty, NTS_AR, pair=_lose_nodes_on_edges)),
@@ -119,6 +136,8 @@ MUTANTS = (
            lambda *, penalty: wrap(penalty, STS, tangent=_forget_rows)),
     Mutant("one cell for each hundred of slave face and master face", "hard.search",
            lambda *, penalty: wrap(penalty, STS, pair=_share_keys)),
+    Mutant("springs a twentieth too stiff, of an unstated area", "scale", _stiffen),
+    Mutant("an instance that tires", "purity.long", _tire),
     Mutant("a front that starts once", "remote", lambda *, penalty: wrap(penalty, STS, pair=_follow_front)),
     Mutant("tangent made symmetric where it nearly is", "tangent.long",
            lambda *, penalty: wrap(penalty, STS, tangent=_symmetrise)),
