@@ -225,7 +225,12 @@ def test_daemons_that_fork_as_they_are_ended_end_with_the_box(tmp_path: Path) ->
     program.write_text(Path(boxed_few.__file__).read_text(encoding="utf-8"), encoding="utf-8")
     load_remote(python_program(str(program)), "Daemons", LIMITS)
     process.end_marked()
-    assert not [other for other in psutil.process_iter() if str(program) in _words(other)]
+
+    def daemons() -> list[psutil.Process]:
+        return [other for other in psutil.process_iter() if str(program) in _words(other)]
+
+    psutil.wait_procs(daemons(), timeout=5.0)  # The system ends the processes of a box one after another.
+    assert not daemons()
 
 
 def _words(other: psutil.Process) -> list[str]:
