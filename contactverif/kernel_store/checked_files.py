@@ -19,7 +19,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cached_property
 from numbers import Number
 from pathlib import Path
 from typing import Any, cast
@@ -91,8 +91,9 @@ def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
     if type(files) is IndexDataCacheFile:
         files.__class__ = CheckedFiles
         assert isinstance(files, CheckedFiles)
-        files.function = function
         files.usual = _usual_files(function, files) if cast(Any, numba.config).CACHE_DIR else ()
+        for each in (files, *files.usual):
+            each.function = function
     return dispatcher
 
 
@@ -103,16 +104,15 @@ def _usual_files(function: Callable[..., Any], files: Any) -> tuple[CheckedFiles
     kinds = [getattr(caching, name, None) or getattr(caching, f"_{name}") for name in names]
     locators = (kind(function, function.__code__.co_filename) for kind in kinds)
     folders = [locator.get_cache_path() for locator in locators]
-    usual = tuple(CheckedFiles(folder, base, stamp) for folder in folders)  # type: ignore[no-untyped-call]
-    for each in usual:
-        each.function = function
-    return usual
+    return tuple(CheckedFiles(folder, base, stamp) for folder in folders)  # type: ignore[no-untyped-call]
 
 
 def _add_parts(parts: set[Any], function: Callable[..., Any]) -> None:
     """Add the names of all functions that one calls, with digests of their files, and the numbers that it reads."""
     code, names = function.__code__, function.__globals__
-    part = f"{function.__module__}.{function.__qualname__}", _digest_file(Path(code.co_filename))
+    file = Path(code.co_filename)
+    digest = hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else ""
+    part = f"{function.__module__}.{function.__qualname__}", digest
     if part in parts:
         return
     parts.add(part)
@@ -136,17 +136,3 @@ def _unpickle(path: Path) -> Any:
         return pickle.loads(content[:-_DIGEST])
     except Exception:  # What was stored refers to a module that is not there any more.
         return None
-
-
-def _digest_file(path: Path) -> str:
-    """Return the digest of a file, which is read again where its time or size has changed; empty for no file."""
-    try:
-        status = path.stat()
-    except OSError:
-        return ""
-    return _digest_content(path, status.st_mtime_ns, status.st_size)
-
-
-@cache
-def _digest_content(path: Path, _time: int, _size: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -236,11 +236,14 @@ def equal_area_states() -> tuple[Case, ...]:
     reaches farther by more than a length, and no node of it faces the border of the slave.
     """
     cases = []
-    for n, depth, penalty in ((5, 2.0**-4, _PENALTY), (5, 2.0**-12, 2.0**-4), (12, 2.0**-4, _PENALTY)):
+    for name, n, depth, penalty in (
+        ("25 nodes", 5, 2.0**-4, _PENALTY),
+        ("25 nodes, soft and shallow", 5, 2.0**-12, 2.0**-4),
+        ("144 nodes", 12, 2.0**-4, _PENALTY),
+    ):
         places = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])]
         below = [-1.375 + k for k in range(n + 4)]
         slave, master = shuffle(grid(places, places)), shuffle(grid(below, below))
-        name = f"{n * n} nodes" + ("" if penalty == _PENALTY else ", soft and shallow")
         cases.append(replace(flat_face_state(name, slave, master, depth), penalty=penalty))
     return tuple(cases)
 

@@ -16,6 +16,8 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
+from contactverif.contract.traits import Traits
+from contactverif.problems.lifted_states import fit_to_traits
 from contactverif.problems.surface_states import SURFACE_STATES
 
 _PENETRATION = 2.0**-4
@@ -126,3 +128,11 @@ _OTHERS: dict[str, Callable[[], Case]] = {
 }
 FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)
 NAMED: tuple[str, ...] = (*FLAT_NAMES, *_OTHERS)
+IN_SPACE = "crossed-diagonals"  # A flat interface that penetrates uniformly.
+# Its lengths of 3.2 and 2.8 are rounded: on A1 single precision makes no error.
+_FIRST = "c-prime"
+
+
+def first_state(traits: Traits) -> tuple[Case, str]:
+    """Return the state of the first answers of a process, and why a formulation takes it not, or an empty string."""
+    return fit_to_traits(named_case(_FIRST if traits.abilities.in_plane else IN_SPACE), traits)

@@ -34,13 +34,10 @@ from contactverif.contract.property import (
 from contactverif.contract.result import JUDGED_SHARE, NodalForces, Row
 from contactverif.contract.subject import Subject
 from contactverif.problems.lifted_states import fit_to_traits
-from contactverif.problems.named_states import named_case
+from contactverif.problems.named_states import IN_SPACE, first_state, named_case
 from contactverif.sampling.blas_threads import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
-IN_SPACE = "crossed-diagonals"  # The same in space.
-# The state of the first answers. Its lengths of 3.2 and 2.8 are rounded: on A1 single precision makes no error.
-FIRST = "c-prime"
 RAISED = "the property raised "
 SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
 
@@ -189,14 +186,13 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     """
     if isinstance(subject, EngineSubject):
         return FirstCall()  # It has no forces to ask for.
-    in_plane = subject.traits.abilities.in_plane
-    first_case, refused = fit_to_traits(named_case(FIRST if in_plane else IN_SPACE), subject.traits)
+    first_case, refused = first_state(subject.traits)
     if refused:
         return FirstCall()  # A barrier whose activation is unknown is not defined in these states.
     try:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, first_case, parts)
-            names = STATES if in_plane else (IN_SPACE,)
+            names = STATES if subject.traits.abilities.in_plane else (IN_SPACE,)
             opposite, seconds = _pulls_in_time(subject, names[0])
             if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
                 seconds = min(seconds, _pulls_in_time(subject, names[0])[1])

@@ -9,12 +9,11 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
 from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.first_questions import ask_first
-from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import CheckedFormulation, Restartable, Subject
-from contactverif.problems.lifted_states import fit_to_traits
-from contactverif.problems.named_states import named_case
+from contactverif.problems.named_states import first_state, named_case
 from contactverif.strategies.surfaces import surface_cases
 from contactverif_properties.shared import interleaved_calls
 from contactverif_properties.shared.any_state import any_cases, prepare_state
@@ -224,8 +223,7 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
     """
     first = subject.first_answers
     if first is None:
-        name = "c-prime" if case.interface.dim == PLANE else "crossed-diagonals"
-        first = ask_first(subject, fit_to_traits(named_case(name), subject.traits)[0], subject.provides)
+        first = ask_first(subject, first_state(subject.traits)[0], subject.provides)
     formulation, state = prepare_state(case, subject)
     random = np.random.default_rng(state.seed)
     moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.resolution
