@@ -26,6 +26,7 @@ from contactverif.contract.errors import MisuseError
 
 CACHE_SIZE = 512  # Number of condensed bodies that are remembered: penalties and formulations of one run share them.
 SHARED_SIZE = 64  # Number of factorised meshes that are remembered: loads, places and penalties share them.
+DENSE_SHARE = 0.25  # From this share of entries on, a matrix of any size is factorised sooner if it is dense.
 DENSE_LIMIT = 600  # Largest number of unknowns for which a dense matrix is factorised as fast as a sparse one.
 # A pivot below this share of its diagonal entry is zero: a loose part leaves less than 1e2 u, a long thin bar 1e6 u.
 _PIVOT_FLOOR = 2.0**-40

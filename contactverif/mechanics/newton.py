@@ -43,6 +43,7 @@ def solve(
     use_tangent: bool = True,
     tolerance: float = 0.0,
     difference_step: float | None = None,
+    any_matrix: bool = False,
     solution_only: bool = False,
 ) -> Trace:
     """Solve a scene by Newton's method with full steps.
@@ -69,11 +70,13 @@ def solve(
         does not apply to multipliers.
     difference_step : float | None
         The step of differences in positions, a length; None for the one that suits smooth residuals.
+    any_matrix : bool
+        True takes, in place of differences for each unknown, any matrix that one difference confirms: the formulation's
+        own tangent, or differences of many unknowns at a time.
     solution_only : bool
-        True saves calls where the iterates do not matter. The same residual decides about convergence. The matrix is
-        kept while each iteration makes the residual `KEPT_FALL` times smaller, but not with multipliers, since it says
-        which of them are active. In place of differences for each unknown it takes any matrix that one difference
-        confirms: the formulation's own tangent, or differences of many unknowns at a time.
+        True saves calls where the iterates do not matter. The same residual decides about convergence. It takes any
+        matrix, too. The matrix is kept while each iteration makes the residual `KEPT_FALL` times smaller, but not with
+        multipliers, since it says which of them are active.
 
     Returns
     -------
@@ -94,9 +97,8 @@ def solve(
     for name, number in (("load_steps", load_steps), ("iterations", iterations)):
         if number < 1:
             raise MisuseError(name, f"{number}", "at least 1")
-    system = System(
-        scene, formulation, use_tangent=use_tangent, difference_step=difference_step, any_matrix=solution_only
-    )
+    any_matrix = any_matrix or solution_only
+    system = System(scene, formulation, use_tangent=use_tangent, difference_step=difference_step, any_matrix=any_matrix)
     record, keep_matrix = Record(), solution_only and not system.n_multipliers
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):

@@ -27,6 +27,7 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.mechanics.bulk import (
     CACHE_SIZE,
     DENSE_LIMIT,
+    DENSE_SHARE,
     CondensedBody,
     condense,
     forget_condensed,
@@ -158,9 +159,10 @@ class Scene:
 
     @cached_property
     def stiffness(self) -> FloatArray | sparse.csr_array:
-        """The stiffness S (n_free, n_free) of all bodies within reach: dense if it is small, else sparse."""
+        """The stiffness S (n_free, n_free) of all bodies within reach: dense if it is small or has few blocks."""
         blocks = [body.stiffness for body in self.condensed_bodies]
-        if self.n_free <= DENSE_LIMIT:
+        n_entries = sum(block.size for block in blocks)  # Blocks are full.
+        if self.n_free <= DENSE_LIMIT or n_entries >= DENSE_SHARE * self.n_free**2:
             matrix = np.zeros((self.n_free, self.n_free))
             for part, block in zip(self.slices, blocks, strict=True):
                 matrix[part, part] = block

@@ -47,7 +47,8 @@ def solve_in_tries(
 ) -> tuple[Trace, ...]:
     """Solve a scene with the formulation's tangent; if that does not converge, once more with differences.
 
-    The arguments are those of `solve_for_accuracy`. With `solution_only`, calls are saved, see `solve`.
+    The arguments are those of `solve_for_accuracy`. With `solution_only`, calls are saved, see `solve`. Where one
+    difference confirms the tangent that did not help, it stands for differences of each unknown.
     """
     ways = (True, False) if "tangent" in formulation.provides else (True,)
     traces = []
@@ -59,6 +60,7 @@ def solve_in_tries(
             tolerance=BALANCED,
             difference_step=step,
             use_tangent=use_tangent,
+            any_matrix=not use_tangent,
             solution_only=solution_only,
         )
         traces.append(trace)

@@ -58,13 +58,8 @@ class System:
         scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)
         self.n_multipliers, self.transformation, self.stiffness = count, scene.transformation, scene.stiffness
         if count:
-            if isinstance(scene.transformation, np.ndarray):
-                self.transformation = linalg.block_diag(scene.transformation, np.eye(count))
-                self.stiffness = linalg.block_diag(scene.stiffness, np.zeros((count, count)))
-            else:
-                unit, nothing = sparse.eye_array(count), sparse.csr_array((count, count))
-                self.transformation = sparse.csr_array(sparse.block_diag([scene.transformation, unit]))
-                self.stiffness = sparse.csr_array(sparse.block_diag([scene.stiffness, nothing]))
+            self.transformation = _add_diagonal(scene.transformation, 1.0, count)
+            self.stiffness = _add_diagonal(scene.stiffness, 0.0, count)
         self._sizes = abs(self.transformation).T, abs(scene.stiffness)
 
     @property
@@ -223,3 +218,10 @@ class System:
                 yield None  # A tangent that breaks the contract is no fault of the forces.
         if not self.n_multipliers:
             yield differences.by_groups(reach)
+
+
+def _add_diagonal(matrix: Any, value: float, count: int) -> Any:
+    """Return a matrix, dense or sparse, with so many equal diagonal entries behind it."""
+    if isinstance(matrix, np.ndarray):
+        return linalg.block_diag(matrix, value * np.eye(count))
+    return sparse.csr_array(sparse.block_diag([matrix, value * sparse.eye_array(count)]))

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from math import isnan
+from math import inf, isnan
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,13 @@ def mean_pressure(scene: Scene, q: FloatArray) -> tuple[float, float]:
     """Return the mean normal stress of each body over its Gauss points, as a pressure."""
     upper, lower = (-stresses[..., 1] for stresses in scene.stresses(q))
     return float(upper.mean()), float(lower.mean())
+
+
+def make_sparse(monkeypatch: pytest.MonkeyPatch, full: float = inf) -> None:
+    """Make small scenes sparse as large ones are; from the share `full` of entries on, the stiffness stays dense."""
+    monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(bulk, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(scene_module, "DENSE_SHARE", full)
 
 
 # --- the exact answer -------------------------------------------------------------------------------------------
@@ -92,7 +99,7 @@ def check_trace(trace: Trace, scene: Scene) -> None:
     assert trace.n_iterations == np.isfinite(trace.energies).sum()
     assert isnan(trace.conditions[-1]) == (trace.end is not End.SINGULAR)
     assert np.array_equal(trace.solution, trace.q[-1])
-    assert np.array_equal(trace.z, scene.positions(trace.q[-1], trace.factors[-1]))
+    assert np.array_equal(trace.z[: scene.interface.n_unknowns], scene.positions(trace.q[-1], trace.factors[-1]))
     assert trace.converged == (trace.end is End.CONVERGED) == (trace.roundings[-1] <= 1)
     assert trace.end.label
     assert trace.end.advice.count("\n") == 0
@@ -150,7 +157,7 @@ def test_a_punch_that_starts_open_and_hangs_on_contact_is_singular(
 ) -> None:
     """Whatever roundoff makes of the matrix: a step of 1e14 downwards would find contact there, and "converge"."""
     if not dense:
-        monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+        make_sparse(monkeypatch)
     for degrees, poisson, refine in ((0.0, 0.3, 1), (10.0, 0.2, 3), (33.0, 0.45, 1), (77.0, 0.0, 2)):
         scene = catalogue.make_scene(name, lowered=-0.1, degrees=degrees, poisson=poisson, refine=refine)
         trace = solve_named("vts-ppt", scene)
@@ -182,7 +189,7 @@ def test_roundoff_of_the_solver_does_not_decide_whether_a_tie_is_solved(monkeypa
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
 def test_a_stiff_contact_is_not_singular(dense: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not dense:
-        monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+        make_sparse(monkeypatch)
     for penalty, ratio in ((1e14, 1.0), (1e4, 1e6), (1e14, 1e6)):
         scene = catalogue.make_scene("c", penalty=penalty, ratio=ratio)
         system = System(scene, on("vts-ppt", scene))
@@ -370,20 +377,20 @@ def test_a_formulation_without_pairing() -> None:
     assert np.abs(trace.solution - expected).max() <= bound
 
 
-@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-balanced", "nts-ar"])
-def test_sparse_and_dense_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("stiffness", ["sparse", "full"])
+@pytest.mark.parametrize("name", ["vts-ppt", "vts-ppt-balanced", "nts-ar", "mortar-lm"])
+def test_sparse_and_dense_agree(name: str, stiffness: str, monkeypatch: pytest.MonkeyPatch) -> None:
     build_scene: Callable[[], Scene] = lambda: catalogue.make_scene("c", penalty=1e4, sides="free", ratio=0.5, refine=2)  # noqa: E731
     scene = build_scene()
     dense = solve_named(name, scene)
-    matrix, floor = System(scene, on(name, scene)).matrix(
-        dense.solution, on(name, scene).pair(scene.interface, dense.z)
-    )
-    monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
-    monkeypatch.setattr(bulk, "DENSE_LIMIT", 0)
+    system, u = System(scene, on(name, scene)), dense.u[-1]
+    matrix, floor = system.matrix(u, system.pair(u))
+    make_sparse(monkeypatch, scene_module.DENSE_SHARE if stiffness == "full" else inf)
     large = build_scene()
     trace = solve_named(name, large)
     check_trace(trace, large)
-    assert sparse.issparse(large.stiffness)
+    assert sparse.issparse(large.transformation)
+    assert sparse.issparse(large.stiffness) == (stiffness == "sparse")
     assert trace.end is dense.end is End.CONVERGED
     bound = 2 * np.linalg.norm(np.linalg.inv(matrix), np.inf) * floor.max()
     assert np.abs(trace.solution - dense.solution).max() <= bound
@@ -449,7 +456,7 @@ def test_no_tangent_where_forces_balance_already() -> None:
 @pytest.mark.parametrize("dense", [True, False], ids=["dense", "sparse"])
 def test_unsymmetric_matrices_are_solved_right(dense: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not dense:
-        monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+        make_sparse(monkeypatch)
     scene = catalogue.make_scene("c", sides="free", penalty=1e5, lowered=0.05)
     system = System(scene, on("vts-ppt", scene))
     q = scene.start + 1e-3 * np.sin(np.arange(scene.n_free))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import cos, radians, sin
+from math import cos, inf, radians, sin
 from typing import Any
 
 import numpy as np
@@ -183,6 +183,7 @@ def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) ->
     q = at_random(dense)
     positions, forces = dense.positions(q), dense.bulk_forces(q)
     monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
+    monkeypatch.setattr(scene_module, "DENSE_SHARE", inf)
     large = replace(dense)
     assert not isinstance(large.stiffness, np.ndarray)
     assert not isinstance(large.transformation, np.ndarray)

@@ -136,6 +136,14 @@ def test_counts_are_those_of_newtons_method_whatever_verb_it_uses() -> None:
     assert counts["differences"] == 0
 
 
+def test_an_exact_tangent_that_does_not_help_costs_no_difference_for_each_unknown() -> None:
+    """Newton's method cycles here. One difference in each iteration says that differences would do the same."""
+    subject = load_subject("vts-ppt-balanced")
+    stiff = solve_cell(Cell("rings", 15, 0), subject)[-1]
+    assert stiff.outcome == Outcome.NOT_SOLVED
+    assert 0 < stiff.counts["differences"] <= stiff.counts["iterations"] + 2
+
+
 def test_counts_and_nonzeros_are_the_same_in_every_run_and_in_every_place() -> None:
     """A plugin in a process of its own has the same outcomes, errors and counts; no process tells them."""
     far = load_formulation("vts-ppt", Limits())
