@@ -48,6 +48,29 @@ def test_a_constraint_that_is_asked_several_times_is_counted(kind: Any, times: i
     assert np.ptp(shared) < 1e-14
 
 
+def test_eliminated_positions_change_neither_the_step_nor_what_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constraints and transfer differ here, as those of the tangent of a formulation do."""
+    random = np.random.default_rng(7)
+    mixed = random.uniform(-1, 1, (9, 4))
+    matrix = saddle(random.uniform(-1, 1, (4, 4)))
+    transfer, constraints = matrix[:4, 4:] @ mixed.T, mixed @ (matrix[4:, :4] + 0.1)
+    large = np.block([[matrix[:4, :4], transfer], [constraints, np.zeros((9, 9))]])
+    right = large @ random.uniform(-1, 1, 13)
+    eliminated = linear._shortest(large, right, 4, np.zeros(13))
+    monkeypatch.setattr(linear, "_FAR_FROM_SINGULAR", np.inf)
+    whole = linear._shortest(large, right, 4, np.zeros(13))
+    assert eliminated[1] == whole[1] == 5
+    assert eliminated[0] is not None
+    assert whole[0] is not None
+    assert np.abs(eliminated[0] - whole[0]).max() <= 1e-12 * np.abs(whole[0]).max()
+    right[0] += 1e-3  # A force contradicts no constraint.
+    assert linear._shortest(large, right, 4, np.zeros(13))[0] is not None
+    right[12] += 1e-3
+    assert linear._shortest(large, right, 4, np.zeros(13))[0] is None
+    monkeypatch.undo()
+    assert linear._shortest(large, right, 4, np.zeros(13))[0] is None
+
+
 @KINDS
 def test_constraints_that_contradict_each_other_are_not_averaged(kind: Any) -> None:
     matrix = saddle(np.array([[1.0, -1, 0, 0], [1.0, -1, 0, 0]]))
