@@ -1,6 +1,6 @@
 """The progress of a run on standard error: a line for each row that is judged, and how far the whole run is.
 
-A terminal has a bar for that below the rows, and a file a line every few seconds.
+A terminal has a bar for that below the rows, and a file a line every few seconds, for any long work.
 
 While the bar is up, Ctrl-C ends the run at the next case at the latest. Python drops an interrupt that arrives in a
 callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
@@ -28,7 +28,7 @@ from contactverif.run.judge import SLOW_CALL
 
 _BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
-_PAUSE = 5.0  # Seconds between two lines about the whole run, where there is no terminal.
+_PAUSE = 5.0  # Seconds between two lines about the whole, where there is no terminal.
 
 
 class _TimeColumn(TimeElapsedColumn):
@@ -84,9 +84,6 @@ class Bar:
         if (step.first_seconds or 0.0) >= SLOW_CALL:
             self._print(Text(f"{step.formulation}: a pairing and a residual take {step.first_seconds:.2g} s"))
         words = f"{f'{step.formulation} {step.property_id}'.rstrip()}: {step.phase} {step.count}/{step.planned}"
-        if self._progress.disable and monotonic() >= self._next_line:
-            self._next_line = monotonic() + _PAUSE
-            self._print(Text(f"{words}{_of_whole_run(self._of_run)}", style=PLAIN_STYLE))
         if self._of_run is None:
             self.update(words, 0, None)
         else:
@@ -116,6 +113,9 @@ class Bar:
         if self._interrupted:
             raise KeyboardInterrupt
         if self._progress.disable:
+            if monotonic() >= self._next_line:
+                self._next_line = monotonic() + _PAUSE
+                self._print(Text(f"{description}{_of_all(n_finished, n_planned, left)}", style=PLAIN_STYLE))
             return
         if self._task is None:
             self._task = self._progress.add_task(description, left=left)
@@ -124,12 +124,11 @@ class Bar:
         )
 
 
-def _of_whole_run(progress: scheduler.RunProgress | None) -> str:
-    """Return how far a run is, behind other words."""
-    if progress is None:
+def _of_all(n_finished: int, n_planned: int | None, left: str) -> str:
+    """Return how far all of it is, behind other words."""
+    if n_planned is None:
         return ""
-    left = _time_left(progress)
-    return f"; {progress.finished:,} of some {progress.planned:,} cases in all{left and f', {left}'}"
+    return f"; {n_finished:,} of some {n_planned:,} in all{left and f', {left}'}"
 
 
 def _time_left(progress: scheduler.RunProgress) -> str:

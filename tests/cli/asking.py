@@ -25,7 +25,8 @@ class Answer(NamedTuple):
 
 Ask = Callable[..., Answer]
 _ROW = re.compile(
-    r"^\S+ [a-z0-9.-]*: ([A-Za-z ]+(, \d+/\d+ judged| again)(: .*)?|[a-z ()]+ \d+/\d+(; .* cases in all.*)?)\n",
+    r"^(\S+ [a-z0-9.-]*: ([A-Za-z ]+(, \d+/\d+ judged| again)(: .*)?|[a-z ()]+ \d+/\d+)"
+    r"|.*; [\d,]+ of some [\d,]+ in all.*)\n",
     re.MULTILINE,
 )
 

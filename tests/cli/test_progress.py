@@ -24,9 +24,9 @@ def test_a_line_every_few_seconds_says_how_far_the_run_is(bar: Bar, capsys: pyte
     for count in range(6):
         bar.show_progress(step(count, 100.0 - count))
     assert capsys.readouterr().err.splitlines() == [
-        "mine purity: judging 1/100; 1,001 of some 4,255 cases in all, about 99 s left",
-        "mine purity: judging 3/100; 1,003 of some 4,255 cases in all, about 97 s left",
-        "mine purity: judging 5/100; 1,005 of some 4,255 cases in all, about 95 s left",
+        "mine purity: judging 1/100; 1,001 of some 4,255 in all, about 99 s left",
+        "mine purity: judging 3/100; 1,003 of some 4,255 in all, about 97 s left",
+        "mine purity: judging 5/100; 1,005 of some 4,255 in all, about 95 s left",
     ]
 
 
@@ -47,3 +47,13 @@ def test_a_slow_formulation_is_told_what_a_call_costs(bar: Bar, capsys: pytest.C
         bar.show_progress(Progress(name, "", "first call (compiles)", 1, 1, first_seconds=seconds))
     lines = capsys.readouterr().err.splitlines()
     assert [line for line in lines if "take" in line] == ["slow: a pairing and a residual take 0.25 s"]
+
+
+def test_work_without_rows_has_such_lines_too(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
+    """Such as a bench, which takes hours."""
+    for count in range(4):
+        bar.update("wavy, mesh 8, instance 0", 1000 + count, 1125)
+    assert capsys.readouterr().err.splitlines() == [
+        "wavy, mesh 8, instance 0; 1,001 of some 1,125 in all",
+        "wavy, mesh 8, instance 0; 1,003 of some 1,125 in all",
+    ]
