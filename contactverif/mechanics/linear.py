@@ -140,7 +140,7 @@ def _eliminate(stiffness: FloatArray) -> tuple[int, float, Solver, Solver]:
         solution: FloatArray = lapack.dgetrs(factors, pivots, right, trans=1)[0]
         return solution
 
-    return len(stiffness), float(condition), solve, solve_transposed
+    return len(stiffness), float(np.float32(condition)), solve, solve_transposed  # As in `_factorise`.
 
 
 def _factorise(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
