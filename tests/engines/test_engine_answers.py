@@ -9,7 +9,7 @@ from plain_engine import Plain
 from subjects import load_property
 
 from contactverif import Case, MisuseError, Verdict, judge_case, load_scene
-from contactverif.contract.engine import EngineAnswer, EngineTraits
+from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError
 from contactverif.isolation.host import end_all
@@ -163,3 +163,19 @@ def test_a_code_with_a_stiffness_of_its_own_is_judged_by_its_mean_pressure() -> 
     assert outcome.verdict is Verdict.PASS
     assert outcome.measurement is not None
     assert "mean pressure over that of hard contact" in outcome.measurement.details
+
+
+def test_a_body_that_flies_away_does_not_widen_its_own_tolerance() -> None:
+    """A code has said so in small units: displacements of 1e16 segments, no stress, and that it converged."""
+
+    class Flying(Plain):
+        def __init__(self) -> None:
+            super().__init__()
+            self.traits = EngineTraits("own", inclined_supports=True)
+
+        def solve(self, scene: SceneArrays) -> EngineAnswer:
+            return EngineAnswer(np.where(scene.body_of_node[:, None] == 0, [0.0, 1e9], 0.0), True)
+
+    verdict, reason = judge(EngineSubject("engine/flying", Flying()))
+    assert verdict is Verdict.FAIL
+    assert "stress error 1" in reason

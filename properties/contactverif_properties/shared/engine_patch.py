@@ -119,11 +119,14 @@ def _force_errors(case: Case, scene: Scene, solution: Solution, pressure: float)
 
 
 def engine_tolerance(scene: Scene, solution: Solution, accuracy: float, pressure: float) -> float:
-    """Return a (1 + M U/(ℓ p)) + 1e-12 κ: displacements that are wrong by a U strain the shortest segment."""
+    """Return a (1 + M U/(ℓ p)) + 1e-12 κ: displacements that are wrong by a U strain the shortest segment.
+
+    U is at most the size of the interface, or a body that flies away would excuse itself.
+    """
     modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
     nodes = scene.interface.nodes
     shortest = min(float(side.lengths(nodes).min()) for side in (scene.interface.slave, scene.interface.master))
-    displacement = float(np.abs(solution.displacements).max())
+    displacement = min(float(np.abs(solution.displacements).max()), float(np.ptp(nodes, axis=0).max()))
     return float(accuracy * (1 + modulus * displacement / (shortest * pressure)) + 1e-12 * _condition(scene))
 
 
