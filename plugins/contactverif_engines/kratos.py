@@ -83,7 +83,10 @@ class Kratos:
             job.time = solver.AdvanceInTime(job.time)
             job.InitializeSolutionStep()
             solver.Predict()
-            converged = bool(solver.SolveSolutionStep())
+            try:
+                converged = bool(solver.SolveSolutionStep())
+            except RuntimeError as error:  # Its solver of linear systems ends so where nothing holds a body.
+                return EngineAnswer(np.zeros_like(scene.nodes), False, message=str(error).strip().splitlines()[0])
             moves = np.array([list(node.GetSolutionStepValue(Kratos.DISPLACEMENT))[:2] for node in part.Nodes])
             order = np.argsort([node.Id for node in part.Nodes])[: len(scene.nodes)]
             iterations = int(part.ProcessInfo[Kratos.NL_ITERATION_NUMBER])
