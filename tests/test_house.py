@@ -110,7 +110,9 @@ ROOMS = {
         ),
     ),
     # A library is a file, and a call of it needs ctypes.
-    "contactverif_foreign": Room(("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo")),
+    "contactverif_foreign": Room(
+        ("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo", "ngsolve", "netgen")
+    ),
     "properties.shared": Room(
         ("contract", "oracle", "mechanics", "problems", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
     ),

@@ -83,6 +83,7 @@ LIBRARIES = (
     Choice("opensees", "kind=interface", library="openseespy"),
     Choice("fedoo", "kind=search_nearest", library="fedoo"),
     Choice("fedoo", "kind=bucket", library="fedoo"),
+    Choice("ngsolve", library="ngsolve"),
 )
 
 

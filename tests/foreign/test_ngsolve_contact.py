@@ -1,0 +1,54 @@
+"""The contact of NGSolve is read in the signs and the order of this project, with the places that it found."""
+
+import numpy as np
+import pytest
+
+from contactverif import Interface, MisuseError, Pairing
+from contactverif_foreign import ngsolve_contact
+
+DEPTH, PENALTY = 0.05, 10.0
+INTERFACE = Interface.from_chains([[0.0, 0.0], [1.5, 0.0], [4.0, 0.0]], [[5.0, 0.0], [2.0, 0.0], [-1.0, 0.0]])
+
+
+def pressed(depth: float) -> np.ndarray:
+    z = INTERFACE.nodes.copy()
+    z[: INTERFACE.n_slave_nodes, 1] -= depth
+    return z.ravel()
+
+
+@pytest.fixture
+def formulation() -> ngsolve_contact.NGSolveContact:
+    pytest.importorskip("ngsolve")
+    return ngsolve_contact.ngsolve(penalty=PENALTY)
+
+
+def test_a_uniform_depth_pushes_the_slave_up_and_the_master_down(formulation: ngsolve_contact.NGSolveContact) -> None:
+    z = pressed(DEPTH)
+    forces = formulation.residual(INTERFACE, Pairing(formulation.pair(INTERFACE, z)), z).reshape(-1, 2)
+    lengths = np.array([0.75, 2.0, 1.25])  # A slave node has half of its segments.
+    np.testing.assert_allclose(forces[:3], np.outer(-PENALTY * DEPTH * lengths, [0.0, 1.0]), atol=1e-13)
+    np.testing.assert_allclose(forces.sum(axis=0), 0.0, atol=1e-13)
+    assert (forces[3:, 1] > 0).all()
+
+
+def test_the_tangent_is_the_derivative_where_places_are_fixed(formulation: ngsolve_contact.NGSolveContact) -> None:
+    z = pressed(DEPTH)
+    z[1] -= 0.01
+    pairing, steps = Pairing(formulation.pair(INTERFACE, z)), 1e-6 * np.eye(len(z))
+    tangent = formulation.tangent(INTERFACE, pairing, z).toarray()
+    forward, back = ([formulation.residual(INTERFACE, pairing, z + sign * step) for step in steps] for sign in (1, -1))
+    np.testing.assert_allclose(tangent, (np.array(forward) - back).T / 2e-6, atol=1e-7)
+    np.testing.assert_allclose(tangent, tangent.T, atol=1e-13)
+
+
+def test_surfaces_apart_have_no_forces(formulation: ngsolve_contact.NGSolveContact) -> None:
+    z = pressed(-DEPTH)
+    pairing = Pairing(formulation.pair(INTERFACE, z))
+    assert not formulation.residual(INTERFACE, pairing, z).any()
+    assert not formulation.tangent(INTERFACE, pairing, z).toarray().any()
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ngsolve_contact, "find_spec", lambda name: None)
+    with pytest.raises(MisuseError, match=r"pip install 'contactverif\[ngsolve\]'"):
+        ngsolve_contact.ngsolve(penalty=1.0)
