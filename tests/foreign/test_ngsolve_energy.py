@@ -4,26 +4,26 @@ import numpy as np
 import pytest
 
 from contactverif import Interface, MisuseError, Pairing
-from contactverif_foreign import ngsolve_contact
+from contactverif_foreign import ngsolve_energy
 
 DEPTH, PENALTY = 0.05, 10.0
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.5, 0.0], [4.0, 0.0]], [[5.0, 0.0], [2.0, 0.0], [-1.0, 0.0]])
 
 
-def pressed(depth: float) -> np.ndarray:
+def press(depth: float) -> np.ndarray:
     z = INTERFACE.nodes.copy()
     z[: INTERFACE.n_slave_nodes, 1] -= depth
     return z.ravel()
 
 
 @pytest.fixture
-def formulation() -> ngsolve_contact.NGSolveContact:
+def formulation() -> ngsolve_energy.NGSolveContact:
     pytest.importorskip("ngsolve")
-    return ngsolve_contact.ngsolve(penalty=PENALTY)
+    return ngsolve_energy.ngsolve(penalty=PENALTY)
 
 
-def test_a_uniform_depth_pushes_the_slave_up_and_the_master_down(formulation: ngsolve_contact.NGSolveContact) -> None:
-    z = pressed(DEPTH)
+def test_a_uniform_depth_pushes_the_slave_up_and_the_master_down(formulation: ngsolve_energy.NGSolveContact) -> None:
+    z = press(DEPTH)
     forces = formulation.residual(INTERFACE, Pairing(formulation.pair(INTERFACE, z)), z).reshape(-1, 2)
     lengths = np.array([0.75, 2.0, 1.25])  # A slave node has half of its segments.
     np.testing.assert_allclose(forces[:3], np.outer(-PENALTY * DEPTH * lengths, [0.0, 1.0]), atol=1e-13)
@@ -31,8 +31,8 @@ def test_a_uniform_depth_pushes_the_slave_up_and_the_master_down(formulation: ng
     assert (forces[3:, 1] > 0).all()
 
 
-def test_the_tangent_is_the_derivative_where_places_are_fixed(formulation: ngsolve_contact.NGSolveContact) -> None:
-    z = pressed(DEPTH)
+def test_the_tangent_is_the_derivative_where_places_are_fixed(formulation: ngsolve_energy.NGSolveContact) -> None:
+    z = press(DEPTH)
     z[1] -= 0.01
     pairing, steps = Pairing(formulation.pair(INTERFACE, z)), 1e-6 * np.eye(len(z))
     tangent = formulation.tangent(INTERFACE, pairing, z).toarray()
@@ -41,14 +41,14 @@ def test_the_tangent_is_the_derivative_where_places_are_fixed(formulation: ngsol
     np.testing.assert_allclose(tangent, tangent.T, atol=1e-13)
 
 
-def test_surfaces_apart_have_no_forces(formulation: ngsolve_contact.NGSolveContact) -> None:
-    z = pressed(-DEPTH)
+def test_surfaces_apart_have_no_forces(formulation: ngsolve_energy.NGSolveContact) -> None:
+    z = press(-DEPTH)
     pairing = Pairing(formulation.pair(INTERFACE, z))
     assert not formulation.residual(INTERFACE, pairing, z).any()
     assert not formulation.tangent(INTERFACE, pairing, z).toarray().any()
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ngsolve_contact, "find_spec", lambda name: None)
+    monkeypatch.setattr(ngsolve_energy, "find_spec", lambda name: None)
     with pytest.raises(MisuseError, match=r"pip install 'contactverif\[ngsolve\]'"):
-        ngsolve_contact.ngsolve(penalty=1.0)
+        ngsolve_energy.ngsolve(penalty=1.0)
