@@ -59,7 +59,7 @@ class Kratos:
         plane = make_plane(scene)
         with tempfile.TemporaryDirectory() as folder, _working_in(folder):
             import KratosMultiphysics as Kratos
-            import KratosMultiphysics.ContactStructuralMechanicsApplication
+            from KratosMultiphysics import ContactStructuralMechanicsApplication as Contact
             from KratosMultiphysics import StructuralMechanicsApplication as Structural
             from KratosMultiphysics.StructuralMechanicsApplication.structural_mechanics_analysis import (
                 StructuralMechanicsAnalysis,
@@ -87,10 +87,16 @@ class Kratos:
                 converged = bool(solver.SolveSolutionStep())
             except RuntimeError as error:  # Its solver of linear systems ends so where nothing holds a body.
                 return EngineAnswer(np.zeros_like(scene.nodes), False, message=str(error).strip().splitlines()[0])
-            moves = np.array([list(node.GetSolutionStepValue(Kratos.DISPLACEMENT))[:2] for node in part.Nodes])
-            order = np.argsort([node.Id for node in part.Nodes])[: len(scene.nodes)]
+            nodes = sorted(part.Nodes, key=lambda node: node.Id)[: len(scene.nodes)]
+            moves = np.array([list(node.GetSolutionStepValue(Kratos.DISPLACEMENT))[:2] for node in nodes])
+            pressures = None
+            if self.kind == "multiplier":  # Multipliers have a unit of their own, and press where they are negative.
+                name, unit = Contact.LAGRANGE_MULTIPLIER_CONTACT_PRESSURE, float(part.ProcessInfo[Kratos.SCALE_FACTOR])
+                slave = np.unique(scene.slave).tolist()
+                pressures = np.array([-unit * nodes[number].GetSolutionStepValue(name) for number in slave])
             iterations = int(part.ProcessInfo[Kratos.NL_ITERATION_NUMBER])
-        return EngineAnswer(moves[order], converged, iterations, "" if converged else "no convergence in one step")
+        message = "" if converged else "no convergence in one step"
+        return EngineAnswer(moves, converged, iterations, message, pressures=pressures)
 
     def _settings(self, scene: SceneArrays) -> dict[str, Any]:
         """Return the parameters of the analysis."""
