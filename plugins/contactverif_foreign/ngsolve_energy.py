@@ -17,7 +17,7 @@ from scipy import sparse
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_count
+from contactverif.contract.option_checks import check_count, choose
 from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Evidence, Promises, Traits
 
@@ -40,11 +40,11 @@ class NGSolveContact:
 
     traits = Traits(Promises(conserves_force=True), evidence=Evidence(source="NGSolve, class ContactBoundary"))
 
-    def __init__(self, penalty: float, order: int, reach: float) -> None:
+    def __init__(self, penalty: float, is_energy: bool, order: int, reach: float) -> None:
         import netgen.meshing
         import ngsolve  # An extra, and whoever does not ask for it need not have it.
 
-        self.penalty, self.order, self.reach = penalty, order, reach
+        self.penalty, self.is_energy, self.order, self.reach = penalty, is_energy, order, reach
         self._ng, self._meshing = ngsolve, netgen.meshing
 
     def pair(self, interface: Interface, z: FloatArray) -> dict[str, Handle]:
@@ -54,9 +54,12 @@ class NGSolveContact:
         vertices = (ng.NodeId(ng.VERTEX, node) for node in range(interface.n_nodes))
         numbers = np.array([space.GetDofNrs(vertex)[part] for vertex in vertices for part in (0, 1)])
         contact = ng.ContactBoundary(mesh.Boundaries("slave"), mesh.Boundaries("master"))
-        u, place = space.TrialFunction(), ng.CF((ng.x, ng.y))
+        (u, v), place = space.TnT(), ng.CF((ng.x, ng.y))
         depth = (place + u - place.Other() - u.Other()) * contact.normal
-        contact.AddEnergy(ng.IfPos(depth, self.penalty / 2 * depth * depth, 0))
+        if self.is_energy:
+            contact.AddEnergy(ng.IfPos(depth, self.penalty / 2 * depth * depth, 0))
+        else:
+            contact.AddIntegrator(ng.IfPos(depth, self.penalty * depth, 0) * (v - v.Other()) * contact.normal)
         energy = Energy(ng.BilinearForm(space), contact, ng.GridFunction(space), numbers)
         energy.move(interface, z)
         reach = self.reach * float(interface.master.lengths(interface.nodes).max())
@@ -99,13 +102,15 @@ class NGSolveContact:
         return self._ng.Mesh(mesh)
 
 
-def ngsolve(*, penalty: float, order: int = 5, reach: float = inf) -> NGSolveContact:
+def ngsolve(*, penalty: float, kind: str, order: int = 5, reach: float = inf) -> NGSolveContact:
     """Return the contact of NGSolve with the energy ε̂/2 × depth².
 
     Parameters
     ----------
     penalty : float
         The stiffness ε̂, a force per length per length of depth.
+    kind : str
+        What NGSolve is given: the "energy" of springs, or their "work" in a virtual displacement.
     order : int
         The order of integration on each slave segment, ≥ 0.
     reach : float
@@ -115,8 +120,9 @@ def ngsolve(*, penalty: float, order: int = 5, reach: float = inf) -> NGSolveCon
     Raises
     ------
     MisuseError
-        If NGSolve is not installed, or the order is negative.
+        If there is no such kind, NGSolve is not installed, or the order is negative.
     """
+    is_energy = choose("kind", kind, {"energy": True, "work": False})
     if find_spec("ngsolve") is None:
         raise MisuseError("ngsolve", "no such package", "pip install 'contactverif[ngsolve]'")
-    return NGSolveContact(penalty, check_count(order, "order", least=0), reach)
+    return NGSolveContact(penalty, is_energy, check_count(order, "order", least=0), reach)

@@ -83,7 +83,7 @@ LIBRARIES = (
     Choice("opensees", "kind=interface", library="openseespy"),
     Choice("fedoo", "kind=search_nearest", library="fedoo"),
     Choice("fedoo", "kind=bucket", library="fedoo"),
-    Choice("ngsolve", library="ngsolve"),
+    Choice("ngsolve", "kind=energy", library="ngsolve"),
 )
 
 

@@ -16,10 +16,10 @@ def press(depth: float) -> np.ndarray:
     return z.ravel()
 
 
-@pytest.fixture
-def formulation() -> ngsolve_energy.NGSolveContact:
+@pytest.fixture(params=["energy", "work"])
+def formulation(request: pytest.FixtureRequest) -> ngsolve_energy.NGSolveContact:
     pytest.importorskip("ngsolve")
-    return ngsolve_energy.ngsolve(penalty=PENALTY)
+    return ngsolve_energy.ngsolve(penalty=PENALTY, kind=request.param)
 
 
 def test_a_uniform_depth_pushes_the_slave_up_and_the_master_down(formulation: ngsolve_energy.NGSolveContact) -> None:
@@ -51,4 +51,4 @@ def test_surfaces_apart_have_no_forces(formulation: ngsolve_energy.NGSolveContac
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ngsolve_energy, "find_spec", lambda name: None)
     with pytest.raises(MisuseError, match=r"pip install 'contactverif\[ngsolve\]'"):
-        ngsolve_energy.ngsolve(penalty=1.0)
+        ngsolve_energy.ngsolve(penalty=1.0, kind="energy")
