@@ -98,7 +98,7 @@ def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArra
     """Return the shortest solution and the number of multipliers that are not unique.
 
     The solution is None if positions are not unique, or if constraints contradict one another. Positions that bodies
-    and open contact hold are eliminated first, since singular values of what is left take a hundredth of the time.
+    and open contact hold are eliminated first, since singular values of so much less take a small part of the time.
     """
     full = dense(matrix)
     n, condition, solve, solve_transposed = _eliminate(full[:n_positions, :n_positions])
