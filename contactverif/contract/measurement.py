@@ -169,6 +169,7 @@ class Measurement:
     def __post_init__(self) -> None:
         clean(self, lines=("undecided", "broken"))
         object.__setattr__(self, "numbers", tuple(self.numbers))
+        object.__setattr__(self, "idle", bool(self.idle))  # numpy's would turn counts of cases into numpy's integers.
         if len(self.values) != len(self.numbers):
             raise ValueError("a quantity is measured twice")
 

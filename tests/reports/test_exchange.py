@@ -6,10 +6,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 import msgspec
+import numpy as np
 import pytest
+from handmade_report import run_with_kinds
 
 from contactverif import Run, load_formulation, load_properties, verify
-from contactverif.contract.result import NotLoaded
+from contactverif.contract.result import NotLoaded, Outcome
 from contactverif_reports.exchange.junit import write_junit
 from contactverif_reports.exchange.run_document import SCHEMA, RunDocument, document_of, schema, write_json
 from contactverif_reports.exchange.sarif import write_sarif
@@ -46,6 +48,21 @@ def test_the_document_says_what_the_run_says(run: Run, tmp_path: Path) -> None:
     assert [number.name for number in broken.counterexample.numbers]
     assert document.not_loaded[0].name == "gone"
     assert document.opposite_signs == ["vts-ppt"]
+
+
+def test_a_property_that_says_idle_with_a_truth_of_numpy_has_a_document(tmp_path: Path) -> None:
+    """`hard.c` said so of a formulation without forces: `size == 0 and bounds[0] > 0`."""
+    run = run_with_kinds()
+    rows = [replace(row, outcomes=tuple(map(_idle_by_numpy, row.outcomes))) for row in run.rows]
+    write_json(replace(run, rows=tuple(rows)), tmp_path / "run.json")
+    document = msgspec.json.decode((tmp_path / "run.json").read_bytes(), type=RunDocument)
+    assert sum(row.idle for row in document.rows) > 0
+
+
+def _idle_by_numpy(outcome: Outcome) -> Outcome:
+    if outcome.measurement is None:
+        return outcome
+    return replace(outcome, measurement=replace(outcome.measurement, idle=np.bool_(True)))
 
 
 def test_the_schema_in_the_repository_is_that_of_the_document() -> None:
