@@ -121,8 +121,9 @@ def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
     """Return the line of a row; None where displacements do not answer the question."""
     if row["result"] == "not applicable":
         return None
-    closest = row["closest"] or {"name": "", "value": nan, "tolerance": nan}
-    numbers = [f"{closest[key]:.2e}" if closest[key] == closest[key] else "" for key in ("value", "tolerance")]
+    closest = row["closest"] or {"name": "", "value": None, "tolerance": None}
+    # A report has no value for a number that is infinite or none.
+    numbers = ["" if closest[key] is None else f"{closest[key]:.2e}" for key in ("value", "tolerance")]
     seconds = f"{row['seconds'] / max(row['planned'], 1):.2g}"
     counts = (str(row[key]) for key in ("judged", "failed", "planned"))
     return choice.label, row["property"], row["result"], *counts, closest["name"], *numbers, seconds, row["reason"]

@@ -165,6 +165,14 @@ def test_a_curve_has_medians_and_failures_are_infinite() -> None:
     assert errors.tolist() == [0.3, inf]
 
 
+def test_an_instance_without_a_solution_takes_no_mesh_off_a_curve() -> None:
+    results = make_results(make_cells(), RUNS)
+    results.factorisation[0, [0, 6, 7]] = np.nan
+    assert curve(results, "vts-ppt", "wavy", "forces", "factorisation")[0].tolist() == pytest.approx([8e-3, 16e-3])
+    results.factorisation[0, :6] = np.nan
+    assert np.isnan(curve(results, "vts-ppt", "wavy", "forces", "factorisation")[0]).tolist() == [True, False]
+
+
 def test_the_table_of_starts_tells_failures_and_ranges() -> None:
     results = make_results(make_cells(), RUNS)
     results.counts[0, 0, 0, 0] = 7

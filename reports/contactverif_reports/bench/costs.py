@@ -139,13 +139,16 @@ def curve(
 ) -> tuple[FloatArray, FloatArray]:
     """Return a number and the least error over variants, both medians over instances, on each mesh (n_meshes,).
 
-    The error is infinite where fewer than half of the instances have a solution.
+    The error is infinite where fewer than half of the instances have a solution. The number is that of those that have
+    one: an instance without a solution has no factorisation.
     """
     row, ladders = results.formulations.index(formulation), results.ladders(scene)
     errors = results.errors_of(formulation, kind)[:, variants].min(axis=1)[ladders]
     values = results.evaluation[row].mean(axis=1) if number == "evaluation" else results.factorisation[row]
     with np.errstate(invalid="ignore"):
-        return np.median(values[ladders], axis=0), np.maximum(np.median(errors, axis=0), ROUNDOFF)
+        errors = np.maximum(np.median(errors, axis=0), ROUNDOFF)
+    solved = [column[np.isfinite(column)] for column in values[ladders].T]
+    return np.array([np.median(column) if column.size else nan for column in solved]), errors
 
 
 def rank(results: BenchResults, scene: str) -> list[str]:

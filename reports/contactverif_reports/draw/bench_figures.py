@@ -28,11 +28,12 @@ from contactverif_reports.bench.bench_text import (
     picture_of_each,
 )
 from contactverif_reports.bench.cost_tables import costs_at, format_share, ratios_at
-from contactverif_reports.bench.costs import REFERENCE, ROUNDOFF, curve, rank, runtimes
+from contactverif_reports.bench.costs import REFERENCE, ROUNDOFF, Cost, curve, rank, runtimes
 from contactverif_reports.bench.results import BEST, DEEPEST, ERRORS, RULE, VARIANTS, BenchResults
 from contactverif_reports.draw.case_figure import save
 from contactverif_reports.draw.curve_names import name_curves
 
+_NEVER: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7, "color": "0.45"}
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#8B4513")  # Okabe and Ito's, and brown.
 _MARKERS = "os^vDP"
 _AXES = {"evaluation": "one evaluation / ms", "factorisation": "one factorisation / ms"}
@@ -169,7 +170,8 @@ def make_cost_figure(results: BenchResults) -> Figure:
             counts = [cost.middle("systems") for cost in map(costs_at(results, scene, target).get, order) if cost]
             finite = [(count, place) for place, count in enumerate(counts) if count < inf]
             panels[1].plot(*zip(*finite, strict=True), color=colour, marker=marker, linestyle="none", mfc="none")
-        panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        _tell_who_fails(panels[1], [costs_at(results, scene, target) for target in targets], order)
+        panels[1].xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
         panels[1].set_xlim(left=0)
         titles = (f"one evaluation,\n{REFERENCE} = 1", "linear systems", f"one factorisation,\n{REFERENCE} = 1")
         for axes, title in zip(panels, titles, strict=True):
@@ -185,6 +187,13 @@ def make_cost_figure(results: BenchResults) -> Figure:
         ]
         figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
+
+
+def _tell_who_fails(axes: Axes, costs: list[dict[str, Cost]], order: list[str]) -> None:
+    """Write into the rows of those who reach no error that they never get there."""
+    for place, name in enumerate(order):
+        if not any(cost[name].is_usual for cost in costs):
+            axes.text(0.5, place, "never there", transform=axes.get_yaxis_transform(), **_NEVER)
 
 
 def _draw_ratios(
