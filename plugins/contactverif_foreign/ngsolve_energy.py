@@ -62,8 +62,10 @@ class NGSolveContact:
             contact.AddIntegrator(ng.IfPos(depth, self.penalty * depth, 0) * (v - v.Other()) * contact.normal)
         energy = Energy(ng.BilinearForm(space), contact, ng.GridFunction(space), numbers)
         energy.move(interface, z)
+        # No place is farther away. With a distance of 1e100 or more NGSolve may take another one than the nearest.
+        farthest = 2.0 * float(np.linalg.norm(np.ptp(z.reshape(-1, 2), axis=0)))
         reach = self.reach * float(interface.master.lengths(interface.nodes).max())
-        contact.Update(energy.moves, energy.form, self.order, reach)
+        contact.Update(energy.moves, energy.form, self.order, min(reach, farthest))
         return {"energy": Handle(energy)}
 
     def residual(self, interface: Interface, pairing: Pairing, z: FloatArray) -> FloatArray:
