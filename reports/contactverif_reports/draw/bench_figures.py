@@ -160,17 +160,17 @@ def make_cost_figure(results: BenchResults) -> Figure:
     """Return what two errors on the first scene cost: ratios of evaluation and factorisation, and linear systems."""
     scene = results.scenes[0]
     targets = results.targets[scene][:2]
-    order = rank(results, scene)[::-1]
+    order, costs = rank(results, scene)[::-1], [costs_at(results, scene, target) for target in targets]
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(5.2, 1.3 + 0.22 * len(order)), layout="constrained")
         panels = figure.subplots(1, 3, sharey=True)
-        for target, colour, marker in zip(targets, _COLOURS, _MARKERS, strict=False):
+        for target, each, colour, marker in zip(targets, costs, _COLOURS, _MARKERS, strict=False):
             for axes, number in zip(panels[[0, 2]], _AXES, strict=True):
                 _draw_ratios(axes, results, (scene, target, number), order, {"color": colour, "marker": marker})
-            counts = [cost.middle("systems") for cost in map(costs_at(results, scene, target).get, order) if cost]
+            counts = [each[name].middle("systems") for name in order]
             finite = [(count, place) for place, count in enumerate(counts) if count < inf]
             panels[1].plot(*zip(*finite, strict=True), color=colour, marker=marker, linestyle="none", mfc="none")
-        _tell_who_fails(panels[1], [costs_at(results, scene, target) for target in targets], order)
+        _tell_who_fails(panels[1], costs, order)
         panels[1].xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
         panels[1].set_xlim(left=0)
         titles = (f"one evaluation,\n{REFERENCE} = 1", "linear systems", f"one factorisation,\n{REFERENCE} = 1")
