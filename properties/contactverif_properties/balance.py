@@ -53,11 +53,11 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** Contact is internal to the pair of bodies: action equals reaction. A formulation that loses a
     part of a force accelerates a free body, and the reactions at the supports do not add up to the load.
 
-    **How it is judged.** The measured number is |ΣR| over Σ|R| of the slave. The tolerance is u(8Z/|g| + 4N): a gap is
-    a difference of positions, each rounded to uZ, and N forces are summed. Z is the diameter D of the state for a
-    formulation that promises `translation_stable`, and the largest coordinate X for any other: it may form points
-    first, and measure the gap of each side anew. The printed VTS-PPT fails by 1 − cos θ of the slave's force on a tilt
-    θ.
+    **How it is judged.** The measured number is |ΣR| over Σ|R| of the slave. The tolerance is u(8Z/|g| + 4N + 128): a
+    gap is a difference of positions, each rounded to uZ, N forces are summed, and the weights of two sides may come
+    from two rules of integration, known to 1e-14. Z is the diameter D of the state for a formulation that promises
+    `translation_stable`, and the largest coordinate X for any other: it may form points first, and measure the gap of
+    each side anew. The printed VTS-PPT fails by 1 − cos θ of the slave's force on a tilt θ.
 
     **Undecided.** Never: a change of partner moves forces between nodes and leaves their sum as it is.
     """
@@ -81,8 +81,8 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** Two forces that balance but do not lie on one line turn a free body without any cause.
 
     **How it is judged.** Moments are taken about the centroid of the nodes. The measured number is |Σ x×R| over D Σ|R|
-    of the slave, with the diameter D of the state. The tolerance is u(8Z/|g| + 4N), with the distance Z of
-    `balance.force`: a gap is a difference of positions, each rounded to uZ, and N forces are summed.
+    of the slave, with the diameter D of the state. The tolerance is u(8Z/|g| + 4N + 128), with the distance Z of
+    `balance.force`, and for its reasons.
 
     **Undecided.** Never: on either side of a kink a formulation that balances moments does so.
     """

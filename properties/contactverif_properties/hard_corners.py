@@ -35,12 +35,13 @@ from contactverif.problems.hard_corner_states import (
 )
 from contactverif_properties.shared.applicability import knows_total, may_act_twice
 from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.roundoff import SEGMENT_REASON, ratio
+from contactverif_properties.shared.roundoff import SEGMENT_REASON, WEIGHT_REASON, WEIGHT_ROUNDINGS, ratio
 from contactverif_properties.shared.uniform_pressure import normal_of, pushing_forces, uniform_state
 
-_TOLERANCE = "u(8X/min(|g|, ℓ) + 4N)"
-DIRECTION = Quantity("part outside the normals", _TOLERANCE, SEGMENT_REASON)
-TOTAL = Quantity("total force outside its bounds", _TOLERANCE, SEGMENT_REASON)
+_TOLERANCE = "u(8X/min(|g|, ℓ) + 4N + 128)"
+_REASON = f"{SEGMENT_REASON} {WEIGHT_REASON}"
+DIRECTION = Quantity("part outside the normals", _TOLERANCE, _REASON)
+TOTAL = Quantity("total force outside its bounds", _TOLERANCE, _REASON)
 TWO_PASSES = "springs act in two passes at most, on n + 1 nodes for n segments."
 SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASSES}")
 
@@ -53,7 +54,7 @@ def measure_bounded(case: Case, subject: Subject) -> Measurement:
     largest = case.penalty * case.diameter * case.slave_length
     numbers, broken = [SIZE.check(size / largest, 4.0)], ""
     reach = min(case.parameter("penetration"), case.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments)
+    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments + WEIGHT_ROUNDINGS)
     if bounds[1] == 0:
         broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
     else:
@@ -100,7 +101,7 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     bisector). So where `penalty`, `area` and `gap` are stated, the vertical force is ε̂ L cos a times a number between
     these two gaps, on both sides of the bisector: as δ goes to 0 it is continuous. A formulation that states no rule
     for gaps may smooth the master, which then bulges at the vertex, and is asked for the direction alone. The tolerance
-    is u(8X/min(|g|, ℓ) + 4N).
+    is u(8X/min(|g|, ℓ) + 4N + 128).
 
     **Undecided.** Never: on the bisector itself the bounds allow for either segment.
     """
@@ -119,8 +120,8 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** All gaps are d. Normals are along the axes, so the sum of both components of the total force
     is ε̂ d times the area that is felt: that of the parts that face a face along its normal at least, and the slave's
-    length at most. No force pulls. The tolerance is u(8X/min(|g|, ℓ) + 4N). Totals are asked where `penalty`, `area`
-    and `gap` are stated, directions of everybody.
+    length at most. No force pulls. The tolerance is u(8X/min(|g|, ℓ) + 4N + 128). Totals are asked where `penalty`,
+    `area` and `gap` are stated, directions of everybody.
 
     **Undecided.** Never: which face takes the node is left open by the bounds.
     """
@@ -143,7 +144,7 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     where `penalty` and `area` are stated, the total is at least ε̂ |g| times the length of the other segments, and at
     most that of the whole slave. The detail `share of the upper bound` shows the jump: compare the cases 0.0099 and
     0.0101 past the end for τ = 0.01. A slave wholly outside, by the length of a segment or more, must feel exactly
-    nothing, whatever the formulation. The tolerance is u(8X/min(|g|, ℓ) + 4N).
+    nothing, whatever the formulation. The tolerance is u(8X/min(|g|, ℓ) + 4N + 128).
 
     **Undecided.** Never: what a formulation may choose is inside the bounds.
     """

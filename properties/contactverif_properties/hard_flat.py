@@ -110,7 +110,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     coordinates of few enough bits. So the stored gap is uniform, and the forces are exact in rationals. Near 1e8 the
     stored gap is not the one that was asked for, and the stored one counts. What is asked depends on the traits: no
     force along the surface (everybody), the total (who states `penalty` and `area`), each nodal force (unless
-    `patch.flat` is False). The tolerance is u(8Z/|g| + 4N). Z is the diameter D of the interface for whoever
+    `patch.flat` is False). The tolerance is u(8Z/|g| + 4N + 128). Z is the diameter D of the interface for whoever
     says `translation_stable`, and the largest coordinate X for everybody else.
 
     **Undecided.** The case whose gap is one step of the doubles is undecided without that promise: there the tolerance
@@ -130,7 +130,7 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
     that looks at near segments only, or takes what is deep for the far side of the body, lets the bodies pass through.
 
     **How it is judged.** As in `hard.offset`: flat states that are exact in binary, no force along the surface, the
-    total and the nodal forces as the traits promise them, with the tolerance u(8Z/|g| + 4N).
+    total and the nodal forces as the traits promise them, with the tolerance u(8Z/|g| + 4N + 128).
 
     **Undecided.** Never.
     """
@@ -151,7 +151,7 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     of two bodies share lines more often than not, so this is the normal case.
 
     **How it is judged.** As in `hard.offset`: the interface is flat, so both segments give the same gap, and the exact
-    forces are those of a uniform pressure. The tolerance is u(8Z/|g| + 4N).
+    forces are those of a uniform pressure. The tolerance is u(8Z/|g| + 4N + 128).
 
     **Undecided.** Never: whichever segment a formulation takes, the answer is the same.
     """
@@ -172,7 +172,7 @@ def hard_search(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The flat part is the nearest surface, and the first that the slave's normal meets, for every
     point of the slave. So all rules agree, and the exact forces are those of a uniform pressure on it; all other nodes
-    are free. What is asked, and the tolerance u(8Z/|g| + 4N), are as in `hard.offset`.
+    are free. What is asked, and the tolerance u(8Z/|g| + 4N + 128), are as in `hard.offset`.
 
     **Undecided.** Never.
     """
@@ -180,9 +180,12 @@ def hard_search(case: Case, subject: Subject) -> Measurement:
 
 
 _END_SPRINGS = "Nodal springs are n + 1 for n segments, and roundoff may lose the two halves at the ends."
-MOST = Quantity("your springs, over ε̂ L", "k (1 + 1/n) + u(8Z/|g| + 4N)", f"k is 1 or 2 passes. {_END_SPRINGS}")
+MOST = Quantity("your springs, over ε̂ L", "k (1 + 1/n) + u(8Z/|g| + 4N + 128)", f"k is 1 or 2 passes. {_END_SPRINGS}")
 LEAST = Quantity(
-    "your springs, over ε̂ L, at least", "k (1 − 1/n) − u(8Z/|g| + 4N)", f"As above. {_END_SPRINGS}", sense="at least"
+    "your springs, over ε̂ L, at least",
+    "k (1 − 1/n) − u(8Z/|g| + 4N + 128)",
+    f"As above. {_END_SPRINGS}",
+    sense="at least",
 )
 
 
@@ -225,7 +228,7 @@ def scale(case: Case, subject: Subject) -> Measurement:
     and n is the number of slave nodes, 25 or 144; each has the mean area 1.
 
     A law that is not linear has no stiffness. The state is asked again at half the depth, and where the number changes
-    by more than u(8Z/|g| + 4N), it is kept as a detail and not judged.
+    by more than u(8Z/|g| + 4N + 128), it is kept as a detail and not judged.
 
     **Undecided.** Never.
     """

@@ -71,9 +71,10 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The measured number is the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both surfaces,
     and in space the largest |F − F_exact| over the largest exact force on a node.
-    The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N): a gap
-    is a difference of coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation,
-    because the state is turned and moved, and stored as it is rounded; `stability.local` asks on states that are exact.
+    The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N + 128):
+    a gap is a difference of coordinates, each rounded to uX, N forces are summed, and weights of integration are known
+    to 1e-14. X stands here for every formulation, because the state is turned and moved, and stored as it is rounded;
+    `stability.local` asks on states that are exact.
     With multipliers only the distribution of the forces is judged, and not their size: of uniform multipliers if they
     are pressures, and of those that come nearest to the exact forces if they are nodal forces. Of a barrier, whose
     slave is lifted to a uniform gap, the distribution is judged, too.
@@ -115,9 +116,8 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The measured number is |ΣF − ε̂ |g| A n| / (ε̂ |g| A) over the slave's nodes, with the current
     or the reference length A. The reference is scaled by a power of two, so that the two configurations differ.
-    Multipliers that are pressures are all ε̂ |g| here. The tolerance is u(8X/|g| + 4N): a gap is a difference of
-    coordinates, each rounded to uX, and N forces are summed. X stands here for every formulation, because the state is
-    turned and moved, and stored as it is rounded.
+    Multipliers that are pressures are all ε̂ |g| here. The tolerance is u(8X/|g| + 4N + 128), as in
+    `patch.flat.transmission`.
 
     **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly: roundoff
     decides whether the node is over the master.
@@ -241,9 +241,9 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The measured numbers are the largest |F − F_exact| / (ε̂ |g| L) over the nodes of both
     surfaces, the largest error of a reported gap over |g|, and that of a reported pressure over ε̂ |g|. The exact
-    forces are computed in rationals. The tolerance is u(8X/|g| + 4N), as in `patch.flat.transmission`, and multipliers
-    are judged as there. The promise is `patch.normal`; a formulation that passes any flat patch test is asked
-    too.
+    forces are computed in rationals. The tolerance is u(8X/|g| + 4N + 128), as in `patch.flat.transmission`, and
+    multipliers are judged as there. The promise is `patch.normal`; a formulation that passes any flat patch test is
+    asked too.
 
     **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly, and roundoff
     decides whether the node is over the master.
@@ -298,7 +298,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     `unbiased` has springs at the nodes of both surfaces, all with the same stiffness. How they share the penalty is its
     own choice, so their size is not judged here, but in `patch.flat.published`. The meshes are those of
     `patch.flat.single`, with a master that goes beyond the slave. The exact shares are computed in rationals. The
-    tolerance is u(8X/|g| + 4N).
+    tolerance is u(8X/|g| + 4N + 128).
 
     **Undecided.** Never: no node faces a free end of the other surface, and at a kink of a flat interface both partners
     give the same gap and the same force.
@@ -352,8 +352,8 @@ def patch_flat_published(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The measured number is the largest |F − F_stated| over all nodes, over the forces of all slave
     nodes. Forces are over penalty × penetration, with the penalty in the formulation's own unit. With multipliers, they
     are those of unit multipliers. On a case of which nothing is stated the consistent forces are asked of a formulation
-    that promises them, and nothing of any other. The tolerance is u(8X/|g| + 4N): a gap is a difference of coordinates,
-    and N forces are summed.
+    that promises them, and nothing of any other. The tolerance is u(8X/|g| + 4N + 128), as in
+    `patch.flat.transmission`.
 
     **Undecided.** Never: at a kink of a flat interface both partners give the same gap and the same force.
 

@@ -27,12 +27,12 @@ from contactverif_properties.shared.exact_places import (
 )
 from contactverif_properties.shared.face_places import ON_FACES, FacePlaces, area_error
 from contactverif_properties.shared.passes import Pass
-from contactverif_properties.shared.roundoff import sum_slave_forces
+from contactverif_properties.shared.roundoff import WEIGHT_REASON, WEIGHT_ROUNDINGS, sum_slave_forces
 
 ENDS_REASON = "An end that a master node cuts is a quotient of differences; X is added unless points keep their digits."
 WEIGHT = Quantity("weight against the area's ends", "16u", ENDS_REASON)
 ENDS = Quantity("area outside its segment, its point or its neighbour", "16u", ENDS_REASON)
-SUM = Quantity("error of the sum of weights", "64u", "As above; nodes that are covered by less than that are left out.")
+SUM = Quantity("error of the sum of weights", "192u", f"{WEIGHT_REASON} Nodes that are covered by less are left out.")
 
 
 @define_projection(
@@ -53,7 +53,7 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** All points are reported, active or not. A weight is a number ≥ 0. Where ends are reported of a
     point inside its segment, in either order, the weight is the length between them, in the configuration of the trait
     `area` (without the trait, in either); the point lies between them, and areas of one segment do not overlap: 16u of
-    the interface's diameter. The sum of the weights is held against an exact length, 64u of the diameter for each
+    the interface's diameter. The sum of the weights is held against an exact length, 192u of the diameter for each
     segment. Cells cover what the slave sees along its normal, segment by segment. Closest points add up to the slave's
     length; unless the trait `patch.overhang` is False, they need to only where the whole slave faces one master chain
     in all its normals. Points that look along the slave's normal need to where all of the slave sees the master.
@@ -79,7 +79,7 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
         trials = [_Areas(each, subject.traits, length, reported.distant, one_pass).errors() for length in lengths]
         best = min(trials, key=lambda trial: max(trial.values()))
         values = {name: max(value, best[name]) for name, value in values.items()}
-    tolerances = {name: {SUM: 64}.get(name, 16) * UNIT_ROUNDOFF for name in values}
+    tolerances = {name: {SUM: 64 + WEIGHT_ROUNDINGS}.get(name, 16) * UNIT_ROUNDOFF for name in values}
     fits = values[SUM] <= tolerances[SUM]
     return Measurement(
         check_all(values, tolerances), broken=_area_breach(reported, fits=fits), idle=not reported.points.active.any()

@@ -74,7 +74,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     `force_along` that along which contact pushes, `area` the configuration of ds. The first number is the part of the
     total force off that normal, over the total. The second is the error of the total force over its exact size, where
     `penalty` and `area` are stated. Multipliers that are pressures are uniform here, and nodal springs are asked for
-    the direction alone. The tolerance is u(8Z/|g| + 4N), where Z is the diameter of a formulation that promises
+    the direction alone. The tolerance is u(8Z/|g| + 4N + 128), where Z is the diameter of a formulation that promises
     `translation_stable`, and the largest coordinate of any other.
 
     In half of the cases the tilt is 35° to 89°, and no coordinate is rounded. Gaps along the slave's normal are up to
@@ -139,7 +139,7 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
     the middle of parts, and mortar methods, whose pressures come from weighted means.
 
     **How it is judged.** The largest error of a nodal force on the slave counts over the total. Gap, direction and
-    lengths follow from the traits as in `patch.tilted.resultant`. The tolerance is u(8Z/|g| + 4N), likewise.
+    lengths follow from the traits as in `patch.tilted.resultant`. The tolerance is u(8Z/|g| + 4N + 128), likewise.
 
     **Undecided.** Never: the slave is in contact with all its length, and far from the ends of the master.
     """

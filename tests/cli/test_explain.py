@@ -101,7 +101,7 @@ def report(ask: Ask, tmp_path: Path) -> Path:
 def test_the_numbers_of_a_case_stand_in_the_tolerance(report: Path, ask: Ask) -> None:
     answer = ask("explain", "patch.flat.transmission", "--report", report, columns=COLUMNS)
     flat = " ".join(words(answer.out))
-    assert "0.25, must be at most u(8X/|g| + 4N) = 1.11e-16·(8·4/|0.0625| + 4·3) = 5.82e-14. " in flat
+    assert "0.25, must be at most u(8X/|g| + 4N + 128) = 1.11e-16·(8·4/|0.0625| + 4·3 + 128) = 7.24e-14. " in flat
     assert "The worst place: slave node 0" in flat
     assert "slave ●─────2─────●" in flat
     assert f"contactverif replay {report} --case nts.patch.flat.transmission.witness" in answer.out

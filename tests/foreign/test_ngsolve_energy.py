@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from subjects import judge_as, load_property, load_subject
 
-from contactverif import Interface, MisuseError, Pairing, Surface
+from contactverif import Case, Interface, MisuseError, Pairing, Surface, Verdict
 from contactverif_foreign import ngsolve_energy
 
 DEPTH, PENALTY = 0.05, 10.0
@@ -60,6 +61,18 @@ def test_the_place_of_a_point_does_not_depend_on_the_order_of_segments() -> None
     ]
     assert np.linalg.norm(forces[0]) > 1.0
     np.testing.assert_allclose(forces[1], forces[0], atol=1e-13 * PENALTY)  # Roundings: sums of the same springs
+
+
+@pytest.mark.parametrize("order", [5, 7, 9])
+def test_computed_weights_of_integration_are_no_mistake(order: int) -> None:
+    """They add up to 1 − 26u, 1 − 54u and 1 − 71u, and one segment on one has exact forces at any order."""
+    pytest.importorskip("ngsolve")
+    subject, question = load_subject(f"ngsolve:kind=energy,order={order}"), load_property("patch.flat.normal")
+    interface = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [-1.5, 0.0]])
+    z = interface.nodes - np.repeat([[0.0, 1.25], [0.0, 0.0]], 2, axis=0)
+    flat = {"penetration": np.array(1.25), "along": interface.nodes[:, 0], "direction": np.array([1.0, 0.0])}
+    case = Case(interface, z.ravel(), 1.0, flat)
+    judge_as(Verdict.PASS, question, case, subject)
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,12 +27,12 @@ def test_the_mean_penetration_is_the_uniform_one_that_the_same_forces_need() -> 
 
 def test_the_tolerance_of_a_gap_is_the_formula() -> None:
     """X = 2 and N = 3."""
-    assert roundoff.gap_tolerance(case(), 1 / 8) == pytest.approx(U * (8 * 2 / (1 / 8) + 4 * 3), rel=1e-15)
+    assert roundoff.gap_tolerance(case(), 1 / 8) == pytest.approx(U * (8 * 2 / (1 / 8) + 4 * 3 + 128), rel=1e-15)
     assert roundoff.gap_tolerance(case(), 1e-9) > 1e6 * roundoff.gap_tolerance(case(), 1e-2)
 
 
 def test_where_nothing_penetrates_no_gap_is_rounded() -> None:
-    assert roundoff.gap_tolerance(case(), 0.0) == U * 4 * 3
+    assert roundoff.gap_tolerance(case(), 0.0) == U * (4 * 3 + 128)
 
 
 def test_a_stable_formulation_rounds_at_the_diameter_and_any_other_at_its_distance() -> None:

@@ -26,6 +26,14 @@ def test_a_force_the_other_way_has_a_negative_ratio() -> None:
     assert worst_force(case.interface, -exact, exact).remark == "ratio -1"
 
 
+@pytest.mark.parametrize("share", [2.0**-40, -(2.0**-40)])
+def test_a_ratio_that_four_digits_call_1_says_by_how_much_it_is_not(share: float) -> None:
+    case = named_case("c")
+    exact = forces_of_penetration(case)
+    remark = worst_force(case.interface, exact * (1 + share), exact).remark
+    assert remark == f"ratio 1 {'+' if share > 0 else '−'} 9.1e-13"
+
+
 def test_a_force_aside_has_both_components() -> None:
     case = named_case("c")
     exact = forces_of_penetration(case)

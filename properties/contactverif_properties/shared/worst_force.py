@@ -37,8 +37,15 @@ def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, 
     if not aside <= _ASIDE * float(np.abs(np.stack([force, right])).max()):
         return Finding(f"{place}, {COMPONENTS[len(force)]}", tuple(force), tuple(right), "N", *names)
     along, size = float(force @ direction), float(right @ direction)
-    ratio = f"ratio {along / size:.4g}" if size else ""
-    return Finding(place, (along,), (size,), "N", *names, ratio)
+    return Finding(place, (along,), (size,), "N", *names, _tell_ratio(along, size) if size else "")
+
+
+def _tell_ratio(force: float, right: float) -> str:
+    """Return a force over the right one in words, and by how much it differs from 1 if four digits do not say that."""
+    ratio, difference = f"ratio {force / right:.4g}", (force - right) / right
+    if ratio != "ratio 1" or difference == 0:
+        return ratio
+    return f"{ratio} {'+' if difference > 0 else '−'} {abs(difference):.2g}"
 
 
 def distance_from_line(force: FloatArray, direction: FloatArray) -> float:
