@@ -15,7 +15,13 @@ from strangers.middle_line import MiddleLine
 from strangers.nodal_least_squares import NodalLeastSquares
 from strangers.node_to_segment import NodesWithAreas, NodesWithMultipliers, NodesWithPotential
 from strangers.one_point import OnePoint
-from strangers.segment_penalty import BothSidesHalved, SegmentPenalty, SimpsonPoints
+from strangers.segment_penalty import (
+    BothSidesHalved,
+    ComputedPoints,
+    SegmentPenalty,
+    SimpsonPoints,
+    TabulatedPoints,
+)
 from strangers.smoothed_normals import SmoothedNormals
 from strangers.springs_at_points import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
 
@@ -30,6 +36,8 @@ STRANGERS: dict[str, Callable[..., Any]] = {
     "discontinuous quadratic mortar": DiscontinuousMortar,
     "exact segments with three Gauss points": SegmentPenalty,
     "exact segments with Simpson's rule": SimpsonPoints,
+    "exact segments with a table of 14 digits": TabulatedPoints,
+    "exact segments with five computed points": ComputedPoints,
     "both sides with half the stiffness": BothSidesHalved,
     "half passes in both directions": HalfPasses,
     "smoothed normals": SmoothedNormals,

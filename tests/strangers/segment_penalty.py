@@ -56,7 +56,7 @@ class SegmentPenalty:
         return np.hstack([*segments, ends])
 
     def _at_points(self, corners: Any) -> Any:
-        """Return gap, s, t, weight of the points (..., n, 3), and the normal into the slave (..., n, 1, 2)."""
+        """Return gap, s, t, weight of the points (..., n, n_places), and the normal into the slave (..., n, 1, 2)."""
         a, b, first, second, low, high = (corners[..., number, :] for number in range(6))
         along = b - a
         square = dot(along, along)
@@ -100,7 +100,7 @@ class SegmentPenalty:
         gap, s, t, weight, normal = self._at_points(self._corners(interface, strips, x))
         a, b = (x[interface.slave.segments[strips[:, 0], end]][:, None] for end in (0, 1))
         position = (1 - s)[..., None] * a + s[..., None] * b
-        slave, master = (np.repeat(strips[:, column], 3) for column in (0, 1))
+        slave, master = (np.repeat(strips[:, column], len(self.places)) for column in (0, 1))
         active = pairing["active"].ravel()
         gap, normals = gap.ravel(), np.broadcast_to(normal, position.shape).reshape(-1, 2)
         pressure, unknown = np.where(active, -self.penalty * gap, 0.0), np.full(gap.size, np.nan)
@@ -112,6 +112,22 @@ class SimpsonPoints(SegmentPenalty):
     """Springs at the points of Simpson's rule: at the ends of strips a shape is 0, or what roundoff leaves."""
 
     places, weights = np.array([0.0, 0.5, 1.0]), np.array([1.0, 4.0, 1.0]) / 6
+
+
+class TabulatedPoints(SegmentPenalty):
+    """Springs at three Gauss points from a table of 14 digits, whose weights add up to 1 + 45u."""
+
+    places = (np.array([-0.77459666924148, 0.0, 0.77459666924148]) + 1) / 2
+    weights = np.array([0.55555555555556, 0.88888888888889, 0.55555555555556]) / 2
+
+
+class ComputedPoints(SegmentPenalty):
+    """Springs at the five Gauss points that the library NGSolve 6.2.2608 computes; the weights add up to 1 − 71u."""
+
+    places = np.array([0.04691007703066802, 0.23076534494715845, 0.5, 0.7692346550528415, 0.9530899229693319])
+    weights = np.array(
+        [0.11846344252809062, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324, 0.11846344252809062]
+    )
 
 
 class BothSidesHalved:
