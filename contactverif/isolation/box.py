@@ -71,8 +71,9 @@ def environment(box: Box, folder: str) -> dict[str, str]:
     places = {"TMPDIR": folder, "NUMBA_CACHE_DIR": store}
     if box.by_rules:
         return places | {WRITABLE: os.pathsep.join(writable)}
-    # Rules of Landlock hold in a box, too: a pipe of another program can be written where a file cannot.
-    return places | {WRITABLE: os.pathsep.join((*writable, "/dev")), PROCESSES: str(MOST_PROCESSES)}
+    # Rules of Landlock hold in a box, too: a pipe of another program can be written where a file cannot. They leave TCP
+    # alone there: a box has a network of its own without anybody else, and libraries of MPI listen to a port of it.
+    return places | {WRITABLE: os.pathsep.join((*writable, "/dev", NETWORK)), PROCESSES: str(MOST_PROCESSES)}
 
 
 def kernel_folder(name: str) -> str:

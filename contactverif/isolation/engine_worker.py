@@ -1,8 +1,9 @@
 """The program of an engine's process, which is started by its path in the interpreter of the code.
 
-`python engine_worker.py MODULE:FUNCTION OPTIONS [FOLDER …]`: it makes the engine with options in JSON, finds modules in
-the folders too, and answers scenes until its judge is gone. Rule for the next editor: numpy and the standard library
-alone; of the harness nothing that imports more.
+`python engine_worker.py MODULE:FUNCTION OPTIONS PLACES [FOLDER …]`: it makes the engine with options in JSON, and
+answers scenes until its judge is gone. It finds modules in the folders too, and those that PLACES names in JSON,
+{name: folder}, but nothing else beside them. Rule for the next editor: numpy and the standard library alone; of the
+harness nothing that imports more.
 """
 
 from __future__ import annotations
@@ -15,12 +16,25 @@ import struct
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from importlib.machinery import ModuleSpec, PathFinder
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 if __name__ == "__main__":  # The folder of this file holds modules of the harness, and none that engines need.
     sys.path[:1] = []
-    sys.path += [folder for folder in sys.argv[3:] if folder not in sys.path]
+    sys.path += [folder for folder in sys.argv[4:] if folder not in sys.path]
+
+    class Places:
+        """A finder of the modules that PLACES names, each in its folder, after all others."""
+
+        folders: ClassVar[dict[str, str]] = json.loads(sys.argv[3])
+
+        @classmethod
+        def find_spec(cls, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+            """Return where a module is, or None; what lies in a package is found as usual."""
+            return PathFinder.find_spec(name, [cls.folders[name]]) if name in cls.folders else None
+
+    sys.meta_path.append(Places)
 
 import numpy as np
 

@@ -85,17 +85,26 @@ def engine_program(entry: str, options: Mapping[str, Any], python: str | None = 
     An interpreter of its own finds its own modules first, and of this process's the harness alone.
     """
     worker = str(Path(__file__).with_name("engine_worker.py"))
-    folders = [folder for folder in sys.path if folder] if python is None else _folders_of(entry)
-    return python or sys.executable, worker, entry, json.dumps(options), *folders
+    places, folders = ({}, filter(None, sys.path)) if python is None else (_places_of(entry), ())
+    return python or sys.executable, worker, entry, json.dumps(options), json.dumps(places), *folders
 
 
-def _folders_of(entry: str) -> list[str]:
-    """Return the folders in which the harness and the package of an entry point lie."""
+def _places_of(entry: str) -> dict[str, str]:
+    """Return {module: folder} of the harness, of what is installed together with an entry point, and of `landlockpy`.
+
+    The folder may be that of all packages of this interpreter, such as a numpy that another one cannot load.
+    """
     import importlib.util
+    from importlib.metadata import packages_distributions
 
-    packages = "contactverif", entry.partition(":")[0].partition(".")[0]
-    files = [spec.origin for name in packages if (spec := importlib.util.find_spec(name)) is not None]
-    return list(dict.fromkeys(str(Path(file).parent.parent) for file in files if file is not None))
+    module, owners = entry.partition(":")[0].partition(".")[0], packages_distributions()
+    installed = set(owners.get(module, ()))
+    names = {"contactverif", module, "landlockpy", *(name for name in owners if installed & set(owners[name]))}
+    specs = {name: spec for name in sorted(names) if (spec := importlib.util.find_spec(name)) and spec.origin}
+    return {
+        name: str(Path(spec.origin or "").parents[bool(spec.submodule_search_locations)])
+        for name, spec in specs.items()
+    }
 
 
 def load_remote_engine(command: tuple[str, ...], name: str, limits: Limits) -> EngineSubject | NotLoaded:

@@ -1,7 +1,8 @@
 """An engine is loaded, asked and judged, in this process and in one of its own, whatever it does."""
 
-import sys
+import sysconfig
 from pathlib import Path
+from venv import EnvBuilder
 
 import numpy as np
 import pytest
@@ -131,10 +132,17 @@ def test_the_process_of_an_engine_imports_numpy_and_the_standard_library_alone()
     assert answer.converged is False
 
 
-def test_another_interpreter_gets_of_this_one_the_harness_alone() -> None:
-    *_, entry, options, folder = engine_program("contactverif_engines.control:Control", {}, sys.executable)[:5]
-    assert (entry, options) == ("contactverif_engines.control:Control", "{}")
-    assert Path(folder, "contactverif", "contract", "engine.py").is_file()
+def test_another_interpreter_gets_of_this_one_the_harness_and_its_engine_alone(tmp_path: Path) -> None:
+    """Everything else that lies beside them stayed visible, such as `landlockpy` or a scipy of another numpy."""
+    EnvBuilder(symlinks=True, system_site_packages=False).create(tmp_path)
+    packages = Path(sysconfig.get_path("purelib", "venv", {"base": str(tmp_path)}))
+    for folder in Path(np.__file__).parents[1].glob("numpy*"):
+        (packages / folder.name).symlink_to(folder)
+    command = engine_program("plain_engine:Plain", {"fault": "tells what it finds"}, str(tmp_path / "bin" / "python"))
+    subject = load_remote_engine(command, "engine/plain", Limits(20.0))
+    assert isinstance(subject, EngineSubject), subject
+    answer = subject.solve(load_scene("a1").arrays())
+    assert answer.message.split() == ["contactverif", "numpy", "plain_engine"]
 
 
 def test_a_question_about_forces_says_why_an_engine_is_not_asked() -> None:

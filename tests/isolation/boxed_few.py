@@ -74,6 +74,12 @@ def connect_by_network(port):
     socket.create_connection(("127.0.0.1", int(port)), 1).close()
 
 
+def talk_to_itself(host):
+    """Listen to a port, and connect to it."""
+    with socket.create_server((host, 0)) as listener:
+        socket.create_connection(listener.getsockname(), 1).close()
+
+
 def connect_by_file(path):
     with socket.socket(socket.AF_UNIX) as line:
         line.connect(path)

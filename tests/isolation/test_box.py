@@ -123,6 +123,12 @@ def test_no_line_leads_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @needs_box
+def test_a_box_has_a_network_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rules of Landlock took its ports away, and OpenSees, which listens to one, ended as it was imported."""
+    assert try_targets(monkeypatch, Box(), talk_to_itself="127.0.0.1") == {"talk_to_itself"}
+
+
+@needs_box
 def test_shared_memory_is_that_of_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
     memory = Path(f"/dev/shm/contactverif-{os.getpid()}")
     memory.write_text("of this process", encoding="utf-8")
