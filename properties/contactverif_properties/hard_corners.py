@@ -46,8 +46,11 @@ TWO_PASSES = "springs act in two passes at most, on n + 1 nodes for n segments."
 SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASSES}")
 
 
-def measure_bounded(case: Case, subject: Subject) -> Measurement:
-    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap."""
+def measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measurement:
+    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap.
+
+    So much of the force may point `aside`, a force ≥ 0.
+    """
     bounds = case.parameters["segment_bounds" if subject.traits.rules.gap else "bounds"] * case.penalty
     slave = pushing_forces(uniform_state(case, subject))[: case.interface.n_slave_nodes]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
@@ -58,7 +61,8 @@ def measure_bounded(case: Case, subject: Subject) -> Measurement:
     if bounds[1] == 0:
         broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
     else:
-        numbers.append(DIRECTION.check(ratio(_outside(total, case.parameters["edges"]), size), tolerance))
+        outside = max(0.0, _outside(total, case.parameters["edges"]) - aside)
+        numbers.append(DIRECTION.check(ratio(outside, size), tolerance))
         # A master that is smoothed through its nodes bulges at a kink, and who states no rule for gaps may do that.
         straight = bool((case.parameters["edges"][0] == case.parameters["edges"][1]).all())
         if knows_total(subject.traits) and (straight or subject.traits.rules.gap is not None):
@@ -146,9 +150,15 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     0.0101 past the end for τ = 0.01. A slave wholly outside, by the length of a segment or more, must feel exactly
     nothing, whatever the formulation. The tolerance is u(8X/min(|g|, ℓ) + 4N + 128).
 
+    The force points along the common normal. If forces are the derivative of an energy of what is covered, the end
+    that cuts the cover is pushed along the surface by the energy there, ε̂ g²/2 for a length. That is subtracted, unless
+    the trait `force_along` says that contact pushes along a normal, or `symmetric` is False.
+
     **Undecided.** Never: what a formulation may choose is inside the bounds.
     """
-    return measure_bounded(case, subject)
+    traits, gap = subject.traits, case.parameter("penetration")
+    may_have_energy = traits.rules.force_along is None and traits.promises.symmetric is not False
+    return measure_bounded(case, subject, case.penalty * gap**2 / 2 if may_have_energy else 0.0)
 
 
 def promise_no_wild_force(traits: Traits) -> bool | None:

@@ -37,7 +37,11 @@ def refuse_without_rule(traits: Traits) -> str:
 
 # Two ends of an overlap are scalar products of two terms, each rounded by 2u of the lengths.
 OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
-FARTHER = Quantity("distance beyond the nearest segment", "4u", LOCAL_REASON)
+# A search may call segments tied whose distances differ by so little, and no gap shows which of them it took.
+TIED = 1e-12
+FARTHER = Quantity(
+    "distance beyond the nearest segment", "1e-12", "A search may call segments tied that differ by less."
+)
 
 
 @define_projection(
@@ -55,7 +59,7 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The point is formed in rationals from the stored nodes and c. The number is how much farther
     the reported segment is than the nearest, a length that is exact, over the lengths of which a gap is a difference.
-    It must be at most 4u. So a tie needs no rule: of segments at the same distance any is right. Along the slave's
+    It must be at most 1e-12. So a tie needs no rule: of segments at the same distance any is right. Along the slave's
     normal, a segment must face the slave and be met by the line. Of one that is seen edge-on, rounding may leave an
     overlap: a point whose weight is at most 8u of those lengths may name it. For `cells` it may be the nearest at the
     point or in the middle of its overlap, and segments beyond two lengths of both are no rivals.
@@ -67,7 +71,7 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
     """
     if case.interface.dim != PLANE:
         value, broken, idle = face_errors(case, subject)
-        return Measurement([FARTHER.check(value, 4 * UNIT_ROUNDOFF)], broken=broken, idle=idle)
+        return Measurement([FARTHER.check(value, TIED)], broken=broken, idle=idle)
     reported = Reported.from_case(case, subject)
     rule, value, ties, broken = subject.traits.rules.gap, 0.0, 0, ""
     for each in reported.passes:
@@ -85,7 +89,7 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
         if not (facing | rounded).all():
             broken = "a master segment does not face the slave segment of its point"
     return Measurement(
-        [FARTHER.check(value, 4 * UNIT_ROUNDOFF)],
+        [FARTHER.check(value, TIED)],
         broken=broken,
         details={"tied points": ties},
         idle=not reported.points.active.any(),

@@ -50,17 +50,18 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** The weight is the stiffness of a point. A length that is counted twice, or not at all, is a
     contact that is too stiff or too soft in one place. A sum over the whole interface hides it where two errors cancel.
 
-    **How it is judged.** All points are reported, active or not. A weight is a number ≥ 0. Where ends are reported of a
-    point inside its segment, in either order, the weight is the length between them, in the configuration of the trait
-    `area` (without the trait, in either); the point lies between them, and areas of one segment do not overlap: 16u of
-    the interface's diameter. The sum of the weights is held against an exact length, 192u of the diameter for each
-    segment. Cells cover what the slave sees along its normal, segment by segment. Closest points add up to the slave's
-    length; unless the trait `patch.overhang` is False, they need to only where the whole slave faces one master chain
-    in all its normals. Points that look along the slave's normal need to where all of the slave sees the master.
-    Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is asked only where the
-    slave faces one master chain as above, since cells of averaged normals overlap where a master folds back.
+    **How it is judged.** All points are reported, active or not. A weight is ≥ 0, or negative by rounding. Where ends
+    are reported of a point inside its segment, in either order, the weight is the length between them, in the
+    configuration of the trait `area` (without the trait, in either); the point lies between them, and areas of one
+    segment do not overlap: 16u of the interface's diameter. The sum of the weights is held against an exact length,
+    192u of the diameter for each segment. Cells cover what the slave sees along its normal, segment by segment. Closest
+    points add up to the slave's length; unless the trait `patch.overhang` is False, they need to only where the whole
+    slave faces one master chain in all its normals. Points that look along the slave's normal need to where all of the
+    slave sees the master. Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is
+    asked only where the slave faces one master chain as above, since cells of averaged normals overlap where a master
+    folds back.
 
-    In space a weight is an area, negative by rounding at most, and areas have no ends. The sums are over the diameter
+    In space a weight is an area, and areas have no ends. The sums are over the diameter
     and the longest edge, or the area's root. Closest points add up to the slave's area where they are all its nodes.
 
     **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is
@@ -92,8 +93,8 @@ def _area_breach(reported: Reported, *, fits: bool) -> str:
     Idle points are left out if no point is idle, and lengths are missing.
     """
     points = reported.points
-    # An area of no more than rounding may have either sign, a length not.
-    rounding = 16 * UNIT_ROUNDOFF * reported.distant**2 if reported.state.interface.dim != PLANE else 0.0
+    # What a cell of no more than rounding covers may have either sign.
+    rounding = 16 * UNIT_ROUNDOFF * reported.distant ** (reported.state.interface.dim - 1)
     if not (points.weight >= -rounding).all():
         return "a weight is negative or NaN"
     length = sum(float(_lengths(each, reported.traits)[0].sum()) for each in reported.passes)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
 from strangers import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
+from strangers.segment_penalty import SegmentPenalty
 from subjects import load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
@@ -115,6 +116,32 @@ def test_only_an_end_that_roundoff_loses_is_undecided(name: str) -> None:
     reasons = {outcome.reason for outcome in outcomes if not outcome.decided}
     assert reasons == {LOST_END}
     assert Verdict.FAIL not in {outcome.verdict for outcome in outcomes}
+
+
+class ProductsOfPositions:
+    """Exact segments, whose gaps are wrong by what overhangs times the distance from the origin, as in D x − M x."""
+
+    traits = Traits(Promises(patch=PatchPromises(flat=True)), Rules(penalty="distributed", area="current"))
+
+    def __init__(self, *, penalty: float) -> None:
+        self.springs = SegmentPenalty(penalty=penalty)
+        self.pair = self.springs.pair
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        x, forces = z.reshape(-1, 2), self.springs.residual(interface, pairing, z).reshape(-1, 2)
+        along = np.diff(x[interface.slave.segments[0]], axis=0)[0]
+        slave, master = np.split(x @ (along / np.linalg.norm(along)), [interface.n_slave_nodes])
+        overhang = max(0.0, slave.max() - master.max(), master.min() - slave.min())
+        forces[0] += self.springs.penalty * overhang * np.abs(x).max() * forces[0] / np.linalg.norm(forces[0])
+        return forces.reshape(z.shape)
+
+
+@pytest.mark.parametrize(("stable", "verdict"), [(None, Verdict.UNDECIDED), (True, Verdict.FAIL)])
+def test_what_overhangs_by_a_rounding_excuses_an_error_of_that_size(stable: bool | None, verdict: Verdict) -> None:
+    subject = with_promises(ProductsOfPositions, translation_stable=stable)
+    question = load_property("patch.flat.transmission")
+    verdicts = {judge_case(question, case, subject).verdict for case in draw("patch.flat.transmission", examples=200)}
+    assert verdicts == {Verdict.PASS, verdict}
 
 
 def test_a_force_lost_elsewhere_is_a_failure_though_an_end_is_lost_too() -> None:

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from strangers import STRANGERS
-from strangers.segment_penalty import SimpsonPoints
+from strangers.one_point import OnePoint
+from strangers.segment_penalty import SegmentPenalty, SimpsonPoints
 from subjects import judge_as, load_property
 
 from contactverif import Case, Interface, Subject, Verdict, judge_case
@@ -53,3 +54,11 @@ def test_dust_at_a_node_that_a_strip_reaches_by_a_rounding_is_no_wrong_row(prope
         interface = Interface.from_chains(slave, master=[[x, 0.0] for x in (6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0)])
         case = Case(interface, interface.nodes.reshape(-1), 1.0)
         judge_as(Verdict.PASS, question, case, subject)
+
+
+@pytest.mark.parametrize("make", [SegmentPenalty, OnePoint])
+def test_a_body_behind_that_of_the_slave_is_no_partner(make: Any) -> None:
+    """The slave reaches past the master, and there its normal meets another body, 64 diameters behind its own."""
+    interface = Interface.from_chains([[1 / 112, -0.375], [113 / 112, -0.125]], [[1.0, 0.0], [0.0, 0.0]])
+    case = Case(interface, interface.nodes.reshape(-1), 1.0, seed=359)
+    judge_as(Verdict.PASS, load_property("remote"), case, Subject("strips", make))

@@ -37,13 +37,14 @@ class SegmentPenalty:
     )
 
     places, weights = GAUSS
+    snap = 0.0  # The share of a segment within which a node of the master lies on its end.
 
     def __init__(self, *, penalty: float) -> None:
         self.penalty = penalty
 
     def pair(self, interface: Any, z: Any) -> Any:
         x = z.reshape(-1, 2)
-        strips = visible_strips(interface.slave.segments, interface.master.segments, x)
+        strips = visible_strips(interface.slave.segments, interface.master.segments, x, self.snap)
         return {"strips": strips, "active": self._at_points(self._corners(interface, strips, x))[0] < 0}
 
     def _corners(self, interface: Any, strips: Any, x: Any) -> Any:
