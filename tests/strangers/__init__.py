@@ -24,6 +24,7 @@ from strangers.segment_penalty import (
 )
 from strangers.smoothed_normals import SmoothedNormals
 from strangers.springs_at_points import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
+from strangers.strip_energy import StripEnergy
 
 __all__ = ["STRANGERS", "NearbyOnly", "PointsFirst", "SlaveNormalAtGaussPoints", "TurnedFrame"]
 
@@ -47,5 +48,6 @@ STRANGERS: dict[str, Callable[..., Any]] = {
     "nodes with areas of the reference": NodesWithPotential,
     "nodes with multipliers": NodesWithMultipliers,
     "springs on the middle line": MiddleLine,
+    "an energy of what faces the master": StripEnergy,
     "a logarithmic barrier on both sides": LogBarrier,
 }
