@@ -82,7 +82,7 @@ def _unpack(packed: PackedArray) -> Any:
 def engine_program(entry: str, options: Mapping[str, Any], python: str | None = None) -> tuple[str, ...]:
     """Return the command that makes an engine of an entry point, by default in the interpreter of this process.
 
-    An interpreter of its own finds its own modules first, and of this process's the harness alone.
+    An interpreter of its own finds its own modules first, and of this process's the harness and the engine alone.
     """
     worker = str(Path(__file__).with_name("engine_worker.py"))
     places, folders = ({}, filter(None, sys.path)) if python is None else (_places_of(entry), ())
@@ -100,10 +100,11 @@ def _places_of(entry: str) -> dict[str, str]:
     module, owners = entry.partition(":")[0].partition(".")[0], packages_distributions()
     installed = set(owners.get(module, ()))
     names = {"contactverif", module, "landlockpy", *(name for name in owners if installed & set(owners[name]))}
-    specs = {name: spec for name in sorted(names) if (spec := importlib.util.find_spec(name)) and spec.origin}
+    specs = ((name, importlib.util.find_spec(name)) for name in sorted(names))
     return {
-        name: str(Path(spec.origin or "").parents[bool(spec.submodule_search_locations)])
-        for name, spec in specs.items()
+        name: str(Path(spec.origin).parents[bool(spec.submodule_search_locations)])
+        for name, spec in specs
+        if spec and spec.origin
     }
 
 

@@ -88,12 +88,8 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
     """
-    measure = partial(uniform_pressure.measure_transmission, FORCE, subject=subject)
-    measurement = _unless_end_is_lost(case, measure)
-    (number,) = measurement.numbers
-    resolution = case.largest_coordinate / case.shortest_segment
-    levers = 0.0 if subject.traits.promises.translation_stable else number.tolerance * resolution
-    return measurement if number.value <= levers else replace(measurement, undecided="")
+    most = 0.0 if subject.traits.promises.translation_stable else case.largest_coordinate / case.shortest_segment
+    return _unless_end_is_lost(case, partial(uniform_pressure.measure_transmission, FORCE, subject=subject), most)
 
 
 def refuse_unknown_total(traits: Traits) -> str:
@@ -165,13 +161,13 @@ def measure_class(case: Case, subject: Subject) -> Measurement:
     return _unless_end_is_lost(case, partial(_measure_once, subject=subject))
 
 
-def _unless_end_is_lost(case: Case, measure: Callable[[Case], Measurement]) -> Measurement:
+def _unless_end_is_lost(case: Case, measure: Callable[[Case], Measurement], most: float = np.inf) -> Measurement:
     """Return what is measured in a case, undecided if it fails only where roundoff decides whether an end overhangs.
 
-    `measure` returns the numbers of a case.
+    `measure` returns the numbers of a case. More than `most` times a tolerance is never undecided.
     """
     measurement = measure(case)
-    if _is_within(measurement, 1.0):
+    if _is_within(measurement, 1.0) or not _is_within(measurement, most):
         return measurement
     inside = _move_ends_inwards(case)
     loses_end = inside is not None and _heals(measurement, measure(inside))
