@@ -13,7 +13,7 @@ from importlib import import_module
 from inspect import getdoc
 from math import isfinite
 from sys import modules
-from typing import Any, TypedDict, Unpack
+from typing import Annotated, Any, TypedDict, Unpack
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
@@ -23,6 +23,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import TRIANGLE
 from contactverif.contract.foreign_text import clean, refuse
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
+from contactverif.contract.records import StoredAs
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 
@@ -290,7 +291,7 @@ class Outcome:
         The plugin broke the contract or returned NaN: a failure that no statement excuses.
     """
 
-    case_or_summary: Case | CaseSummary
+    case_or_summary: Annotated[Case | CaseSummary, StoredAs("summary", CaseSummary)]
     verdict: Verdict
     reason: str = ""
     measurement: Measurement | None = None
