@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-NOT_RUN = {"ipykernel", "nbclient", "radon", "tox"}  # No test of the environment `floors` uses them.
+NOT_RUN = {"ipykernel", "nbclient", "tox"}  # No test of the environment `floors` uses them.
 
 
 def _parts(version: str) -> tuple[int, ...]:

@@ -7,7 +7,6 @@ import ast
 import configparser
 import importlib
 import re
-import statistics
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -17,8 +16,6 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
-from radon.complexity import cc_visit
-from radon.visitors import Function
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -328,60 +325,6 @@ def test_a_file_name_says_which_file_is_meant() -> None:
         if path.stem != "__init__":
             names.setdefault(path.stem, []).append(str(path.relative_to(ROOT)))
     assert not {name: paths for name, paths in names.items() if len(paths) > 1}
-
-
-# What the house may measure. `pytest tests/test_house.py -s -k measure` prints what it does measure.
-MOST_FUNCTIONS_ABOVE_TEN = 25  # Functions with a cyclomatic complexity above 10, by radon.
-MOST_ARGUMENTS = 12  # Arguments of one function, `self` not counted.
-MOST_LONG_FILES = 8  # Files with more than LONG lines, of more than 160.
-LONG = 400
-MEDIAN_LINES = (50, 200)
-
-
-def functions() -> Iterator[tuple[str, Function]]:
-    """Return (place, function) of every function and method of the house."""
-    for path in SOURCES.values():
-        for block in cc_visit(path.read_text(encoding="utf-8")):
-            if isinstance(block, Function):
-                yield f"{path.relative_to(ROOT)}:{block.lineno}: {block.fullname}", block
-
-
-def arguments() -> Iterator[tuple[str, int]]:
-    """Return (place, number of arguments) of every function and method of the house."""
-    for module, path in SOURCES.items():
-        for node in ast.walk(trees()[module]):
-            if isinstance(node, ast.FunctionDef):
-                everything = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-                names = [argument.arg for argument in everything if argument.arg not in ("self", "cls")]
-                yield f"{path.relative_to(ROOT)}:{node.lineno}: {node.name}", len(names)
-
-
-def test_few_functions_measure_above_ten() -> None:
-    above = {place: block.complexity for place, block in functions() if block.complexity > 10}
-    print(f"\n{len(above)} functions with a complexity above 10; the largest is {max(above.values(), default=0)}")
-    listing = "\n".join(f"{place} ({complexity})" for place, complexity in sorted(above.items()))
-    assert len(above) <= MOST_FUNCTIONS_ABOVE_TEN, f"{len(above)} functions above 10:\n{listing}"
-
-
-def test_no_function_measures_too_many_arguments() -> None:
-    numbers = dict(arguments())
-    print(f"\nthe largest number of arguments is {max(numbers.values())}")
-    assert not {place: number for place, number in numbers.items() if number > MOST_ARGUMENTS}
-
-
-def test_files_measure_what_a_reader_takes_in() -> None:
-    lines = {
-        str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES.values()
-    }
-    full = {path: number for path, number in lines.items() if not path.endswith("__init__.py")}
-    largest = max(full, key=full.__getitem__)
-    median = statistics.median(full.values())
-    print(
-        f"\n{len(full)} files in {len(ROOMS)} folders; the median has {median:g} lines, {largest} has {full[largest]}"
-    )
-    assert MEDIAN_LINES[0] <= median <= MEDIAN_LINES[1]
-    long = {path: number for path, number in full.items() if number > LONG}
-    assert len(long) <= MOST_LONG_FILES, long
 
 
 def test_the_first_lines_of_a_file_say_why_it_exists() -> None:

@@ -162,12 +162,13 @@ def names_in(tree: ast.Module, module: str) -> Iterator[Name]:
             case ast.NamedExpr(target=target, value=value):
                 for kind, name in targets_of(target):
                     yield Name(node.lineno, name, kind, is_true_or_false(value))
-            case ast.For(target=target) | ast.comprehension(target=target):
+            case (
+                ast.For(target=target)
+                | ast.comprehension(target=target)
+                | ast.withitem(optional_vars=ast.expr() as target)
+            ):
                 for kind, name in targets_of(target):
                     yield Name(getattr(target, "lineno", 1), name, kind, False)
-            case ast.withitem(optional_vars=ast.expr() as target):
-                for kind, name in targets_of(target):
-                    yield Name(target.lineno, name, kind, False)
 
 
 def words_of(name: str) -> list[str]:
