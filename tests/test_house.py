@@ -118,7 +118,7 @@ ROOMS = {
         ("numpy", "scipy", "hypothesis"),
         QUIET,
     ),
-    "reports": Room(("contract",), ("numpy", "psutil")),
+    "reports": Room(("contract",), ("numpy", "psutil", "rich")),
     "reports.bench": Room(("contract", "reports"), ("numpy",)),
     "reports.netcdf": Room(
         ("contract", "isolation", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4", "msgspec")

@@ -24,6 +24,7 @@ from contactverif.contract.foreign_text import printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result
 from contactverif_reports.files import check_writable, checked_name, whole
+from contactverif_reports.tables import Change, ResultCell, plain_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,6 +105,22 @@ def number(value: float, digits: int = 3) -> str:
     return plain.replace("-", "−").replace("inf", "∞")
 
 
+def page_cell(value: Any) -> str:
+    """Return a cell of a table as a page shows it."""
+    match value:
+        case float():
+            return number(value, 2)
+        case Change(old, new) if plain_text(old) != plain_text(new):
+            return Markup("{} → {}").format(page_cell(old), page_cell(new))
+        case Change(_, new):
+            return page_cell(new)
+        case ResultCell(result, unexpected, differs) if result:
+            parts: Any = _environment().get_template("parts.html.j2").module
+            verdict = Markup(parts.verdict(str(result), unexpected))
+            return verdict + Markup(' <span class="soft">(differs)</span>') if differs else verdict
+    return value if isinstance(value, str) else plain_text(value)
+
+
 def origin(provenance: Mapping[str, str], names: Iterable[str]) -> dict[str, str]:
     """Return what a reader of a page wants to know of the origin of its numbers."""
     return {name.replace("_", " "): provenance[name] for name in names if provenance.get(name)}
@@ -122,6 +139,7 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
+    environment.filters["cell"] = page_cell
     environment.filters["percent"] = percent
     environment.globals["marks"] = {str(word): mark for word, mark in MARKS.items()}
     return environment
