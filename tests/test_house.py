@@ -63,9 +63,8 @@ ROOMS = {
         ("contract", "problems", "strategies", "isolation", "diagnosis", *BESIDE_RUN),
         ("numpy", "scipy", "msgspec"),
     ),
-    # `geometry` is what `studies/queries` scores; a test there holds that no other file of it imports that.
     "studies": Room(
-        (*BELOW_RUN, "geometry", "isolation", *RUN, *REPORTS),
+        (*BELOW_RUN, "isolation", *RUN, *REPORTS),
         ("numpy", "scipy", "hypothesis", "msgspec"),
     ),
     "api": Room((*BELOW_RUN, "isolation", *RUN, *REPORTS), ("msgspec", "pandas", "xarray", "matplotlib")),

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 import contactverif
+import contactverif.strategies
 import contactverif.testing
 
 ROOT = Path(__file__).parents[1]
@@ -39,6 +40,12 @@ PUBLIC = {
         *("ContactverifError", "ContractError", "MisuseError"),
     },
     "contactverif.testing": {"parametrize_with_properties"},
+    "contactverif.strategies": {
+        # Examples for an author's own tests.
+        *("interfaces", "faces", "states", "projections", "Projection"),
+        # Cases of properties.
+        *("flat_cases", "normal_cases", "single_cases", "overhung_cases", "general_cases", "smooth_cases", "tie_cases"),
+    },
 }
 NAMES = [(module, name) for module, names in PUBLIC.items() for name in sorted(names)]
 # Packages that take long to import, of which `import contactverif` needs none.

@@ -26,11 +26,9 @@ from contactverif.cli.list_command import list_installed
 from contactverif.cli.merge_command import merge
 from contactverif.cli.new_command import new
 from contactverif.cli.paper_command import paper
-from contactverif.cli.queries_command import queries
 from contactverif.cli.replay_command import replay
 from contactverif.cli.report_command import report
 from contactverif.cli.scenes_command import scenes
-from contactverif.cli.score_command import score
 from contactverif.cli.shared_options import spell_out_groups
 from contactverif.cli.stability_command import stability
 from contactverif.cli.verify_command import verify
@@ -60,8 +58,6 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "paper": paper,
     "scenes": scenes,
     "new": new,
-    "queries": queries,
-    "score": score,
 }
 for name, command in COMMANDS.items():
     app.command(name)(spell_out_groups(command))

@@ -106,7 +106,6 @@ def test_an_error_is_one_clean_line_whatever_the_user_typed(ask: Ask, text: str)
         ("replay", text),
         ("report", f"{text}.nc"),
         ("draw", "--scene", text),
-        ("score", text, "--built-in"),
         (text,),
     ]
     for line in lines:

@@ -26,7 +26,7 @@ def test_a_terminal_without_greek_is_shown_question_marks() -> None:
 
 @pytest.mark.parametrize("columns", ["99999999", "9" * 5000])
 def test_no_terminal_is_so_wide(ask: Ask, columns: str) -> None:
-    answer = ask("score", "--help", columns=columns)
+    answer = ask("verify", "--help", columns=columns)
     assert (answer.status, answer.err) == (0, "")
     assert max(map(len, answer.out.splitlines())) <= 10_000
 

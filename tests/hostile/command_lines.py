@@ -64,10 +64,9 @@ class Files:
 
     @classmethod
     def make(cls, folder: Path) -> Files:
-        """Write the files: a report, parts of it, a mesh, queries, loops, names of strangers."""
+        """Write the files: a report, parts of it, a mesh, loops, names of strangers."""
         from contactverif.contract.case import Case
         from contactverif.contract.interface import Interface
-        from contactverif.studies.queries.query_making import write_queries
         from contactverif_reports.netcdf.write import write
 
         sys.path.insert(0, str(Path(__file__).parents[1] / "cli"))
@@ -81,7 +80,6 @@ class Files:
         (folder / "noise.nc").write_bytes(random.Random(0).randbytes(4096))
         (folder / "empty.nc").write_bytes(b"")
         (folder / "text.txt").write_text("no report\n")
-        write_queries(folder / "queries.txt", 0, 100)
         (folder / "loop.nc").symlink_to("loop.nc")
         (folder / "folder.nc").mkdir()
         (folder / TEXTS["escape"].replace("/", "")).write_text("a stranger's file\n")
@@ -160,11 +158,7 @@ def _draw_value(rng: random.Random, option: Any, files: Files, command: str) -> 
     if name == "scene":
         return rng.choice(["c", "c-prime", "b:refine=2", "c:refine=1e9", "c:penalty=nan", "c:degrees=1e308", "x", "c:"])
     if name in ("examples", "seed", "jobs", "number", "repeats"):
-        return rng.choice(["100", "200", *_WHOLE[5:]] if command == "queries" else _WHOLE)
-    if name == "at_most":
-        return rng.choice(_BROKEN_NUMBERS)
-    if name == "program":
-        return rng.choice(["/bin/false", "/bin/true", "cat", "/", "absent-program", "--", "-h"])
+        return rng.choice(_WHOLE)
     if name in ("properties", "known"):
         return rng.choice(["balance.force", "scaling", "nope", "[", "*?[!]", "balance.force=why", "=", "**" * 50 + "x"])
     if name in ("case_id", "case", "slave", "master", "profile"):

@@ -24,7 +24,7 @@ from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.exact_points import ExactPoints, Lattice, View, closest_view, run_against, slave_normal_view
 from contactverif.strategies import general_cases, tie_cases
-from contactverif.strategies.projections import KINDS, projection_states, projections_by_kind
+from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif_properties.shared.any_state import any_cases, freeze_state
 from contactverif_properties.shared.passes import Pass, split_passes
 from contactverif_properties.shared.roundoff import rounding_distance
