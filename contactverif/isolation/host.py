@@ -8,7 +8,8 @@ question.
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -23,6 +24,7 @@ from contactverif.contract.foreign_text import one_line
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.isolation.limits import Limits
+from contactverif.isolation.lockstep import wait_in_lockstep
 from contactverif.isolation.messages import (
     MOST_QUESTIONS,
     Answer,
@@ -38,7 +40,8 @@ from contactverif.isolation.messages import (
     SharePairing,
     Solve,
     Solved,
-    encode,
+    encode_part,
+    join,
 )
 from contactverif.isolation.one_core import JUDGE
 from contactverif.isolation.packed import PackedArray
@@ -55,7 +58,9 @@ _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a p
 _LARGE = 1 << 16  # Bytes. A pairing of the judge with more is sent anew for each question, and not kept here.
 _FORGET = 64  # The number of what can be forgotten before the process is told.
 _TOGETHER = 1 << 16  # Bytes. So much fits into a socket, so the judge never waits to send while the process does, too.
-_QUICK = 1 / (2 * MOST_QUESTIONS)  # The share of its limit of time that a call took before it is asked with others.
+# Questions go together if those of the last message took at most this share of their limit of time, or this share for
+# each of them. So the few of one case stay within the limit, and the many in lockstep are asked again if they do not.
+_QUICK, _QUICK_EACH = 1 / 32, 1 / (2 * MOST_QUESTIONS)
 
 
 class Host:
@@ -91,7 +96,7 @@ class Host:
         for store in (self._shelf, self._queue, self._forgotten, self._known_verbs):
             store.clear()
         question = self._put("import", Load(self._next_number(), self._name))
-        self.flush()
+        self._flush_queue()
         return raise_failure(question.result, loading=True)
 
     def _reason_to_stop(self) -> str:
@@ -107,10 +112,21 @@ class Host:
 
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
-        if self._process is None and not isinstance(self.load(), Loaded):
-            raise PluginError("import: it loaded before, and does not any more", "channel")
+        if self._process is None and not wait_in_lockstep(self._is_started):
+            self._load_again()
         self._queue.append((Make(self._next_number(), penalty), None))
         return self._number, self.n_started
+
+    def _load_again(self) -> None:
+        if not isinstance(self.load(), Loaded):
+            raise PluginError("import: it loaded before, and does not any more", "channel")
+
+    def _is_started(self) -> bool:
+        """Start the process for calls in lockstep, and return whether it is there."""
+        if self._process is None:
+            with suppress(ContractError), self._without_blame():
+                self._load_again()
+        return self._process is not None
 
     def _next_number(self) -> int:
         self._number += 1
@@ -156,8 +172,6 @@ class Host:
         `counted`: the methods that run in it are counted. The pairing may be the number under which the process keeps
         one of its answers.
         """
-        if sum(question is not None for _, question in self._queue) >= MOST_QUESTIONS:
-            self.flush()
         of_interface = self._share(interface)
         of_pairing = self._share(pairing) if isinstance(pairing, Pairing) else pairing
         packed = None if z is None else PackedArray.pack(z)
@@ -197,7 +211,26 @@ class Host:
         return self._number
 
     def flush(self) -> None:
-        """Send what waits in the queue, and give each question its answer."""
+        """Give each question in the queue its answer."""
+        if not wait_in_lockstep(self._has_answered):
+            self._flush_queue()
+
+    def _has_answered(self) -> bool:
+        """Send what calls in lockstep have put into the queue, and return whether the process has answered it."""
+        with self._without_blame():
+            return self._flush_queue()
+
+    @contextmanager
+    def _without_blame(self) -> Iterator[None]:
+        """Open a block in which no end of the process counts: what is asked in it is asked again alone."""
+        n_ended, n_hangs = self.n_ended, _hangs[self._key]
+        try:
+            yield
+        finally:
+            self.n_ended, _hangs[self._key] = n_ended, n_hangs
+
+    def _flush_queue(self) -> bool:
+        """Send what waits in the queue, give each question its answer, and return whether the process has answered."""
         self.last_question = monotonic()
         waiting, self._queue = self._queue, []
         questions = [question for _, question in waiting if question is not None]
@@ -207,7 +240,7 @@ class Host:
         if self._process is None:
             verb = questions[0].verb if questions else ""
             _answer_all(questions, PluginError(f"{verb}: its process has ended", "channel"))
-            return
+            return not questions
         try:
             self._exchange(self._process, waiting, questions)
         except PluginError as error:
@@ -217,6 +250,7 @@ class Host:
             _answer_all(questions, PluginError("the question was interrupted", "not asked"))
             self._process = None
             raise
+        return self._process is not None
 
     def _note_end(self, error: PluginError, verb: str) -> None:
         """Note that the process has ended, why, and in which method."""
@@ -230,25 +264,31 @@ class Host:
     def _exchange(
         self, process: PluginProcess, waiting: list[tuple[Request | Solve, Question | None]], questions: list[Question]
     ) -> None:
-        """Send requests and receive the answers: all together if they are small and quick, else one after another."""
-        frame = encode([request for request, _ in waiting])
-        known = all(question.verb in self._known_verbs for question in questions)
-        if len(frame) <= _TOGETHER and (len(questions) <= 1 or (known and self._is_quick)):
-            self._ask(process, frame, questions)
-            return
+        """Send requests and receive the answers: together what is small and quick, else one question after another."""
+        known = self._is_quick and all(question.verb in self._known_verbs for question in questions)
+        most = MOST_QUESTIONS if known else 1
+        frames: list[bytes] = []
+        asked: list[Question] = []
         for request, question in waiting:
-            self._ask(process, encode([request]), [question] if question is not None else [])
+            frame = encode_part(request)
+            is_full = question is not None and len(asked) >= most
+            if frames and (is_full or sum(map(len, frames)) + len(frame) > _TOGETHER):
+                self._ask(process, frames, asked)
+                frames, asked = [], []
+            frames.append(frame)
+            asked += [question] if question is not None else []
+        self._ask(process, frames, asked)
 
-    def _ask(self, process: PluginProcess, frame: bytes, questions: Sequence[Question]) -> None:
+    def _ask(self, process: PluginProcess, frames: Sequence[bytes], questions: Sequence[Question]) -> None:
         """Ask the process; a first call may take longer, by as much as the same one took in an earlier process."""
         limit, start = self._limits.seconds, monotonic()
         verb = questions[0].verb if questions else ""
         if verb not in self._known_verbs:
             limit = min(limit + self._first_seconds.get(verb, inf), self._limits.start_seconds)
-        process.ask(frame, questions, limit)
+        process.ask(join(frames), questions, limit)
         seconds = monotonic() - start
         if questions:
-            self._is_quick = seconds <= _QUICK * self._limits.seconds
+            self._is_quick = seconds <= max(_QUICK, _QUICK_EACH * len(questions)) * self._limits.seconds
             self._known_verbs.add(verb)
             self._first_seconds.setdefault(verb, seconds)
 

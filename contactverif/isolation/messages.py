@@ -15,7 +15,7 @@ import msgspec
 from contactverif.contract.foreign_text import one_line
 from contactverif.isolation.packed import PackedArray
 
-MOST_QUESTIONS = 16  # The number of questions in a message.
+MOST_QUESTIONS = 128  # The number of questions in a message.
 _MOST_NAMES = 256  # The number of arrays in an answer, and of methods.
 _MOST_WORDS = 3  # A misuse has so many; other failures have one.
 _LONGEST_REASON = 200  # Characters of what msgspec says of a message.
@@ -152,6 +152,16 @@ _load_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(
 def encode(messages: Sequence[Request | Solve] | Sequence[Reply]) -> bytes:
     """Return messages as bytes."""
     return _encoder.encode(messages)
+
+
+def encode_part(message: Request | Solve) -> bytes:
+    """Return one of the messages of a frame as bytes."""
+    return _encoder.encode(message)
+
+
+def join(parts: Sequence[bytes]) -> bytes:
+    """Return the frame of messages that are encoded."""
+    return _encoder.encode([*map(msgspec.Raw, parts)])
 
 
 def decode_requests(data: bytes) -> list[Request]:

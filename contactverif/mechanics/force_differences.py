@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.lazy import lazy
 
 # An error of a matrix by this share of its rows makes each iterate of Newton's method a million times better.
 AGREEMENT = 1e-6
@@ -99,9 +100,9 @@ class Differences:
         random = np.random.default_rng(_SEED)
         return np.asarray(self.steps * random.uniform(0.5, 1.0, len(self.z)) * random.choice([-1.0, 1.0], len(self.z)))
 
-    @cached_property
+    @lazy
     def _ends(self) -> FloatArray:
-        """The forces (2, n) at z less the direction, and at z plus it."""
+        """Return the forces (2, n) at z less the direction, and at z plus it."""
         return self.forces(np.stack([self.z - self._direction, self.z + self._direction]))
 
     def _along(self, shifts: FloatArray) -> FloatArray:

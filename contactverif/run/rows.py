@@ -11,6 +11,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain, product
 from math import sqrt
 
@@ -22,13 +23,15 @@ from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.contract.traits import traits_behind
-from contactverif.isolation.remote_formulation import count_ends
+from contactverif.isolation.lockstep import in_lockstep
+from contactverif.isolation.remote_formulation import RemoteSubject, count_ends
 from contactverif.journals.outcome_records import OutcomeForm, decode_outcome, encode_outcome
 from contactverif.journals.run_journal import Notes
 from contactverif.problems.named_states import named_case
 from contactverif.run import judge
 from contactverif.run.judge import badness, verdict_over_all
 from contactverif.run.scheduler import CaseChunk
+from contactverif.sampling.blas_threads import one_thread
 from contactverif.sampling.draw import CaseSource, Sampling, draw_cases, shrink
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
@@ -388,16 +391,41 @@ def judge_cases(
     The outcomes hold summaries, because the parent has the cases.
     """
     outcomes: list[Outcome] = []
-    for place, case in enumerate(chunk.cases):
+    cases = dict(enumerate(chunk.cases))
+    together = _judge_together(question, subject, {n: case for n, case in cases.items() if n not in earlier})
+    for place, case in cases.items():
         if place in earlier:
             outcomes.append(earlier[place])
             continue
-        outcome = judge.judge_case(question, case, subject)
+        outcome = together.get(place) or judge.judge_case(question, case, subject)
         outcomes.append(replace(outcome, case_or_summary=outcome.summary))
         notes.add(place, outcomes[-1])
         if count is not None:
             count(place + 1)
     return JudgedCases(tuple(outcomes), notes.trouble)
+
+
+def _judge_together(question: Property, subject: Subject, cases: Mapping[int, Case]) -> dict[int, Outcome]:
+    """Return {place: outcome} of the cases that pass where all are judged in lockstep; what fails is judged alone.
+
+    Lockstep saves messages to the plugin's process. It is not tried if the first case fails or a process has ended.
+    """
+    if not isinstance(subject, RemoteSubject) or len(cases) < 2 or count_ends(subject):
+        return {}
+    (first, case), *others = cases.items()
+    passed = {first: judge.judge_case(question, case, subject)}
+    if _may_fail(passed[first]):
+        return passed
+    with one_thread():  # It ends behind all cases: one that ends before another must not let BLAS have more.
+        judged = in_lockstep([partial(judge.judge_case, question, case, subject) for _, case in others])
+    for (place, _), (outcome, seconds) in zip(others, judged or (), strict=judged is not None):
+        if not _may_fail(outcome):
+            passed[place] = replace(outcome, seconds=seconds)
+    return passed
+
+
+def _may_fail(outcome: Outcome) -> bool:
+    return outcome.measurement is None or outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
 
 
 def shrink_case(

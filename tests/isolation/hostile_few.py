@@ -126,6 +126,15 @@ class Kills(Springs):
         os.kill(os.getpid(), signal.SIGSEGV)
 
 
+class KillsAtTimes(Springs):
+    """It ends its process in some states, on a slave of many nodes."""
+
+    def residual(self, interface, pairing, z):
+        if interface.n_slave_nodes >= 6:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return super().residual(interface, pairing, z)
+
+
 class Exits(Springs):
     def residual(self, interface, pairing, z):
         print("good bye")

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.lazy import lazy
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import Call, CheckedFormulation
 from contactverif_properties.shared.passes import Pass, split_passes
@@ -46,7 +46,7 @@ class FrozenState:
         """Return the residuals (..., n) at other states z (..., n), on the pairing of this one."""
         return self.formulation.residual(self.case.interface, self.pairing, z)
 
-    @cached_property
+    @lazy
     def residual(self) -> FloatArray:
         """The residual (n_unknowns + n_multipliers,)."""
         return self.residual_at(self.case.z)
@@ -56,7 +56,7 @@ class FrozenState:
         """The position rows of the residual, (n_nodes, dim): the forces that pull the nodes back."""
         return self.residual[: self.case.interface.n_unknowns].reshape(self.case.interface.nodes.shape)
 
-    @cached_property
+    @lazy
     def tangent(self) -> FloatArray:
         """The tangent (n, n) with n = n_unknowns + n_multipliers."""
         return dense(self.formulation.tangent(self.case.interface, self.pairing, self.case.z))
@@ -66,7 +66,7 @@ class FrozenState:
         """True if the formulation reports contact points."""
         return "contact_points" in self.formulation.provides
 
-    @cached_property
+    @lazy
     def points(self) -> ContactPoints:
         """The contact points."""
         return self.formulation.contact_points(self.case.interface, self.pairing, self.case.z)
