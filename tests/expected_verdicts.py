@@ -169,7 +169,7 @@ CANNOT_JUDGE: Mapping[str, frozenset[str]] = {
     LOCAL: frozenset(WITHOUT_EXACT_FORCES),
     CURVED: frozenset(WITHOUT_RINGS),
     RESULTANT: frozenset(WITHOUT_AREA),
-    "scale": frozenset(WITH_MULTIPLIERS),
+    "total-stiffness": frozenset(WITH_MULTIPLIERS),
     ARC: frozenset(WITHOUT_AREA),
 }
 

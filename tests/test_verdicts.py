@@ -292,7 +292,7 @@ def test_a_formulation_that_does_nothing_is_not_judged() -> None:
     assert not result.promises_kept
     judged = {row.property_id: row.verdict for row in result.rows}
     classes = {f"{name}{solved}" for name in (NORMAL, SINGLE) for solved in ("", ".solve")}
-    failures = (*PATCHES, *classes, NODAL, WAVY, CURVED_WAVE, "scale", "unilateral")
+    failures = (*PATCHES, *classes, NODAL, WAVY, CURVED_WAVE, "total-stiffness", "unilateral")
     assert {judged.pop(name) for name in failures} == {Verdict.FAIL}
     assert judged.pop(LOCKING) is Verdict.NOT_PROVIDED  # It has no pairing to keep.
     assert {judged.pop(name) for name in (RESULTANT, RANK, COMPLEMENTARITY, PUBLISHED)} == {Verdict.NOT_APPLICABLE}

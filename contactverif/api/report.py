@@ -20,7 +20,7 @@ from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.remote_formulation import RemoteSubject
-from contactverif.run.telling import by_telling
+from contactverif.run.ranking import by_rank
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,7 +118,7 @@ class Report(Run):
 
     @property
     def failures(self) -> list[Failure]:
-        """The cases that fail, one for each row: broken promises first, failures as stated last, by telling.
+        """The cases that fail, one for each row: broken promises first, failures as stated last, by rank.
 
         A row that fails without a case (not judged, wrong traits) is in `table` alone.
         """
@@ -217,7 +217,7 @@ def _failing_rows(run: Run) -> list[Row]:
     """Return the rows that fail: those that make the run fail first, those that fail as stated last."""
     failures = (Verdict.FAIL, Verdict.CRASHED)
     rows = [row for row in run.rows if (row.unexpected or row.verdict in failures) and not row.omitted]
-    return sorted(by_telling(rows), key=lambda row: (not row.unexpected, row.result is Result.FAILS_AS_STATED))
+    return sorted(by_rank(rows), key=lambda row: (not row.unexpected, row.result is Result.FAILS_AS_STATED))
 
 
 def _remarks(run: Run) -> list[str]:

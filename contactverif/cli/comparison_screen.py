@@ -16,7 +16,7 @@ from contactverif.cli.comparison_tables import number
 from contactverif.cli.console import PLAIN_STYLE, STYLES, fold, line
 from contactverif.cli.run_tables import headline
 from contactverif.contract.result import Result
-from contactverif.run.telling import by_telling
+from contactverif.run.ranking import by_rank
 from contactverif.studies.comparison_study import Study
 from contactverif_reports.compare.cells import Cell
 
@@ -43,7 +43,7 @@ class ComparisonScreen:
     def _candidate(self, name: str, width: int) -> Iterator[Text]:
         reference, both = self.study.comparison.reference, self._pairs(name)
         others = {id(cell.row): (cell, beside) for cell, beside in both if _differ(cell, beside)}
-        rows = [others[id(row)] for row in by_telling(cell.row for cell, _ in others.values())]
+        rows = [others[id(row)] for row in by_rank(cell.row for cell, _ in others.values())]
         methods = [pair for pair in both if not _differ(*pair) and _is_worth_a_line(*pair)]
         same = f"the same verdict in {len(both) - len(rows)} of {len(both)} properties"
         yield Text("")

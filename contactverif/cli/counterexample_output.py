@@ -26,7 +26,7 @@ from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import formulation_names
 from contactverif.run.judge import forces_to_draw
-from contactverif.run.telling import by_telling, most_telling
+from contactverif.run.ranking import by_rank, first_failure
 from contactverif_reports.draw import as_text
 
 
@@ -57,9 +57,9 @@ def how_to_keep(run: Run) -> str:
 
 def how_to_explain(run: Run, report: Path | None) -> str:
     """Return the line that explains the first row of the screen that fails, with its numbers if a report has them."""
-    failing = by_telling(row for row in run.rows if row.verdict in (Verdict.FAIL, Verdict.CRASHED))
+    failing = by_rank(row for row in run.rows if row.verdict in (Verdict.FAIL, Verdict.CRASHED))
     news = [row for row in failing if row.result is Result.FAIL]
-    row = most_telling(failing) or next(iter([*news, *failing]), None)
+    row = first_failure(failing) or next(iter([*news, *failing]), None)
     if row is None:
         return ""
     stored = report is not None and any(example.row is row for example in failing_examples(run))

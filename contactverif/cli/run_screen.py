@@ -29,7 +29,7 @@ from contactverif.contract.result import (
     Row,
     Run,
 )
-from contactverif.run.telling import by_telling, most_telling, wrong_rows
+from contactverif.run.ranking import by_rank, first_failure, wrong_rows
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
 _MOST_WRONG = 8  # The same of those that are wrong beside the most telling one.
@@ -84,7 +84,7 @@ class RunScreen:
             yield fold(OPPOSITE_SIGN, width, "bold red", indent=2)
         if name in self.run.diagnoses:
             yield fold(f"diagnosis: {self.run.diagnoses[name]}", width, "bold", indent=2)
-        if (row := most_telling(rows)) is not None:
+        if (row := first_failure(rows)) is not None:
             yield self._with_mesh(row, width)
             yield Text("")
         yield from _part("also wrong", wrong[1:], width, _MOST_WRONG)
@@ -114,7 +114,7 @@ def _title(name: str, rows: Sequence[Row], wrong: Sequence[Row], width: int) -> 
 def _other_failures(rows: Sequence[Row], width: int, *, in_full: bool) -> Iterator[Text]:
     """Yield the failures that break no promise, and what was left open; in full with a line for each."""
     for result, title in _PARTS.items():
-        part = by_telling(row for row in rows if row.result is result)
+        part = by_rank(row for row in rows if row.result is result)
         if in_full or result is Result.NOT_JUDGED:  # Such a row makes a run fail, too: its reason is wanted.
             yield from _part(title, part, width)
         elif part:

@@ -18,7 +18,7 @@ from contactverif.cli.coverage_tables import coverage_text
 from contactverif.contract.case_counts import whole_percent
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import BROKEN_BY_FAILING, OPPOSITE_SIGN, Result, Row, Run
-from contactverif.run.telling import by_telling
+from contactverif.run.ranking import by_rank
 
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 _COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
@@ -100,7 +100,7 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequ
     """Sum up rows and plugins that did not load, behind sentences about whole formulations."""
     sentences = list(accusations)
     for result, (singular, plural) in _COUNTED.items():
-        names = [_name(row) for row in by_telling(rows) if row.result is result and row.unexpected]
+        names = [_name(row) for row in by_rank(rows) if row.result is result and row.unexpected]
         names += not_loaded if result is Result.NOT_LOADED else []
         if names:
             named = f": {_list(names, _MOST_SUMMED_UP)}" if result is not Result.OMITTED else ""

@@ -58,14 +58,13 @@ class VerifyOptions:
 
     def with_settings(self, settings: Settings) -> VerifyOptions:
         """Return the options with those of the project where nothing is typed; of `isolation` see there."""
-        from contactverif.contract.names import unknown_name_error
         from contactverif.plugins.engines import has_engine
-        from contactverif.plugins.registry import matching_ids, property_ids
+        from contactverif.plugins.registry import matching_ids, property_ids, unknown_property_error
 
         properties = self.properties or settings.properties
         ids, engines = property_ids(engines=True), has_engine(self.names)
         for unknown in settings.known.keys() - {*ids}:
-            raise unknown_name_error("known failure", unknown, ids)
+            raise unknown_property_error("known failure", unknown, ids)
         matching = {*matching_ids(properties or ("*",), engines=engines)} - _known_failures(self.known).keys()
         known = (f"{name}={reason}" for name, reason in settings.known.items() if name in matching)
         return replace(

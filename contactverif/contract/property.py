@@ -13,7 +13,7 @@ from importlib import import_module
 from inspect import getdoc
 from math import isfinite
 from sys import modules
-from typing import Annotated, Any, TypedDict, Unpack
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
@@ -31,6 +31,7 @@ LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says
 # With the 23 built-in formulations and 100 cases each, most properties leave none of 2300 cases undecided. Then the
 # share is below 3/2300 with a probability of 95 %.
 NONE_UNDECIDED = 3 / 2300
+LAST_TURN = 99
 # The reason of a case that is not asked of a formulation of open chains (`Abilities.chains`): no case to be judged.
 CLOSED_CHAIN = "a chain is closed, and the formulation takes open ones"
 WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
@@ -124,6 +125,9 @@ class OtherAttributes(TypedDict, total=False):
     engines: bool
     exact: Callable[[Case], FloatArray] | None
     cases_in_space: Cases | None
+    rank: float
+    role: Literal["", "foundation", "exact", "comparison"]
+    turn: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,6 +162,14 @@ class Property(PropertyInfo):
     exact : Callable[[Case], FloatArray] | None
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
+    rank : float
+        The place of a failure among others, the lowest first: few other properties catch what such a property catches.
+        One of another author has −1 and is shown before ours, since it was installed for a purpose.
+    role : str
+        "foundation" if a failure says that no other answer can be relied on; "exact" for an exact answer, behind which
+        failures of "comparison" are shown: two answers that differ do not say which is right.
+    turn : int
+        The turn among the properties that are asked first, from 0 on: cheap ones, of which one fails for most mistakes.
     question : str
         What is asked, why it matters, how it is judged and what is undecided, from which the property's page is made.
     """
@@ -173,6 +185,9 @@ class Property(PropertyInfo):
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""
     cases_in_space: Cases | None = None
+    rank: float = -1
+    role: Literal["", "foundation", "exact", "comparison"] = ""
+    turn: int = LAST_TURN
 
     @classmethod
     def define(

@@ -42,6 +42,7 @@ FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
 ENGINE_PROPERTIES = "contactverif.engine_properties"  # Those that are asked of engines alone.
 PROBLEMS = "contactverif.problems"
+_RENAMED = {"scale": "total-stiffness", "scaling": "units", "engine.scaling": "engine.units"}  # {former id: id}
 _OURS = "contactverif"  # The distribution whose problems keep their names.
 
 _SHORT_NAME = f"at most {LONGEST_NAME} characters"
@@ -186,7 +187,7 @@ def the_property(property_id: str) -> Property:
     """Return the property of that id; one that does not load is a mistake here."""
     ids = property_ids(engines=True)
     if property_id not in ids:  # A pattern is no id.
-        raise unknown_name_error("property", property_id, ids)
+        raise unknown_property_error("property", property_id, ids)
     (question,) = load_properties([property_id], engines=True)
     if isinstance(question, NotLoaded):
         raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
@@ -201,8 +202,15 @@ def matching_ids(globs: Sequence[str], *, engines: bool = False) -> tuple[str, .
 def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
     for glob in globs:
         if not any(fnmatchcase(name, glob) for name in names):
-            raise unknown_name_error("property", glob, names)
+            raise unknown_property_error("property", glob, names)
     return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
+
+
+def unknown_property_error(argument: str, name: str, ids: Iterable[str]) -> MisuseError:
+    """Return the error for an id that no property has; it names the new id of a property that was renamed."""
+    if name in _RENAMED:
+        return MisuseError(argument, repr(name), f"{_RENAMED[name]!r}, the new id of that property")
+    return unknown_name_error(argument, name, ids)
 
 
 def installed_properties(*, engines: bool = False) -> Mapping[str, Sequence[EntryPoint]]:

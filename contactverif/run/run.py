@@ -10,11 +10,11 @@ from typing import TypeVar, get_args
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
-from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import Subject
 from contactverif.journals.run_journal import Journal
+from contactverif.plugins.registry import unknown_property_error
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.run_jobs import RunJobs
 from contactverif.run.scheduler import Progress, Scheduler
@@ -141,4 +141,4 @@ def check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoa
     ids = [item.id if isinstance(item, Property) else item.formulation for item in properties]
     for property_id in known:
         if property_id not in ids:
-            raise unknown_name_error("known failure", property_id, ids)
+            raise unknown_property_error("known failure", property_id, ids)

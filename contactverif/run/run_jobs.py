@@ -1,6 +1,6 @@
 """The jobs of a run, in the order in which they are handed out.
 
-Each formulation is called once before anything else, and cheap and telling properties are asked first. The cases of a
+Each formulation is called once before anything else; properties that state a turn are asked first. The cases of a
 strategy are drawn, once for all formulations and all properties that have this strategy, they are judged, and what
 failed is shrunk. Properties that solve bodies come last. All planned cases of a row are judged before one is shrunk, so
 that a failure ends nothing early. What the journal knows is not judged again, and a block of which it knows all is not
@@ -31,6 +31,7 @@ from contactverif.journals.run_journal import Journal
 from contactverif.plugins.provenance import collect_provenance
 from contactverif.run import judge
 from contactverif.run.profiles import Shrink
+from contactverif.run.ranking import first_failure, wrong_rows
 from contactverif.run.rows import (
     WHOLE,
     JudgedCases,
@@ -45,16 +46,12 @@ from contactverif.run.rows import (
 from contactverif.run.run_meter import RunMeter
 from contactverif.run.scheduler import CaseChunk, Job, Progress, Scheduler
 from contactverif.run.second_look import look_at_journal
-from contactverif.run.telling import PURITY, most_telling, wrong_rows
 from contactverif.sampling import draw
 from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, Sampling
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
 _FACE_NAMES = {2: "segments in the plane", 3: "triangles in space", 4: "quadrilaterals in space"}
-# The properties that are asked first: cheap ones, of which one fails for most mistakes. Balance is there soon. Purity
-# has the same cases, but starts a second process; its failure explains all that others would show.
-FIRST = ("balance.force", "purity", "unilateral", "scaling", "patch.flat.resultant", "tangent.sparsity")
 
 
 class RunJobs:
@@ -110,12 +107,12 @@ class RunJobs:
         scheduler.work(self._earlier_failures())
         if not self._keep_going:
             # All jobs of these properties end before it is known who is asked more, so that it does not depend on time.
-            if any(question.id in PURITY for question in self._questions):
+            if any(question.role == "foundation" for question in self._questions):
                 scheduler.work(chain.from_iterable(self._parts_of_next()))
             self._stop_wrong()
         scheduler.work(self)
         if self._share is None:
-            scheduler.work(self._explain_most_telling())
+            scheduler.work(self._explain_first_failure())
             scheduler.work(self._measure_forces())
 
     def _without_witnesses(self) -> dict[str, str]:
@@ -133,7 +130,7 @@ class RunJobs:
                 self._stopped[name] = f"the plugin crashes in {property_id}"
             elif row.row.breach:
                 self._stopped[name] = f"the contract is broken in {property_id}"
-            elif property_id in PURITY and row.row.verdict is Verdict.FAIL:
+            elif row.question.role == "foundation" and row.row.verdict is Verdict.FAIL:
                 self._stopped[name] = f"{property_id} fails"
 
     def first_calls(self) -> Iterator[Job]:
@@ -386,9 +383,9 @@ class RunJobs:
         shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
         return self._shrink_row(row, goal) if shrinks else self._add_shrunk(row, goal.first, None)
 
-    def _explain_most_telling(self) -> Iterator[Job]:
-        """Yield the jobs to diagnose, and to shrink, the most telling failure of each formulation."""
-        for row in filter(None, map(self._find_most_telling, self._subjects)):
+    def _explain_first_failure(self) -> Iterator[Job]:
+        """Yield the jobs to diagnose, and to shrink, the failure of each formulation with the lowest rank."""
+        for row in filter(None, map(self._find_first_failure, self._subjects)):
             name, property_id = row.subject.name, row.question.id
             self._report(Progress(name, property_id, "diagnosis", 0, 1))
             others = [wrong.property_id for wrong in wrong_rows(each.row for each in self._rows_of(row.subject))]
@@ -411,13 +408,14 @@ class RunJobs:
         row.row = replace(row.row, forces=forces)
         return ()
 
-    def _find_most_telling(self, subject: Subject) -> OpenRow | None:
+    def _find_first_failure(self, subject: Subject) -> OpenRow | None:
         """Return the row of a formulation whose failure a person wants to see first; crashes explain themselves."""
         rows = {id(row.row): row for row in self._rows_of(subject)}
-        telling = most_telling(row.row for row in rows.values())
-        if telling is None or telling.verdict is not Verdict.FAIL:
+        failure = first_failure(row.row for row in rows.values())
+        if failure is None or failure.verdict is not Verdict.FAIL:
             return None
-        return None if telling.breach and telling.property_id not in PURITY else rows[id(telling)]
+        row = rows[id(failure)]
+        return None if failure.breach and row.question.role != "foundation" else row
 
     def _rows_of(self, subject: Subject) -> list[OpenRow]:
         return [row for row in self._rows.values() if isinstance(row, OpenRow) and row.subject is subject]
@@ -471,7 +469,7 @@ def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseC
 
 def _turn(question: Property) -> tuple[bool, int]:
     """Return the key by which properties are asked: those that solve bodies last, since they take long."""
-    return question.bodies, FIRST.index(question.id) if question.id in FIRST else len(FIRST)
+    return question.bodies, question.turn
 
 
 def _check_place(subject: Subject, interface: Interface | None) -> None:

@@ -44,7 +44,13 @@ _define = partial(
 )
 
 
-@_define(id="balance.force", quantities=(FORCE_IMBALANCE,), promise=lambda traits: traits.promises.conserves_force)
+@_define(
+    id="balance.force",
+    rank=280,
+    turn=0,
+    quantities=(FORCE_IMBALANCE,),
+    promise=lambda traits: traits.promises.conserves_force,
+)
 def force_balance(case: Case, subject: Subject) -> Measurement:
     """The forces on slave and master add up to zero on tilts, kinks and curves.
 
@@ -72,7 +78,12 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
     return replace(measurement, finding=Finding(place, tuple(-total - slave), tuple(-slave), "N", *names))
 
 
-@_define(id="balance.moment", quantities=(MOMENT_IMBALANCE,), promise=lambda traits: traits.promises.conserves_moment)
+@_define(
+    id="balance.moment",
+    rank=230,
+    quantities=(MOMENT_IMBALANCE,),
+    promise=lambda traits: traits.promises.conserves_moment,
+)
 def moment_balance(case: Case, subject: Subject) -> Measurement:
     """The moments of the forces on slave and master add up to zero on tilts, kinks and curves.
 
@@ -107,6 +118,7 @@ def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState,
 
 @Property.define(
     id="symmetric",
+    rank=300,
     family="invariants",
     quantities=(ASYMMETRY, WORK),
     cases=Cases.random(smooth_cases),

@@ -45,6 +45,7 @@ def refuse_unstated_continuity(traits: Traits) -> str:
 
 @Property.define(
     id="continuity",
+    rank=270,
     family="invariants",
     quantities=(FORCE, SLOPE),
     cases=Cases.random(sliding_cases),

@@ -116,7 +116,7 @@ def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
     )
 
 
-@_define(WAVY_STUDIES)(id="accuracy.wavy", promise=lambda traits: traits.promises.converges)
+@_define(WAVY_STUDIES)(id="accuracy.wavy", rank=540, promise=lambda traits: traits.promises.converges)
 def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
     """Forces, pressures and displacements of wavy bodies in full contact converge to the exact ones.
 
@@ -165,7 +165,7 @@ def promise_without_locking(traits: Traits) -> bool | None:
 
 
 @_define(CURVED_STUDIES)(
-    id="accuracy.wavy-curved", promise=promise_without_locking, shown_by=frozenset({"contact_points"})
+    id="accuracy.wavy-curved", rank=530, promise=promise_without_locking, shown_by=frozenset({"contact_points"})
 )
 def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
     """Wavy bodies converge to the exact solution on a curved interface too, at a high penalty as well.
@@ -193,7 +193,7 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
 
 
 @_define(HERTZ_STUDIES)(
-    id="accuracy.hertz", promise=lambda traits: traits.promises.converges, applicable=refuse_unknown_pressure
+    id="accuracy.hertz", rank=520, promise=lambda traits: traits.promises.converges, applicable=refuse_unknown_pressure
 )
 def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
     """Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.
@@ -269,6 +269,7 @@ def arc_cases() -> tuple[Case, ...]:
 
 @Property.define(
     id="accuracy.arc",
+    rank=440,
     family="accuracy",
     quantities=(SLAVE, MASTER, SLAVE_SUM, MASTER_SUM, ALONG, FORCES, SUM, PRESSURE),
     cases=Cases.from_list(arc_cases),

@@ -150,8 +150,8 @@ def engine_renumbering(case: Case, subject: Subject) -> Measurement:
     return compare_scenes(case, subject, changed, lambda body, forces: forces[numbers[body]])
 
 
-@_define(id="engine.scaling")
-def engine_scaling(case: Case, subject: Subject) -> Measurement:
+@_define(id="engine.units")
+def engine_units(case: Case, subject: Subject) -> Measurement:
     """Other units of length and force change nothing but the numbers.
 
     **Question.** All lengths of a random scene are 64 times as large, and all moduli 1/65536, so that forces are

@@ -53,13 +53,16 @@ _define = partial(Property.define, family="invariants", promise=lambda traits: T
 
 
 @_define(
-    id="scaling",
+    id="units",
+    rank=180,
+    role="comparison",
+    turn=3,
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=Cases.random(any_cases),
     cases_in_space=Cases.random(surface_cases),
     applicable=refuse_unknown_unit,
 )
-def scaling(case: Case, subject: Subject) -> Measurement:
+def units(case: Case, subject: Subject) -> Measurement:
     """Another unit of length changes nothing, so no absolute tolerance is hidden.
 
     **Question.** All lengths are multiplied by 2^k, for a random k from −60 to 60. Are the forces 2^k times the old
@@ -124,6 +127,8 @@ def _draw_rotation(random: np.random.Generator, dim: int) -> FloatArray:
 
 @_define(
     id="objectivity",
+    rank=100,
+    role="comparison",
     quantities=(TURNED_FORCES, TURNED_TANGENT),
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),

@@ -88,7 +88,7 @@ def _cross(a: FloatArray, b: FloatArray) -> float:
 _define = partial(Property.define, family="hard", quantities=(DIRECTION, TOTAL, SIZE), promise=lambda traits: True)
 
 
-@_define(id="hard.convex-kink", cases=Cases.from_list(convex_kink_states))
+@_define(id="hard.convex-kink", rank=340, cases=Cases.from_list(convex_kink_states))
 def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
 
@@ -112,7 +112,7 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define(id="hard.concave-corner", cases=Cases.from_list(concave_corner_states))
+@_define(id="hard.concave-corner", rank=310, cases=Cases.from_list(concave_corner_states))
 def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     """A corner in a re-entrant corner of 90° is pushed by both faces, whichever is nearer by a rounding.
 
@@ -132,7 +132,7 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define(id="hard.free-end", cases=Cases.from_list(free_end_states))
+@_define(id="hard.free-end", rank=430, cases=Cases.from_list(free_end_states))
 def hard_free_end(case: Case, subject: Subject) -> Measurement:
     """At a free end the force is between that of the inner segments and that of all; beyond it is 0.
 
@@ -173,6 +173,7 @@ def promise_no_wild_force(traits: Traits) -> bool | None:
 
 @Property.define(
     id="hard.steep-slave",
+    rank=360,
     family="hard",
     quantities=(DIRECTION, TOTAL, SIZE),
     promise=promise_no_wild_force,
@@ -215,6 +216,7 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
 
 @Property.define(
     id="hard.touch",
+    rank=140,
     family="hard",
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
     cases=Cases.from_list(touching_states),

@@ -95,7 +95,9 @@ _define = partial(
 )
 
 
-@_define(id="hard.offset", cases=Cases.from_list(offset_states), cases_in_space=Cases.from_list(offset_face_states))
+@_define(
+    id="hard.offset", rank=420, cases=Cases.from_list(offset_states), cases_in_space=Cases.from_list(offset_face_states)
+)
 def hard_offset(case: Case, subject: Subject) -> Measurement:
     """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
 
@@ -119,7 +121,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(id="hard.deep", cases=Cases.from_list(deep_states), cases_in_space=Cases.from_list(deep_face_states))
+@_define(id="hard.deep", rank=380, cases=Cases.from_list(deep_states), cases_in_space=Cases.from_list(deep_face_states))
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
 
@@ -138,7 +140,10 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
 
 
 @_define(
-    id="hard.node-hit", cases=Cases.from_list(node_hit_states), cases_in_space=Cases.from_list(node_hit_face_states)
+    id="hard.node-hit",
+    rank=410,
+    cases=Cases.from_list(node_hit_states),
+    cases_in_space=Cases.from_list(node_hit_face_states),
 )
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
@@ -158,7 +163,9 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define(id="hard.search", cases=Cases.from_list(search_states), cases_in_space=Cases.from_list(search_face_states))
+@_define(
+    id="hard.search", rank=390, cases=Cases.from_list(search_states), cases_in_space=Cases.from_list(search_face_states)
+)
 def hard_search(case: Case, subject: Subject) -> Measurement:
     """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
 
@@ -199,7 +206,8 @@ PUSH = Quantity(
 
 
 @Property.define(
-    id="scale",
+    id="total-stiffness",
+    rank=350,
     family="patch",
     quantities=(MOST, LEAST, PUSH),
     cases=Cases.from_list(equal_length_states),
@@ -207,7 +215,7 @@ PUSH = Quantity(
     promise=lambda traits: True,
     asks=frozenset({"penalty"}),
 )
-def scale(case: Case, subject: Subject) -> Measurement:
+def total_stiffness(case: Case, subject: Subject) -> Measurement:
     """The springs of a flat interface have the stiffness ε̂ L together, or 2 ε̂ L in two passes.
 
     **Question.** Slave and master are flat, equally long, and penetrate each other by the same depth everywhere. Is the

@@ -57,7 +57,7 @@ _define_patch = partial(
 )
 
 
-@_define_patch(id="hard.c", cases=Cases.from_list(block_scenes.case_c))
+@_define_patch(id="hard.c", rank=670, cases=Cases.from_list(block_scenes.case_c))
 def hard_c(case: Case, subject: Subject) -> Measurement:
     """Cases C and C′ of the reference paper give the exact forces as states, and the exact stress solved.
 
@@ -78,7 +78,7 @@ def hard_c(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(id="hard.contrast", cases=Cases.from_list(block_scenes.contrast_scenes), engines=True)
+@_define_patch(id="hard.contrast", rank=650, cases=Cases.from_list(block_scenes.contrast_scenes), engines=True)
 def hard_contrast(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.
 
@@ -97,7 +97,9 @@ def hard_contrast(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_patch(
-    id="hard.short-segment", cases=Cases.from_list(lambda: tiny_segment_states() + block_scenes.tiny_segment_scenes())
+    id="hard.short-segment",
+    rank=640,
+    cases=Cases.from_list(lambda: tiny_segment_states() + block_scenes.tiny_segment_scenes()),
 )
 def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     """One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.
@@ -118,7 +120,7 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-@_define_patch(id="hard.stiff", cases=Cases.from_list(block_scenes.stiff_scenes), engines=True)
+@_define_patch(id="hard.stiff", rank=630, cases=Cases.from_list(block_scenes.stiff_scenes), engines=True)
 def hard_stiff(case: Case, subject: Subject) -> Measurement:
     """Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.
 
@@ -152,6 +154,7 @@ def _divide_by_share(quantity: Quantity) -> Quantity:
 
 @_define(
     id="hard.dead-zone",
+    rank=600,
     quantities=tuple(map(_divide_by_share, patch_dead_zone.quantities)),
     cases=Cases.from_list(block_scenes.vanishing_overlap_scenes),
     promise=lambda traits: True if traits.promises.patch.overhang else None,
@@ -242,6 +245,7 @@ def check_unloaded(
 
 @_define(
     id="hard.zero-load",
+    rank=690,
     quantities=(NO_STRESS, NO_FORCE),
     cases=Cases.from_list(block_scenes.unloaded_scenes),
     promise=lambda traits: True,

@@ -75,6 +75,8 @@ _define = partial(Property.define, family="invariants", promise=lambda traits: T
 
 @_define(
     id="mirror",
+    rank=120,
+    role="comparison",
     quantities=IN_MIRROR,
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
@@ -101,6 +103,8 @@ def mirror(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="swap",
+    rank=400,
+    role="comparison",
     quantities=WITH_ROLES_EXCHANGED,
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
@@ -137,6 +141,8 @@ def renumbering_cases(
 
 @_define(
     id="renumbering",
+    rank=130,
+    role="comparison",
     quantities=IN_OTHER_NUMBERS,
     cases=Cases.by_kind(renumbering_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
@@ -208,6 +214,8 @@ def remote_surface_cases(interface: Interface | None = None) -> dict[str, Search
 
 @_define(
     id="remote",
+    rank=190,
+    role="comparison",
     quantities=BESIDE_OTHERS,
     cases=Cases.by_kind(remote_cases),
     cases_in_space=Cases.by_kind(remote_surface_cases),

@@ -46,6 +46,7 @@ REDUNDANT = Quantity(
 
 @Property.define(
     id="complementarity",
+    rank=450,
     family="multipliers",
     quantities=(TENSION, CHANGE),
     cases=Cases.random(solid_cases),
@@ -104,6 +105,7 @@ def covered_and_overhanging_cases(scene: Case | None = None) -> dict[str, Search
 
 @Property.define(
     id="multipliers.rank",
+    rank=480,
     family="multipliers",
     quantities=(REDUNDANT,),
     cases=Cases.by_kind(covered_and_overhanging_cases),

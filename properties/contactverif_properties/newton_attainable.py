@@ -90,6 +90,7 @@ class Attained:
 
 @Property.define(
     id="newton.attainable",
+    rank=550,
     family="newton",
     quantities=(ADDED, RESIDUAL, ERROR),
     cases=Cases.random(closed_cases),

@@ -75,7 +75,7 @@ _define = partial(
 )
 
 
-@_define(id="newton.history", quantities=(FINAL_ITERATIONS,), series=SERIES)
+@_define(id="newton.history", rank=560, quantities=(FINAL_ITERATIONS,), series=SERIES)
 def newton_history(case: Case, subject: Subject) -> Measurement:
     """Once the pairing has settled, Newton's method falls to roundoff in a few iterations.
 
@@ -170,7 +170,7 @@ def _allowed_iterations(trace: Trace, begin: int) -> int:
     return ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
 
 
-@_define(id="newton.order", quantities=(ORDER,))
+@_define(id="newton.order", rank=460, quantities=(ORDER,))
 def newton_order(case: Case, subject: Subject) -> Measurement:
     """One Newton step from near a solution ends at a distance of second order.
 

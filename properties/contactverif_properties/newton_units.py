@@ -40,6 +40,7 @@ STEPS = Quantity(
 
 @Property.define(
     id="newton.units",
+    rank=570,
     family="newton",
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),

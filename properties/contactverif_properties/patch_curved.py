@@ -100,6 +100,7 @@ def promise_mean(traits: Traits) -> bool | None:
 
 @Property.define(
     id="patch.curved",
+    rank=470,
     family="patch",
     quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES),
     cases=Cases.from_list(rings),

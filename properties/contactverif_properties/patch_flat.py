@@ -54,6 +54,8 @@ _define = partial(Property.define, family="patch")
 
 @_define(
     id="patch.flat.transmission",
+    rank=240,
+    role="exact",
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
     cases_in_space=Cases.random(flat_surface_cases),
@@ -103,6 +105,9 @@ def refuse_unknown_total(traits: Traits) -> str:
 
 @_define(
     id="patch.flat.resultant",
+    rank=220,
+    role="exact",
+    turn=4,
     quantities=(TOTAL,),
     cases=Cases.random(flat_cases),
     cases_in_space=Cases.random(flat_surface_cases),
@@ -235,6 +240,8 @@ _define_class = partial(
 
 @_define_class(
     id="patch.flat.normal",
+    rank=160,
+    role="exact",
     cases=Cases.random(normal_cases),
     cases_in_space=Cases.random(matched_surface_cases),
     promise=promise_normal,
@@ -266,7 +273,7 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     return measure_class(case, subject)
 
 
-@_define_class(id="patch.flat.single", cases=Cases.random(single_cases), promise=promise_single)
+@_define_class(id="patch.flat.single", rank=200, role="exact", cases=Cases.random(single_cases), promise=promise_single)
 def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     """They are exact too where inner master nodes lie in the middle of slave segments.
 
@@ -290,6 +297,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.flat.nodal",
+    rank=90,
     quantities=(FORCE, GAP, REPORTED_FORCE),
     cases=Cases.random(overhung_cases),
     cases_in_space=Cases.random(overhung_surface_cases),
@@ -346,6 +354,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.flat.published",
+    rank=290,
     quantities=(STATED,),
     cases=Cases.from_list(lambda: tuple(map(named_case, FLAT_NAMES))),
     promise=lambda traits: True if traits.evidence.published_forces else None,

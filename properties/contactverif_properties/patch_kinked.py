@@ -91,6 +91,7 @@ def forces_to_draw(case: Case) -> FloatArray:
 
 @Property.define(
     id="patch.kinked",
+    rank=500,
     family="patch",
     quantities=(STRESS, SLAVE, MASTER, PRESSURE, APPROACH, CUT, FALL),
     cases=Cases.from_list(kinked_cases),

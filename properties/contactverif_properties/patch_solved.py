@@ -72,7 +72,7 @@ _define_at_two_penalties = partial(
 
 
 @_define_at_two_penalties(
-    id="patch.flat.solve", cases=Cases.random(block_cases), promise=lambda traits: traits.promises.patch.flat
+    id="patch.flat.solve", rank=660, cases=Cases.random(block_cases), promise=lambda traits: traits.promises.patch.flat
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
     """Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.
@@ -100,7 +100,10 @@ def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_at_two_penalties(
-    id="patch.flat.normal.solve", cases=_scenes_of_class(normal_scenes, midpoints=False), promise=promise_normal
+    id="patch.flat.normal.solve",
+    rank=590,
+    cases=_scenes_of_class(normal_scenes, midpoints=False),
+    promise=promise_normal,
 )
 def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
     """Two blocks find the exact stress, forces and gap where each inner master node lies on a slave node.
@@ -124,7 +127,10 @@ def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_at_two_penalties(
-    id="patch.flat.single.solve", cases=_scenes_of_class(single_scenes, midpoints=True), promise=promise_single
+    id="patch.flat.single.solve",
+    rank=610,
+    cases=_scenes_of_class(single_scenes, midpoints=True),
+    promise=promise_single,
 )
 def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
     """Two blocks find them too where inner master nodes lie in the middle of slave segments.
@@ -150,6 +156,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="patch.variants",
+    rank=680,
     quantities=(*solved_patch.QUANTITIES, solved_patch.MULTIPLIERS),
     cases=Cases.random(variant_cases),
     promise=lambda traits: traits.promises.patch.flat,
@@ -178,6 +185,7 @@ def _widen_tolerance(quantity: Quantity) -> Quantity:
 
 @_define(
     id="patch.dead-zone",
+    rank=620,
     quantities=tuple(map(_widen_tolerance, (*solved_patch.QUANTITIES, solved_patch.MULTIPLIERS))),
     cases=Cases.random(dead_zone_cases),
     promise=lambda traits: traits.promises.patch.overhang,

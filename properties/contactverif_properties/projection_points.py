@@ -45,7 +45,7 @@ FARTHER = Quantity(
 
 
 @define_projection(
-    id="projection.segment", quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=refuse_without_rule
+    id="projection.segment", rank=320, quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=refuse_without_rule
 )
 def projection_segment(case: Case, subject: Subject) -> Measurement:
     """Each contact point is measured against the master segment that the stated rule names.
@@ -109,6 +109,7 @@ _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 @define_projection(
     id="projection.place",
+    rank=70,
     quantities=(GAP, XI, NORMAL, POSITION),
     cases_in_space=ON_FACES,
     applicable=refuse_without_rule,
@@ -193,7 +194,7 @@ def refuse_other_decisions(traits: Traits) -> str:
 
 
 @define_projection(
-    id="projection.activity", quantities=(WRONG,), cases_in_space=ON_FACES, applicable=refuse_other_decisions
+    id="projection.activity", rank=50, quantities=(WRONG,), cases_in_space=ON_FACES, applicable=refuse_other_decisions
 )
 def projection_activity(case: Case, subject: Subject) -> Measurement:
     """A contact point is active exactly where its gap is closed and its foot is on the master.

@@ -37,6 +37,7 @@ SUM = Quantity("error of the sum of weights", "192u", f"{WEIGHT_REASON} Nodes th
 
 @define_projection(
     id="projection.area",
+    rank=210,
     quantities=(WEIGHT, ENDS, SUM),
     cases_in_space=ON_FACES,
     applicable=lambda traits: "" if traits.rules.penalty == "distributed" else "there are no distributed springs",
@@ -203,7 +204,7 @@ FOOT = Quantity(
 LAW = Quantity("pressure against −ε̂ × gap", "8u", "The gap may be formed anew for the pressure.")
 
 
-@define_projection(id="projection.forces", quantities=(UNIT, FORCES, FOOT, LAW), cases_in_space=ON_FACES)
+@define_projection(id="projection.forces", rank=40, quantities=(UNIT, FORCES, FOOT, LAW), cases_in_space=ON_FACES)
 def projection_forces(case: Case, subject: Subject) -> Measurement:
     """The pressures at the contact points are the forces on the slave, and their gaps are what the places show.
 

@@ -65,6 +65,9 @@ FIRST_TANGENT = Quantity(
 
 @Property.define(
     id="purity",
+    rank=10,
+    role="foundation",
+    turn=1,
     family="invariants",
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),
@@ -194,6 +197,8 @@ def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) ->
 
 @Property.define(
     id="purity.long",
+    rank=80,
+    role="foundation",
     family="invariants",
     quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
     cases=Cases.from_list(lambda: (named_case("offset-c"),)),

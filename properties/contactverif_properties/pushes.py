@@ -121,7 +121,12 @@ _define = partial(
 
 
 @_define(
-    id="unilateral", quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH), promise=lambda traits: True, asks=WITH_BARRIER
+    id="unilateral",
+    rank=60,
+    turn=2,
+    quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH),
+    promise=lambda traits: True,
+    asks=WITH_BARRIER,
 )
 def unilateral(case: Case, subject: Subject) -> Measurement:
     """Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.
@@ -258,6 +263,7 @@ def _move_by_roundoff(case: Case) -> Iterator[Case]:
 
 @_define(
     id="nodal-push",
+    rank=110,
     quantities=(PULL_OF_NODE,),
     promise=lambda traits: traits.promises.nodes_push,
     usual_undecided=0.002,

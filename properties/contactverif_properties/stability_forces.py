@@ -50,6 +50,7 @@ SWEPT_ROUNDINGS = forces_quantity("error of a force in roundings")
 
 @Property.define(
     id="stability.translation",
+    rank=150,
     family="stability",
     quantities=(FORCES, TANGENT, SEARCH),
     cases=Cases.random(translated_cases),
@@ -114,6 +115,7 @@ def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[
 
 @Property.define(
     id="stability.local",
+    rank=170,
     family="stability",
     quantities=(FORCES_THERE, TOTAL_THERE),
     cases=Cases.by_kind(local_cases),
@@ -252,6 +254,7 @@ def move_swept(case: Case) -> Case:
 
 @Property.define(
     id="stability.sweep",
+    rank=330,
     family="stability",
     quantities=(SWEPT_ROUNDINGS,),
     cases=Cases.from_list(stability_states),

@@ -106,6 +106,7 @@ class _TurnedSystem:
 
 @Property.define(
     id="stability.stiffness",
+    rank=580,
     family="stability",
     quantities=(ROUNDINGS,),
     cases=Cases.from_list(stability_scenes),
@@ -234,6 +235,7 @@ def _conditioning(state: FrozenState, scene: Scene) -> Conditioning:
 
 @Property.define(
     id="stability.inf-sup",
+    rank=490,
     family="stability",
     quantities=(ZEROS, SLOPE),
     series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
@@ -290,6 +292,7 @@ def inf_sup(case: Case, subject: Subject) -> Measurement:
 
 @Property.define(
     id="stability.locking",
+    rank=510,
     family="stability",
     quantities=(DRIFT, ROUGHNESS),
     needs=frozenset({"pair"}),

@@ -51,6 +51,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
 
 @Property.define(
     id="patch.tilted.resultant",
+    rank=250,
     family="patch",
     quantities=(OFF_NORMAL, TOTAL),
     cases=Cases.by_kind(resultant_cases),
@@ -121,6 +122,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
 
 @Property.define(
     id="patch.tilted.nodal",
+    rank=370,
     family="patch",
     quantities=(NODAL,),
     cases=Cases.random(tilted_cases),
@@ -152,6 +154,7 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
 
 @Property.define(
     id="locality.bend",
+    rank=260,
     family="invariants",
     quantities=AFTER_A_BEND,
     cases=Cases.random(bent_end_cases),

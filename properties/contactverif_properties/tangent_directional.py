@@ -57,6 +57,7 @@ COMPLEX = Quantity(
 
 @Property.define(
     id="tangent.directional",
+    rank=0,
     family="tangent",
     quantities=(CENTRAL, TAYLOR, COMPLEX),
     cases=Cases.random(smooth_cases),

@@ -46,7 +46,13 @@ _define = partial(
 )
 
 
-@_define(id="tangent.sparsity", cases=Cases.random(smooth_cases), cases_in_space=Cases.random(smooth_surface_cases))
+@_define(
+    id="tangent.sparsity",
+    rank=30,
+    turn=5,
+    cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
+)
 def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.
 
@@ -76,7 +82,9 @@ def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     return measure_blocks(case, subject)
 
 
-@_define(id="tangent.long", cases=Cases.from_list(long_states), cases_in_space=Cases.from_list(long_face_states))
+@_define(
+    id="tangent.long", rank=20, cases=Cases.from_list(long_states), cases_in_space=Cases.from_list(long_face_states)
+)
 def tangent_long(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent of a long interface is the derivative of the residual.
 

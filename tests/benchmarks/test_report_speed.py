@@ -18,7 +18,7 @@ N_EXAMPLES = 200
 
 @pytest.fixture(scope="module")
 def result() -> Run:
-    questions = [load_property(name) for name in ("balance.force", "patch.flat.transmission", "scaling")]
+    questions = [load_property(name) for name in ("balance.force", "patch.flat.transmission", "units")]
     return verify([load_subject("vts-ppt")], questions, examples=N_EXAMPLES, seed=1)
 
 

@@ -21,7 +21,7 @@ from contactverif.run.run import run
 QUESTIONS = (
     "purity",
     "unilateral",
-    "scaling",
+    "units",
     "balance.force",
     "balance.moment",
     "patch.flat.resultant",

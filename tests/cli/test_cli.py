@@ -74,6 +74,7 @@ MISTAKES = [
     # argument, found, needed
     (["verify"], r"NAME: found nothing; needed --all, or some of c, chen-hisada, feap, fedoo, ipctk, mortar, .*"),
     (["verify", "vts-pt"], r"formulation: found 'vts-pt'; needed a name that exists; the nearest: vts-ppt.*"),
+    (["verify", "vts-ppt", "-p", "scaling"], "property: found 'scaling'; needed 'units', the new id of that property"),
     (["verify", "nts-ar:area=now"], r"area: found 'now'; needed 'current' or 'reference'"),
     (["verify", "nts:tau=2"], r"tau: found 2; needed a number ≥ 0 and < 1"),
     (["verify", "nts", "nts"], r"formulation: found nts 2 times; needed each of them once"),

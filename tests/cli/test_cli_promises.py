@@ -33,7 +33,7 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> None:
     install_formulations(monkeypatch, twice=f"{__name__}:make_twice", three_times=f"{__name__}:make_three_times")
 
 
-OPTIONS = ("-p", "scale", "-p", "swap", "-p", "patch.flat.transmission", "--examples", "2", "--seed", "1")
+OPTIONS = ("-p", "total-stiffness", "-p", "swap", "-p", "patch.flat.transmission", "--examples", "2", "--seed", "1")
 
 
 @pytest.mark.usefixtures("silent")

@@ -86,7 +86,7 @@ def test_the_failures_that_are_known_come_from_traits_and_from_the_tables_of_pla
     assert not [name for name in property_ids() if not planted_mistakes(name)]
     assert "penalty squared" in planted_mistakes("patch.flat.transmission")
     assert smallest_mesh("balance.force").startswith("1 slave segment on 1 of the master, for the mistake “")
-    assert smallest_mesh("scale") == ""
+    assert smallest_mesh("total-stiffness") == ""
     assert "`vts-me` (`c-prime`)" in stated_failures(load_property("patch.flat.transmission"), INSTALLED)
     assert "No installed" in stated_failures(load_property("purity"), INSTALLED)
 
@@ -125,7 +125,7 @@ def test_a_mistake_is_answered_with_what_is_needed(report: Path, ask: Ask) -> No
         (["patch.flat.noda"], rf"NAME: found 'patch.flat.noda'; {nearest} patch.flat.nodal.*"),
         (["swap", "--case", "nts.swap"], r"--report: found nothing; needed the report that has the case 'nts.swap'"),
         (["xyzzy"], "NAME: found 'xyzzy'; needed a property, a term, a symbol or a trait; .*"),
-        (["scale", "--report", report], rf"NAME: found 'scale'; {failing}"),
+        (["total-stiffness", "--report", report], rf"NAME: found 'total-stiffness'; {failing}"),
         (["--report", report], rf"NAME: found nothing; {failing}"),
         (["swap", "--report", report, "--case", "nts.swa"], r"--case: found 'nts.swa'; needed an id like nts.swap.*"),
         (

@@ -41,7 +41,7 @@ def test_a_mesh_with_cells_is_a_scene_and_the_screen_says_what_is_not_asked(ask:
 def test_a_mesh_of_which_no_scene_can_be_made_is_an_interface_and_the_reason_is_said(ask: Ask, tmp_path: Path) -> None:
     path = write_curved_bodies(tmp_path / "curved.msh")
     on_one_body = ("--mesh", path, "--slave", "lid", "--master", "bottom")  # Both look away from the other body.
-    answer = ask("verify", "vts-ppt", *on_one_body, "--flip", "-p", "scaling", "-p", "newton.units", *FEW)
+    answer = ask("verify", "vts-ppt", *on_one_body, "--flip", "-p", "units", "-p", "newton.units", *FEW)
     assert "contactverif: no bodies are solved: " in answer.err
     assert "  elastic bodies: newton.units\n" in answer.out
 

@@ -15,9 +15,9 @@ from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Row, Run
 from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.problems.named_states import named_case
-from contactverif.run.telling import by_telling
+from contactverif.run.ranking import by_rank
 
-CHEAP = ("purity", "balance.*", "patch.flat.*", "hard.node-hit", "swap", "scale", "unilateral")
+CHEAP = ("purity", "balance.*", "patch.flat.*", "hard.node-hit", "swap", "total-stiffness", "unilateral")
 OPTIONS = (*(word for name in CHEAP for word in ("-p", name)), "--examples", "4", "--seed", "1")
 MOST_LINES, MOST_LINES_OF_WRONG, COLUMNS = 25, 60, 80
 
@@ -93,7 +93,7 @@ def test_every_counterexample_is_drawn_if_the_user_wants_that(ask: Ask) -> None:
 def test_one_line_is_enough_for_a_script(ask: Ask) -> None:
     answer = ask("verify", "vts-ppt", "-q", *OPTIONS)
     assert answer.out == "Every promise is kept and every property was judged.\n"
-    assert ask("verify", "half", "-q", "-p", "swap", "-p", "scale", *OPTIONS[-4:]).out.count("\n") == 1
+    assert ask("verify", "half", "-q", "-p", "swap", "-p", "total-stiffness", *OPTIONS[-4:]).out.count("\n") == 1
 
 
 def test_what_is_left_out_has_one_line_that_says_why_and_how_to_ask_it(ask: Ask) -> None:
@@ -123,9 +123,9 @@ def test_a_wrong_force_beside_an_exact_one_is_shown_before_two_answers_that_diff
             ("purity", Verdict.FAIL),
         )
     ]
-    assert [row.property_id for row in by_telling(rows)] == ["purity", "patch.flat.resultant", "mirror"]
+    assert [row.property_id for row in by_rank(rows)] == ["purity", "patch.flat.resultant", "mirror"]
     alone = [rows[0], Row("mine", load_property("patch.flat.resultant").info, Verdict.PASS, True)]
-    assert by_telling(alone)[0].property_id == "mirror"
+    assert by_rank(alone)[0].property_id == "mirror"
 
 
 def test_a_failure_in_words_is_not_shown_by_a_number_that_keeps_its_tolerance() -> None:

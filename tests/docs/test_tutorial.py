@@ -116,7 +116,7 @@ def test_a_wrong_tangent_is_found_out(run_program: Run, tmp_path: Path) -> None:
     source = (MINE / "mine.py").read_text(encoding="utf-8")
     wrong = source.replace("return np.column_stack(columns)", "return -np.column_stack(columns)")
     fixed_step = source.replace("h = 2.0**-100 * np.ptp(z)", "h = 1e-20")
-    for text, property_id in ((wrong, "tangent.directional"), (fixed_step, "scaling")):
+    for text, property_id in ((wrong, "tangent.directional"), (fixed_step, "units")):
         assert text != source
         install_mine(tmp_path / "site", text)
         answer = run_program(

@@ -16,7 +16,7 @@ MUTANTS = {
     "engine.purity": "softer at every call",
     "engine.mirror": "the second node gets more",
     "engine.renumbering": "the first edge is soft",
-    "engine.scaling": "an absolute length",
+    "engine.units": "an absolute length",
     "engine.swap": "",  # Springs along the slave's normals are no two-sided method.
     "engine.objectivity": "upright normals",
     "engine.remote": "as stiff as the mean body",

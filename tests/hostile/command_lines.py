@@ -106,7 +106,7 @@ def draw_line(rng: random.Random, files: Files) -> Line:
         if name in _EXPENSIVE:
             arguments.append(rng.choice(_POISON[:2] if name == "paper" else _POISON))
         if name in ("verify", "compare") and rng.random() < 0.9:
-            arguments += ["-p", rng.choice(["balance.force", "scaling"]), "--examples", rng.choice(["1", "2"])]
+            arguments += ["-p", rng.choice(["balance.force", "units"]), "--examples", rng.choice(["1", "2"])]
         if any("--isolation" in option.opts for option in commands[name].params) and rng.random() < 0.95:
             arguments += ["--isolation", "inline"]  # Else each line would start a process for the plugin.
         if rng.random() < 0.05:
@@ -160,7 +160,7 @@ def _draw_value(rng: random.Random, option: Any, files: Files, command: str) -> 
     if name in ("examples", "seed", "jobs", "number", "repeats"):
         return rng.choice(_WHOLE)
     if name in ("properties", "known"):
-        return rng.choice(["balance.force", "scaling", "nope", "[", "*?[!]", "balance.force=why", "=", "**" * 50 + "x"])
+        return rng.choice(["balance.force", "units", "nope", "[", "*?[!]", "balance.force=why", "=", "**" * 50 + "x"])
     if name in ("case_id", "case", "slave", "master", "profile"):
         return rng.choice(["nts.balance.force", "ci", "dev", "punch", "base", "", "*", "é"])
     return rng.choice(files.names())
@@ -286,7 +286,7 @@ def _import_all() -> None:
     importlib.import_module("contactverif_reports.html.report_page")
     from contactverif.plugins import registry
 
-    registry.load_properties(["balance.*", "scaling"])
+    registry.load_properties(["balance.*", "units"])
     registry.load_formulation("nts")
 
 

@@ -63,13 +63,13 @@ def test_a_mistake_in_an_included_formulation_is_named(name: str) -> None:
 @pytest.mark.parametrize("name", STRANGERS)
 def test_nothing_is_said_of_a_right_formulation_of_a_stranger(name: str) -> None:
     subject = Subject(name, STRANGERS[name])
-    assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
+    assert [diagnose(subject, property_id) for property_id in ("balance.force", "units", TANGENT)] == [""] * 3
 
 
 @pytest.mark.parametrize("name", plane_names())
 def test_nothing_is_said_of_an_included_formulation(name: str) -> None:
     subject = load_subject(name)
-    assert [diagnose(subject, property_id) for property_id in ("balance.force", "scaling", TANGENT)] == [""] * 3
+    assert [diagnose(subject, property_id) for property_id in ("balance.force", "units", TANGENT)] == [""] * 3
 
 
 class Nodes:

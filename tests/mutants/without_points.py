@@ -16,7 +16,7 @@ CAUGHT_BY = {
     "whole slave segment active with one of its points": "nodal-push",
     "activity of the neighbour": "unilateral",
     "penetrations below 1e-9 left open": "hard.offset",
-    "gaps below 1e-9 closed": "scaling",
+    "gaps below 1e-9 closed": "units",
     "segments of the nearest node only": "hard.search",
     "wrong with four chains": "patch.flat.transmission",
     "wrong at tilts of 23° to 29°": "patch.flat.transmission",

@@ -35,7 +35,7 @@ SOLVE, VARIANTS, DEAD_ZONE = "patch.flat.solve", "patch.variants", "patch.dead-z
 RANK = "multipliers.rank"
 ORDER, HISTORY = "newton.order", "newton.history"
 UNILATERAL, COMPLEMENTARITY = "unilateral", "complementarity"
-TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "scaling", "purity"
+TANGENT, OBJECTIVITY, SCALING, PURITY = "tangent.directional", "objectivity", "units", "purity"
 BALANCED, VTS_PPT_BALANCED = "vts_ppt_balanced", contactverif_nts.vts_ppt_balanced
 
 

@@ -136,7 +136,7 @@ MUTANTS = (
            lambda *, penalty: wrap(penalty, STS, tangent=_forget_rows)),
     Mutant("one cell for each hundred of slave face and master face", "hard.search",
            lambda *, penalty: wrap(penalty, STS, pair=_share_keys)),
-    Mutant("springs a twentieth too stiff, of an unstated area", "scale", _stiffen),
+    Mutant("springs a twentieth too stiff, of an unstated area", "total-stiffness", _stiffen),
     Mutant("an instance that tires", "purity.long", _tire),
     Mutant("a front that starts once", "remote", lambda *, penalty: wrap(penalty, STS, pair=_follow_front)),
     Mutant("tangent made symmetric where it nearly is", "tangent.long",

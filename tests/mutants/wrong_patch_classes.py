@@ -15,7 +15,7 @@ from contactverif.contract.traits import Traits
 
 NORMAL, NORMAL_SOLVE = "patch.flat.normal", "patch.flat.normal.solve"
 SINGLE, SINGLE_SOLVE = "patch.flat.single", "patch.flat.single.solve"
-NODAL, PUBLISHED, SCALE = "patch.flat.nodal", "patch.flat.published", "scale"
+NODAL, PUBLISHED, SCALE = "patch.flat.nodal", "patch.flat.published", "total-stiffness"
 SMALL = "1e-12"  # The relative size of graded mistakes.
 
 _PLACES = "c = -1 + (2 * np.arange(n) + 1) / n"

@@ -19,7 +19,7 @@ from contactverif_surfaces.face_search import MOST_CORNERS, find_cells
 
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT, TANGENT, OBJECTIVITY = "balance.force", "balance.moment", "tangent.directional", "objectivity"
-SCALING, RENUMBERING, MIRROR, PURITY = "scaling", "renumbering", "mirror", "purity"
+SCALING, RENUMBERING, MIRROR, PURITY = "units", "renumbering", "mirror", "purity"
 STS, CELL, QUARTERS, MORTAR = (
     getattr(contactverif_surfaces, name) for name in ("sts_3d", "vts_cell_3d", "vts_ppt_3d", "mortar_3d")
 )

@@ -20,7 +20,7 @@ from contactverif.strategies.rings import closed_cases
 
 BARRIER = Traits(rules=Rules(enforcement="barrier", activation=0.5))
 FOR_BARRIERS = {
-    *("balance.force", "balance.moment", "mirror", "renumbering", "swap", "objectivity", "scaling", "purity"),
+    *("balance.force", "balance.moment", "mirror", "renumbering", "swap", "objectivity", "units", "purity"),
     *("purity.long", "symmetric", "tangent.directional", "tangent.sparsity", "tangent.long", "unilateral"),
     *("patch.flat.transmission", "patch.flat.normal", "patch.flat.single"),
 }
@@ -33,11 +33,11 @@ def ask(question: Property, make: Any, examples: int = 12) -> list[Verdict]:
 
 def test_who_states_no_activation_distance_is_asked_nothing() -> None:
     questions = [load_property(name) for name in property_ids()]
-    assert {question.id for question in questions if not question.refusal(BARRIER)} == FOR_BARRIERS - {"scaling"}
+    assert {question.id for question in questions if not question.refusal(BARRIER)} == FOR_BARRIERS - {"units"}
     silent = Traits(rules=Rules(enforcement="barrier"))
     assert all("barrier" in question.refusal(silent) for question in questions)
-    assert "penalty_power" in load_property("scaling").refusal(BARRIER)
-    assert "a length" in load_property("scaling").refusal(BARRIER.revise(activation_unit="length"))
+    assert "penalty_power" in load_property("units").refusal(BARRIER)
+    assert "a length" in load_property("units").refusal(BARRIER.revise(activation_unit="length"))
 
 
 @pytest.mark.parametrize("source", [smooth_cases, flat_cases, closed_cases])
@@ -159,7 +159,7 @@ class Pulls(LogBarrier):
         (Bounded, "unilateral"),
         (TooFar, "unilateral"),
         (Pulls, "unilateral"),
-        (FixedLength, "scaling"),
+        (FixedLength, "units"),
         (FollowsTheAxis, "objectivity"),
         (FollowsTheAxis, "symmetric"),
         (Remembers, "purity"),

@@ -10,7 +10,7 @@ from contactverif import ContractError, Handle, Pairing, Subject, Verdict, load_
 from contactverif.run.run import run
 
 RIGHT = {"vts-ppt": contactverif_nts.vts_ppt, "nts-lm": contactverif_nts.nts_lm, "mortar": contactverif_mortar.mortar}
-PROPERTIES = ["tangent.directional", "tangent.sparsity", "purity", "symmetric", "continuity", "objectivity", "scaling"]
+PROPERTIES = ["tangent.directional", "tangent.sparsity", "purity", "symmetric", "continuity", "objectivity", "units"]
 
 
 @pytest.mark.parametrize("name", RIGHT)

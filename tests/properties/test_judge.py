@@ -69,7 +69,14 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
     )
     traits = traits.revise(published_forces={"a1": "1 2 1; 2 2"}, force_along="master normal", continuity="C0")
     nodal = "patch.flat.nodal"
-    springs_alone = (nodal, "projection.activity", "stability.stiffness", "continuity", "patch.tilted.nodal", "scale")
+    springs_alone = (
+        nodal,
+        "projection.activity",
+        "stability.stiffness",
+        "continuity",
+        "patch.tilted.nodal",
+        "total-stiffness",
+    )
     multipliers_alone = (nodal, "multipliers.rank", "complementarity", "stability.inf-sup")
     for question in load_properties():
         assert isinstance(question, Property)

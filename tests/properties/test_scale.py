@@ -12,7 +12,7 @@ import contactverif_nts
 from contactverif import Subject, Verdict, judge_case
 from contactverif.contract.traits import Rules, Traits
 
-SCALE = load_property("scale")
+SCALE = load_property("total-stiffness")
 CASES = {case.name: case for case in SCALE.cases(None)}
 SILENT = Traits()
 

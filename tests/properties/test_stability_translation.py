@@ -89,7 +89,7 @@ def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
     )
 
 
-@pytest.mark.parametrize("property_id", ["balance.force", "balance.moment", "scaling"])
+@pytest.mark.parametrize("property_id", ["balance.force", "balance.moment", "units"])
 @pytest.mark.parametrize("name", RIGHT)
 def test_whoever_promises_to_be_stable_is_asked_for_balance_and_scaling_at_its_diameter(
     name: str, property_id: str

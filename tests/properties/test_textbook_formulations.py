@@ -11,7 +11,7 @@ from contactverif.sampling.draw import draw_cases
 
 FORMULATIONS = (CentredSprings, QuadraticSprings, NodalMultipliers, ClippedCells, WeightedGaps)
 FAMILIES = ("stability", "projection", "hard")
-OTHERS = ("purity", "scaling", "objectivity", "unilateral", "tangent.directional")
+OTHERS = ("purity", "units", "objectivity", "unilateral", "tangent.directional")
 LARGE = ("hard.touch", "hard.contrast")  # Their meshes are large for loops.
 EXAMPLES = 8  # Random cases of each property that solves no bodies.
 FEW = 2  # Cases of the others, and of a finite list, evenly spread over it.

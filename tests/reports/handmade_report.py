@@ -69,7 +69,7 @@ def run_with_kinds() -> Run:
     """Two formulations on cases of three kinds; one kind has no case, another is always idle, and one case has none."""
     info = question("projection.place", "projection", ERROR)
     info = replace(info, kinds=("inside a segment", "from behind", "second body behind"))
-    plain, other = question("balance.force", "balance", ERROR), question("scaling", "invariants", ERROR)
+    plain, other = question("balance.force", "balance", ERROR), question("units", "invariants", ERROR)
     inside, behind = (replace(flat([1], [2]), kind=kind) for kind in info.kinds[:2])
     passed, idle = outcome(inside, 1e-15), outcome(behind, 0.0)
     assert idle.measurement is not None

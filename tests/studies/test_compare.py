@@ -552,12 +552,12 @@ def named_run(cells: dict[tuple[str, str], Cell], failures: dict[str, str] | Non
 
 def test_what_is_missing_is_named_and_what_does_not_load_any_more_is_lost() -> None:
     same = cell(0.5)
-    old = named_run({("nts", "purity"): same, ("vts-me", "purity"): same, ("nts", "scaling"): same})
+    old = named_run({("nts", "purity"): same, ("vts-me", "purity"): same, ("nts", "units"): same})
     new = named_run(
         {("nts", "purity"): same, ("nts", "newton.order"): same}, {"vts-me": "no module", "other": "no module"}
     )
     changes = Changes.between(old, new)
-    assert changes.removed == ("vts-me", "scaling")
+    assert changes.removed == ("vts-me", "units")
     assert changes.added == ("newton.order",)
     assert changes.no_longer_loaded == {"vts-me": "no module"}
     assert changes.regressions == ("vts-me: not loaded any more: no module",)

@@ -31,7 +31,7 @@ SHARED = {
     **dict.fromkeys(("patch.flat.single", "patch.flat.single.solve"), CLASS),
     "patch.tilted.nodal": TILTED,
     **dict.fromkeys(("nodal-push", "projection.activity", "projection.segment"), POINTS),
-    **dict.fromkeys(("newton.units", "scaling"), UNITS),
+    **dict.fromkeys(("newton.units", "units"), UNITS),
     **dict.fromkeys(("newton.attainable", "stability.local", "stability.stiffness"), DIGITS),
     **dict.fromkeys(("stability.sweep", "stability.translation"), DIGITS),
     **dict.fromkeys(("objectivity", "swap"), SIDES),

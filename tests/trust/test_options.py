@@ -12,7 +12,7 @@ from contactverif.sampling.draw import draw_cases
 # Properties that solve nothing, and have hardly an idle or an undecided case.
 QUICK = (
     *("balance.force", "balance.moment", "mirror", "objectivity", "projection.forces", "purity", "renumbering"),
-    *("scaling", "swap", "symmetric", "unilateral", "nodal-push", "stability.translation", "tangent.sparsity"),
+    *("units", "swap", "symmetric", "unilateral", "nodal-push", "stability.translation", "tangent.sparsity"),
 )
 EXAMPLES, EACH = 2, 3  # Random cases of a property; properties for each name, in rotation.
 
