@@ -14,7 +14,7 @@ from contactverif.contract.result import Result, Row
 from contactverif.plugins.registry import installed_properties, load_property
 
 PATCH = "patch"  # The family of the patch tests.
-_LEAST_STEP = 1e-4  # Times a rank it is less than 1, the least difference of two ranks.
+_LEAST_STEP = 1e-4  # A rank times this is less than the least difference of two ranks, which is 1.
 
 
 def wrong_rows(rows: Iterable[Row]) -> list[Row]:
