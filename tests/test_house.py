@@ -109,11 +109,8 @@ ROOMS = {
     "contactverif_foreign": Room(
         ("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo", "ngsolve", "netgen")
     ),
-    "properties.shared": Room(
-        ("contract", "oracle", "mechanics", "problems", "strategies"), ("numpy", "scipy", "hypothesis"), QUIET
-    ),
     "properties": Room(
-        ("contract", "oracle", "mechanics", "problems", "strategies", "properties.shared"),
+        ("contract", "oracle", "mechanics", "problems", "strategies"),
         ("numpy", "scipy", "hypothesis"),
         QUIET,
     ),
@@ -232,10 +229,6 @@ WRONG_IMPORTS = {
         ("from pathlib import Path", "properties may not use pathlib"),
         ("import importlib as i\ni.import_module('numba')", "properties may not import numba"),
     ],
-    "contactverif_properties.shared.a": [
-        ("import contactverif.geometry.projection as p", "properties.shared may not import geometry"),
-        ("import contactverif_properties.b", "properties.shared may not import properties"),
-    ],
     "contactverif_nts.a": [
         ("if TYPE_CHECKING:\n from contactverif.run.run import run", "contactverif_nts may not import run"),
         ("import contactverif_mortar.b", "contactverif_nts may not import contactverif_mortar"),
@@ -277,7 +270,7 @@ def test_the_reader_of_imports_sees_a_wrong_one(module: str, source: str, messag
     [
         (
             "contactverif_properties.a",
-            "from contactverif.oracle import nearest\nimport contactverif_properties.shared.roundoff",
+            "from contactverif.oracle import nearest\nimport contactverif_properties.roundoff",
         ),
         ("contactverif_nts.a", "import numpy.typing\nfrom contactverif_nts import eq6\nfrom .walk import x"),
         (

@@ -1,7 +1,7 @@
-"""The questions that every contact formulation is asked, one file a question; `shared` holds what they have in common.
+"""The properties that every contact formulation is checked for, a file for each family.
 
-Rules for the next editor: the judge shares no code with the judged, so nothing here imports a plugin or
-`contactverif.geometry`. A file holds one property, and its first lines say what is asked, why it matters to an
-engineer, how it is judged, and when a case is undecided. The reference pages of the site are made of these lines.
-`docs/concepts/tolerances.md` explains what the formulas have in common.
+The judge shares no code with the judged, so nothing here imports a plugin or `contactverif.geometry`. The docstring of
+a property says what is asked, why it matters to an engineer, how it is judged, and when a case is undecided: the
+reference pages of the site are made of it. `states`, `roundoff`, `kinks`, `applicability` and `exact_forces` hold what
+several families need, and import no property. `docs/concepts/tolerances.md` explains what the formulas have in common.
 """

@@ -26,10 +26,13 @@ from contactverif.problems.arcs import Arcs
 from contactverif.problems.hertz_studies import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies
 from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
-from contactverif_properties.patch_flat import refuse_unknown_total
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers, refuse_unknown_pressure
-from contactverif_properties.shared.passes import nearest_sum
-from contactverif_properties.shared.uniform_pressure import pushing_forces, uniform_state
+from contactverif_properties.applicability import (
+    refuse_dependent_multipliers,
+    refuse_unknown_pressure,
+    refuse_unknown_total,
+)
+from contactverif_properties.exact_forces import pushing_forces, uniform_state
+from contactverif_properties.states import nearest_sum
 
 
 def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measurement:

@@ -1,25 +1,194 @@
-"""Properties about two states that a right formulation answers alike."""
+"""Two states, or two scenes of a whole code, that have the same answer: mirrored, in other units, beside other bodies.
+
+Each state is one case. `Carry` says which node of the second state is which node of the first, and how vectors go over.
+Multipliers are uniform, so that their order does not matter; only the rows of positions are compared.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from math import cos, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
+from scipy import linalg
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.engine_subject import SOLVE, EngineSubject
 from contactverif.contract.interface import PLANE, Interface, Surface
-from contactverif.contract.measurement import Measurement
+from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Property
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.mechanics import changed_scenes
+from contactverif.mechanics.accuracy import Solution
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
+from contactverif.mechanics.solving import solve_by_engine
+from contactverif.oracle import default_points, nearest_segments
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.rings import closed_cases
-from contactverif.strategies.straight import cases_over_a_body
-from contactverif.strategies.surfaces import plane_cases_by_a_plate, smooth_surface_cases
-from contactverif_properties.shared.same_answer import TIE, Carry, compare, same_answer_quantities
+from contactverif.strategies.solids import closed_cases as closed_scenes
+from contactverif.strategies.straight import bent_end_cases, cases_over_a_body
+from contactverif.strategies.surfaces import plane_cases_by_a_plate, smooth_surface_cases, surface_cases
+from contactverif_properties import roundoff
+from contactverif_properties.applicability import refuse_unstated_penalty
+from contactverif_properties.exact_forces import worst_force
+from contactverif_properties.kinks import explain_by_kink
+from contactverif_properties.patch_solved import engine_tolerance
+from contactverif_properties.states import FrozenState, any_cases, ask_forces_and_tangents, freeze_state
+
+TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
+SHARE = 0.1875  # A uniform multiplier over the shortest segment, with c = 1: as large as a penetration would be.
+BITS = "entries with other bits"
+TIE = "a tie: a point in the normal cone of a vertex is as near to one segment as to another"
+
+
+@dataclass(frozen=True, slots=True)
+class Carry:
+    """The way in which the first of two states becomes the second."""
+
+    nodes: IntArray  # (n_nodes,) The number, in the second state, of each node of the first.
+    # (dim, dim) What becomes of vectors: a force f becomes matrix · f.
+    matrix: FloatArray = field(default_factory=lambda: np.eye(2))
+
+
+def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
+    """Return the quantities of `compare`, the changes of forces and tangent; `situation` ends their names."""
+    return (
+        Quantity(f"change of the forces {situation}", TOLERANCE, roundoff.SEGMENT_REASON),
+        Quantity(f"change of the tangent {situation}", TOLERANCE, roundoff.SEGMENT_REASON),
+    )
+
+
+def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tuple[FrozenState, FloatArray, FloatArray]:
+    """Return a state with uniform multipliers if there are any, its forces (n_nodes, dim) and tangent.
+
+    The tangent has the rows and columns of positions, and none where the plugin has no tangent.
+    """
+    formulation, n = subject.with_penalty(penalty), case.interface.n_unknowns
+    if formulation.n_multipliers(case.interface):
+        formulation = subject.with_penalty(1.0)
+    state = FrozenState.with_multiplier(formulation, case, multiplier)
+    (forces,), tangents = ask_forces_and_tangents(state)
+    return state, forces[:n].reshape(case.interface.nodes.shape), tangents[0][:n, :n] if tangents else np.empty((0, 0))
+
+
+class Change(NamedTuple):
+    """The change of the forces, or of the tangent, between two states."""
+
+    part: str  # "forces" or "tangent".
+    quantity: Quantity
+    change: FloatArray
+    size: float  # The size that the largest change counts over, in the unit of the change.
+    # (n_nodes,) The number, in the second state, of each node of the change; None where both have the same numbers.
+    nodes: IntArray | None = None
+    dim: int = PLANE  # The number of unknowns of a node.
+
+    def worst_columns(self, number: int) -> IntArray:
+        """Return the columns of the node, or the multiplier, with the largest change, in the first state or second."""
+        n_columns = self.change.shape[-1]
+        node = int(np.abs(self.change).argmax()) % n_columns // self.dim
+        if self.nodes is None or number == 0:
+            columns: IntArray = np.minimum(self.dim * node + np.arange(self.dim), n_columns - 1)
+            return columns
+        return self.dim * int(self.nodes[node]) + np.arange(self.dim)
+
+
+def judge_changes(
+    changes: Sequence[Change], tolerance: float, states: Iterable[FrozenState], largest: float | None = None
+) -> tuple[tuple[CheckedNumber, ...], str]:
+    """Return the largest changes over their sizes, and why a kink excuses those above the tolerance.
+
+    Coordinates are rounded at the largest one of each state, or at a length. Without states, nothing is excused.
+    """
+    errors = [float(np.abs(each.change).max()) for each in changes]
+    values = {each.quantity: roundoff.ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
+    failures = [each for each in changes if values[each.quantity] > tolerance]
+    excuses = (_find_excuse(failures, number, state, largest) for number, state in enumerate(states))
+    return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
+
+
+def _find_excuse(failures: Sequence[Change], number: int, state: FrozenState, largest: float | None) -> str:
+    """Return why a kink in the first state, or the second, excuses changes that are too large, or an empty string."""
+    errors = {each.part: float(np.abs(each.change).max()) for each in failures}
+    columns = next((each.worst_columns(number) for each in failures if each.part == "tangent"), None)
+    return explain_by_kink(
+        state, roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), errors, columns
+    )
+
+
+def compare(
+    quantities: tuple[Quantity, Quantity],
+    subject: Subject,
+    case: Case,
+    other: Case,
+    carry: Carry,
+    *,
+    explain: bool = True,
+) -> Measurement:
+    """Compare the answers in two states: the largest change of a force over Σ|R| of a side, of an entry over max|K|.
+
+    The sizes are the larger of both states. The detail `BITS` counts entries that are not equal to the last bit.
+    """
+    penalty, multiplier = subject.penalty(case), SHARE * case.resolution
+    (first, forces, tangent), (second, forces_there, tangent_there) = (
+        _ask(state, subject, penalty, multiplier) for state in (case, other)
+    )
+    size = max(roundoff.sum_larger_forces(case, forces), roundoff.sum_larger_forces(other, forces_there))
+    changes = [Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
+    if tangent.size:
+        dim = case.interface.dim
+        places = (dim * carry.nodes[:, None] + np.arange(dim)).reshape(-1)
+        turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
+        change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
+        size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
+        changes.append(Change("tangent", quantities[1], change, size, carry.nodes, dim))
+    distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
+    tolerance = roundoff.segment_tolerance(case, forces, distance)
+    numbers, undecided = judge_changes(changes, tolerance, [first, second] if explain else [])
+    if explain and not undecided and any(number.value > number.tolerance for number in numbers):
+        # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
+        undecided = _find_tie(first) or _find_tie(second)
+    finding = None
+    if numbers[0].ratio > 1:
+        back = forces_there[carry.nodes] @ carry.matrix
+        finding = worst_force(case.interface, back, forces, ("force in the second state", "in the first"))
+    details = {BITS: float(sum(np.count_nonzero(each.change) for each in changes))}
+    idle = not (forces.any() or forces_there.any())
+    return Measurement(numbers, undecided, details=details, idle=idle, finding=finding)
+
+
+def _find_tie(state: FrozenState) -> str:
+    """Return why either of two segments is right for a point, or an empty string if none is tied.
+
+    A point in the normal cone of a re-entrant vertex is equally near to both segments there, wherever it is. By the
+    rule "the nearest segment" alone, a formulation may take the one with the lower number.
+    """
+    if state.case.interface.dim != PLANE:
+        return ""
+    if state.has_points:
+        passes = [(each.interface, each.z, each.points.position[each.points.active]) for each in state.passes]
+    else:
+        interface, positions = state.case.interface, state.case.positions
+        segment, c, _, _ = default_points(interface)
+        first, second = np.swapaxes(positions[interface.slave.segments[segment]], 0, 1)
+        share = (1 + c[:, None]) / 2
+        passes = [(interface, state.case.z, (1 - share) * first + share * second)]
+    for interface, z, places in passes:
+        nodes = z[: interface.n_unknowns].reshape(-1, 2)
+        for place in places[np.isfinite(places).all(axis=1)]:
+            near = nearest_segments(nodes, interface.master.segments, (float(place[0]), float(place[1]))).segments
+            open_point = all(segment.signed_squared_gap > 0 for segment in near)
+            if len(near) > 1 and (not open_point or state.case.n_multipliers):  # Multipliers may push across a gap.
+                return TIE
+    return ""
+
 
 IN_MIRROR = same_answer_quantities("in the mirror image")
 WITH_ROLES_EXCHANGED = same_answer_quantities("with roles exchanged")
@@ -304,3 +473,398 @@ def add_parts(case: Case, slave: Part, master: Part, *, first: bool = False) -> 
     both = surface(interface.slave, slave, n_all), surface(interface.master, master, n_all + len(slave[0]))
     state = replace(case, interface=Interface(join(interface.nodes), *both), z=join(case.positions).reshape(-1))
     return state, Carry(number[:n_all], np.eye(interface.dim))
+
+
+AFTER_A_BEND = same_answer_quantities("after a bend elsewhere")
+
+
+@Property.define(
+    id="locality.bend",
+    rank=260,
+    family="invariants",
+    quantities=AFTER_A_BEND,
+    cases=Cases.random(bent_end_cases),
+    promise=lambda traits: traits.promises.local,
+)
+def locality_bend(case: Case, subject: Subject) -> Measurement:
+    """A bend of the master's unloaded neighbours changes neither forces nor tangent.
+
+    **Question.** A slave lies on a flat part of the master. The unloaded segments on both sides of that part turn about
+    its ends by −0.3 to 0.9 rad. Are forces and tangent those of before?
+
+    **Why it matters.** Contact acts between what touches. A formulation that makes its springs softer where the surface
+    bends, by averaged normals or by an estimate of the curvature, answers for a part of the surface that carries
+    nothing. On flat parts nothing shows, and at a bend every formulation may differ from every other.
+
+    **How it is judged.** The largest change of a nodal force counts over Σ|R| of the slave, that of an entry of the
+    tangent over max|K|. The slave stays away from the ends of the flat part by more than two penetrations, so no point
+    comes nearer to a bent segment than to the flat part, along any normal. The tolerance is u(8Z/min(g, ℓ) + 4N),
+    because a right formulation may subtract the mean of all nodes first. Formulations that compare nodes of facing
+    segments alone give 0. Smoothed masters do not promise `local`, and may say so.
+
+    **Undecided.** A failing case is undecided where a state lies at a kink, or where moving the nodes by 64 u X changes
+    the answer by a quarter of the error or more.
+    """
+    bent = replace(case, z=case.parameters["bent"])
+    return compare(AFTER_A_BEND, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))
+
+
+POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
+SCALED_TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
+SCALED_FORCES = Quantity("error of the forces in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
+SCALED_TANGENT = Quantity("error of the tangent in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
+LARGEST_EXPONENT = 60
+TURNED_FORCES = Quantity("error of the forces after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
+TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
+
+
+def refuse_unknown_unit(traits: Traits) -> str:
+    """Return why the number of the penalty in another unit of length is unknown, or an empty string."""
+    if traits.rules.enforcement != "barrier":
+        return refuse_unstated_penalty(traits)
+    if traits.rules.activation_unit == "length":
+        return "the activation distance of the barrier is a length, which another unit would change"
+    return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"
+
+
+def penalty_power(traits: Traits, dim: int = PLANE) -> float:
+    """Return the power of a length in the penalty, so that forces grow with lengths and the tangent stays."""
+    if traits.rules.enforcement == "barrier":
+        return traits.rules.penalty_power or 0.0
+    return float(1 - dim) if traits.rules.penalty == "distributed" else 0.0
+
+
+@_define(
+    id="units",
+    rank=180,
+    role="comparison",
+    turn=3,
+    quantities=(SCALED_FORCES, SCALED_TANGENT),
+    cases=Cases.random(any_cases),
+    cases_in_space=Cases.random(surface_cases),
+    applicable=refuse_unknown_unit,
+)
+def units(case: Case, subject: Subject) -> Measurement:
+    """Another unit of length changes nothing, so no absolute tolerance is hidden.
+
+    **Question.** All lengths are multiplied by 2^k, for a random k from −60 to 60. Are the forces 2^k times the old
+    ones, and is the tangent the same, for a penalty that changes with its unit?
+
+    **Why it matters.** A code with an absolute tolerance hidden in it, such as 1e-6 for "touching", works in
+    millimetres and fails in metres or micrometres.
+
+    **How it is judged.** Differences of the forces count over max|R|, those of the tangent over max|K|. The tolerance
+    is u(8Z/min(g, ℓ) + 4N), where Z is the diameter of a formulation that promises `translation_stable`, and the
+    largest coordinate of any other. Powers of two scale the four operations and square roots exactly, so a formulation
+    that uses nothing else gives 0; a power or an angle is rounded anew. A multiplier stays the same if it is a
+    pressure, and scales if it is a nodal force. Of a formulation with multipliers only the position rows are compared.
+
+    **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
+    changes the answer by a quarter of the error or more.
+    """
+    interface, random, dim = case.interface, np.random.default_rng(case.seed), case.interface.dim
+    factor, n = 2.0 ** int(random.integers(-LARGEST_EXPONENT, LARGEST_EXPONENT + 1)), interface.n_unknowns
+    distributed = subject.traits.rules.penalty == "distributed"
+    state = freeze_state(case, subject)
+    case, z = state.case, state.case.z
+    z_there = np.concatenate([z[:n] * factor, z[n:] * (1.0 if distributed else factor)])
+    case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
+    penalty = 1.0 if case.n_multipliers else subject.penalty(case)
+    there = FrozenState.at(
+        subject.with_penalty(penalty * factor ** penalty_power(subject.traits, interface.dim)), case_there
+    )
+    (forces,), tangents = ask_forces_and_tangents(state)
+    (forces_there,), tangents_there = ask_forces_and_tangents(there)
+    forces, forces_there = forces[:n], forces_there[:n]
+    changes = [Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
+    if tangents:
+        tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
+        changes.append(
+            Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max()), dim=dim)
+        )
+    tolerance = roundoff.segment_tolerance(case, forces, roundoff.rounding_distance(case, subject.traits))
+    return Measurement(*judge_changes(changes, tolerance, [state]), idle=not forces.any())
+
+
+def turn_state(case: Case) -> tuple[Case, FloatArray]:
+    """Return a case with the nodes at Qx + c, and the rotation Q (dim, dim), both random by the seed of the case."""
+    random = np.random.default_rng(case.seed)
+    rotation = _draw_rotation(random, case.interface.dim)
+    positions = case.positions @ rotation.T + random.uniform(-1, 1, case.interface.dim) * case.diameter
+    return replace(case, z=np.concatenate([positions.reshape(-1), case.multipliers])), rotation
+
+
+def _draw_rotation(random: np.random.Generator, dim: int) -> FloatArray:
+    """Return a rotation (dim, dim): by a random angle in the plane, and of a random quaternion in space."""
+    if dim == PLANE:
+        angle = random.uniform(-np.pi, np.pi)
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    quaternion = random.normal(size=4)
+    a, *axis = quaternion / np.linalg.norm(quaternion)
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: FloatArray = np.eye(3) + 2 * a * cross + 2 * cross @ cross
+    return rotation
+
+
+@_define(
+    id="objectivity",
+    rank=100,
+    role="comparison",
+    quantities=(TURNED_FORCES, TURNED_TANGENT),
+    cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
+    applicable=lambda traits: (
+        "normals are those of the reference configuration" if traits.abilities.motions == "small" else ""
+    ),
+    usual_undecided=0.003,
+)
+def objectivity(case: Case, subject: Subject) -> Measurement:
+    """Turning and shifting the state turns the forces and the tangent with it.
+
+    **Question.** A random state is turned by a random angle and shifted. Are the forces and the tangent the old ones,
+    turned?
+
+    **Why it matters.** A formulation that prefers an axis gives another answer for the same part in another position in
+    the assembly. In large rotations it creates energy.
+
+    **How it is judged.** The forces R(Qx + c) are compared with Q R(x) over Σ|R| of a side, and the tangent K(Qx + c)
+    with Q K Qᵀ over max|K|. Nothing turns multipliers; their constraint rows are compared too. The tolerance is
+    u(8X/min(g, ℓ) + 4N): a gap is a difference of coordinates, and rounding the ends of a segment turns the segment and
+    its force by uX/ℓ. X stands here for every formulation, because the harness itself rounds the turned positions to
+    uX. Where springs act twice, in two passes, half of the penetration g needs the same forces.
+
+    **Undecided.** A failing case is undecided where either state lies at a kink, or where moving the nodes by 64 u X
+    changes the answer by a quarter of the error or more.
+    """
+    state = freeze_state(case, subject)
+    case, n = state.case, case.interface.n_unknowns
+    case_there, rotation = turn_state(case)
+    there = FrozenState.at(state.formulation, case_there)
+    turn = linalg.block_diag(np.kron(np.eye(case.interface.n_nodes), rotation), np.eye(case.n_multipliers))
+    (forces, forces_there), tangents = ask_forces_and_tangents(state, there)
+
+    largest = max(case.largest_coordinate, case_there.largest_coordinate)
+    # Where springs act twice, in two passes, half of the penetration needs the same forces.
+    n_passes = len(list(state.passes)) if subject.traits.rules.area is None and state.has_points else 1
+    one_pass = forces / n_passes
+    tolerance = roundoff.segment_tolerance(case, one_pass, largest)
+    size = roundoff.sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
+    changes = [Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
+    if tangents:
+        tangent, tangent_there = tangents
+        change = tangent_there - turn @ tangent @ turn.T
+        size = float(np.abs(tangent).max())
+        changes.append(Change("tangent", TURNED_TANGENT, change, size, dim=case.interface.dim))
+    # Slivers may cost more digits in one place than in the other, so that both are looked at.
+    numbers, undecided = judge_changes(changes, tolerance, [state, there], largest)
+    return Measurement(numbers, undecided, idle=not forces[:n].any())
+
+
+CHANGE = Quantity(
+    "change of the forces",
+    "2 (a (1 + M U/(ℓ p)) + 1e-12 κ)",
+    "Both displacements are wrong by their accuracy a, which strains the shortest segment.",
+)
+LENGTH, MODULUS = 2.0**6, 4.0**-8  # Other units, and another one of force, which is their product
+ANGLES = (17.3, 45.0, 90.0, 135.0)  # Degrees
+IMAGE = np.diag([-1.0, 1.0])
+
+Values = Sequence[FloatArray]  # A vector for each node of each body, 0 off the interface.
+
+
+@random_source("contactverif_properties.engine_scenes.scenes")
+def tilted_scenes(scene: Case | None = None) -> SearchStrategy[Case] | None:
+    """Return blocks that are pressed together and tilted, all of the interface in contact; or a scene that is given."""
+    return closed_scenes(scene)
+
+
+_define_for_codes = partial(
+    Property.define,
+    family="engine",
+    quantities=(CHANGE,),
+    cases=Cases.random(tilted_scenes),
+    needs=frozenset({SOLVE}),
+    promise=lambda traits: True,
+    bodies=True,
+    engines=True,
+)
+
+
+def compare_scenes(
+    case: Case,
+    subject: Subject,
+    changed: Scene,
+    back: Callable[[int, FloatArray], FloatArray] = lambda body, forces: forces,
+) -> Measurement:
+    """Solve the scene of a case and a changed one, and return the largest change of a nodal force over p L.
+
+    `back` takes the forces of all nodes of a body of the changed scene to those of the scene.
+    """
+    assert isinstance(subject, EngineSubject)
+    scene = scene_of(case)
+    first, second = (solve_by_engine(item, subject)[0] for item in (scene, changed))
+    if reason := first.no_solution or second.no_solution:
+        return Measurement(undecided=reason)
+    forces, others = _by_body(scene, first), _by_body(changed, second)
+    largest = max(
+        float(np.abs(back(index, other) - force).max(initial=0.0))
+        for index, (force, other) in enumerate(zip(forces, others, strict=False))
+    )
+    total = float(np.linalg.norm(first.forces[: scene.interface.n_slave_nodes].sum(axis=0)))
+    if total == 0:
+        return Measurement([CHANGE.check(largest, 0.0)], idle=True)
+    length = float(scene.interface.slave.lengths(scene.interface.nodes).sum())
+    tolerance = 2 * engine_tolerance(scene, first, subject.engine_traits.accuracy, total / length)
+    return Measurement([CHANGE.check(largest / total, tolerance)])
+
+
+def _by_body(scene: Scene, solution: Solution) -> Values:
+    """Return the forces of all nodes of each body, 0 off the interface."""
+    values = [np.zeros((len(body.nodes), 2)) for body in scene.bodies]
+    first = 0
+    for index in scene.bodies_in_reach:
+        nodes = scene.bodies[index].contact_nodes
+        values[index][nodes] = solution.forces[first : first + len(nodes)]
+        first += len(nodes)
+    return values
+
+
+def _of_seed(case: Case) -> np.random.Generator:
+    return np.random.default_rng([case.seed, 28])
+
+
+@_define_for_codes(id="engine.purity")
+def engine_purity(case: Case, subject: Subject) -> Measurement:
+    """A scene that is solved again has the same solution, also after another one.
+
+    **Question.** A random scene of two blocks is solved, then another one, and then the first one again. Are the forces
+    that the bodies need the same?
+
+    **Why it matters.** A code that keeps a search, a mesh or a penalty of an earlier job answers by chance.
+
+    **How it is judged.** Changes of nodal forces count over p L, the force on the slave. The tolerance is twice that of
+    a patch test, as both solutions are as accurate as the code states.
+
+    **Undecided.** Where the code finds no solution.
+    """
+    assert isinstance(subject, EngineSubject)
+    solve_by_engine(changed_scenes.mirror(scene_of(case)), subject)
+    return compare_scenes(case, subject, scene_of(case))
+
+
+@_define_for_codes(id="engine.mirror")
+def engine_mirror(case: Case, subject: Subject) -> Measurement:
+    """The mirror image of a scene has the mirror image of its solution.
+
+    **Question.** A random scene of two blocks is mirrored. Are the forces that the bodies need the old ones, mirrored?
+
+    **Why it matters.** Left and right are alike in mechanics. A code that treats the first node of an edge otherwise
+    than the second gives an unsymmetric answer to a symmetric part.
+
+    **How it is judged.** As in `engine.purity`.
+
+    **Undecided.** Where the code finds no solution.
+    """
+    return compare_scenes(case, subject, changed_scenes.mirror(scene_of(case)), lambda _, forces: forces @ IMAGE)
+
+
+@_define_for_codes(id="engine.renumbering")
+def engine_renumbering(case: Case, subject: Subject) -> Measurement:
+    """Other numbers of nodes, cells and edges change nothing.
+
+    **Question.** Nodes, cells and contact edges of a random scene get other numbers. Are the forces that the bodies
+    need the old ones?
+
+    **Why it matters.** A mesh generator numbers as it likes.
+
+    **How it is judged.** As in `engine.purity`.
+
+    **Undecided.** Where the code finds no solution.
+    """
+    changed, numbers = changed_scenes.renumber(scene_of(case), _of_seed(case))
+    return compare_scenes(case, subject, changed, lambda body, forces: forces[numbers[body]])
+
+
+@_define_for_codes(id="engine.units")
+def engine_units(case: Case, subject: Subject) -> Measurement:
+    """Other units of length and force change nothing but the numbers.
+
+    **Question.** All lengths of a random scene are 64 times as large, and all moduli 1/65536, so that forces are
+    1/1024. Are the forces that the bodies need the old ones, times that?
+
+    **Why it matters.** A user of millimetres must not get another answer than a user of metres. Absolute tolerances of
+    a search or of a convergence test are such mistakes.
+
+    **How it is judged.** As in `engine.purity`.
+
+    **Undecided.** Where the code finds no solution.
+    """
+    changed = changed_scenes.change_units(scene_of(case), LENGTH, MODULUS)
+    return compare_scenes(case, subject, changed, lambda _, forces: forces / (LENGTH * MODULUS))
+
+
+@_define_for_codes(id="engine.swap", promise=lambda traits: traits.promises.unbiased)
+def engine_swap(case: Case, subject: Subject) -> Measurement:
+    """Slave and master may exchange their roles.
+
+    **Question.** The slave of a random scene becomes the master, and the master the slave. Are the forces that the
+    bodies need the old ones?
+
+    **Why it matters.** An analyst must choose one surface as the slave, and often no choice is natural. Most codes give
+    another answer then, and promise nothing.
+
+    **How it is judged.** As in `engine.purity`.
+
+    **Undecided.** Where the code finds no solution.
+    """
+    return compare_scenes(case, subject, changed_scenes.exchange_roles(scene_of(case)))
+
+
+@_define_for_codes(id="engine.objectivity")
+def engine_objectivity(case: Case, subject: Subject) -> Measurement:
+    """A scene that is turned has the solution that is turned.
+
+    **Question.** A random scene of two blocks is turned by 17.3°, 45°, 90° or 135°, with its supports. Are the forces
+    that the bodies need the old ones, turned?
+
+    **Why it matters.** No machine is built along the axes of its drawing.
+
+    **How it is judged.** As in `engine.purity`.
+
+    **Undecided.** Where the code finds no solution, and where it takes no inclined supports.
+    """
+    assert isinstance(subject, EngineSubject)
+    if not subject.engine_traits.inclined_supports:
+        return Measurement(undecided="the code takes no inclined supports")
+    angle = radians(float(_of_seed(case).choice(ANGLES)))
+    rotation = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+    return compare_scenes(
+        case,
+        subject,
+        changed_scenes.turn(scene_of(case), (cos(angle), sin(angle))),
+        lambda _, forces: forces @ rotation,
+    )
+
+
+@_define_for_codes(id="engine.remote")
+def engine_remote(case: Case, subject: Subject) -> Measurement:
+    """A body that touches nothing, far away, changes nothing.
+
+    **Question.** One more slave block, held, is added far from a random scene. Are the forces that the bodies need
+    those of before?
+
+    **Why it matters.** Parts of an assembly that do not touch have nothing to do with each other. A code that scales
+    its penalty or its search by the mean of all elements couples them.
+
+    **How it is judged.** As in `engine.purity`.
+
+    **Undecided.** Where the code finds no solution.
+    """
+    scene = scene_of(case)
+    low, high = scene.interface.nodes.min(axis=0), scene.interface.nodes.max(axis=0)
+    size = float(np.abs(high - low).max())
+    along_x, along_y = scene.bodies[0].frame[:, 0].tolist()  # Some codes take no inclined supports.
+    place = Placing((along_x, along_y), (float(low[0]) + DISTANCE * size, float(high[1])))
+    far = block(Rectangle([0, size / 3, size], [0, size]), contact="bottom", approach=0.0, placing=place, name="far")
+    return compare_scenes(case, subject, changed_scenes.add_body(scene, far))

@@ -1,4 +1,4 @@
-"""Properties about multipliers: their sign, their scale, and whether they are unique."""
+"""Multipliers: their sign, their scale, whether they are unique, and whether the bodies resist all of them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
+from contactverif.mechanics.inf_sup import inf_sup_constant
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
+from contactverif.problems.refined_blocks import refinement_cases, refinements
 from contactverif.strategies.solids import block_cases, dead_zone_cases, solid_cases
-from contactverif_properties.shared.applicability import refuse_dependent_multipliers
-from contactverif_properties.shared.newton_solution import find_solution, is_untouched, solution_details, solution_floor
-from contactverif_properties.shared.uniform_pressure import exact_solution
+from contactverif_properties.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.exact_forces import exact_solution
+from contactverif_properties.newton_method import find_solution, is_untouched, solution_details, solution_floor
 
 COVERED, OVERHANG = "covered", "overhang"
 SCALE_RATIO = 8.0  # The first scale c over the second one.
@@ -148,3 +150,76 @@ def _count_free_motions(matrix: Any, n_positions: int) -> int:
     scaled = rows[:, None] * dense(matrix) * columns
     least = RANK_ROUNDOFF * len(scaled) * UNIT_ROUNDOFF * np.linalg.norm(scaled, 2)
     return int((np.linalg.svd(scaled[:, :n_positions], compute_uv=False) <= least).sum())
+
+
+MOST_SLOPE = 0.1
+# The names of the series, which have a number for each mesh.
+CONSTANT, SEGMENT, ZERO_COUNT, MULTIPLIER_COUNT = "inf-sup constant", "slave segment", "zero eigenvalues", "multipliers"
+N_FITTED = 3  # The finest meshes: on coarse ones the ends of the interface count as much as its inside.
+ZEROS = Quantity(
+    "pressures that move nothing",
+    "0",
+    "Of such a pressure nothing says how large it is. A singular value below √u of the largest one counts as zero.",
+)
+SLOPE = Quantity(
+    "slope of log β against log h",
+    "0.1",
+    "A constant has a slope of 0, and constraints that a mesh cannot follow have a slope of 1.",
+)
+
+
+@Property.define(
+    id="stability.inf-sup",
+    rank=490,
+    family="stability",
+    quantities=(ZEROS, SLOPE),
+    series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
+    cases=Cases.from_list(refinement_cases),
+    promise=lambda traits: traits.promises.inf_sup,
+    asks=frozenset({"multiplier"}),
+    applicable=refuse_unstated_penalty,
+    bodies=True,
+)
+def inf_sup(case: Case, subject: Subject) -> Measurement:
+    """The bodies resist every pressure of the multipliers, as much on a fine mesh as on a coarse one.
+
+    **Question.** Two blocks touch. How much does a pressure of unit size move them, if it is the one that moves them
+    least? Does that number β stay above zero as both meshes are refined?
+
+    **Why it matters.** Existence, uniqueness and convergence of the pressures rest on it: it is the inf-sup condition
+    of Ladyzhenskaya, Babuška and Brezzi. Where β falls, pressures oscillate from point to point, and a finer mesh makes
+    it worse. Where β is zero, there is a pressure that moves nothing, and so nothing decides how large it is. With a
+    penalty in place of multipliers, the same constraints lock as the penalty grows (`stability.locking`).
+
+    **How it is judged.** B are the rows of the formulation where both bodies touch, S the condensed stiffness of both,
+    A the areas of the multipliers, and h the mean slave segment: B S⁻¹ Bᵀ λ = β² h A λ / E. There are three families of
+    five meshes each: a slave that is coarser than the master (2:3), a finer one (3:2), and nodes on nodes. Rows of
+    forces and rows of gaps are derived from the residual. Where they differ, the smaller β counts.
+
+    The first number counts the eigenvalues that are zero; the tolerance is 0. They are then left out. The second number
+    is the slope of log β against log h, fitted to the three finest meshes. β falls with h if it is positive. The
+    tolerance is 0.1: a constant has a slope of 0, and constraints that a mesh cannot follow have a slope of 1. NTS,
+    mortar and dual mortar have less than 0.001 on all families.
+
+    **Undecided.** Never.
+
+    **Source.** Section 6.3 of Zavarise & De Lorenzis (2009) leaves open whether VTS-PPT satisfies the condition. It
+    does not: with two virtual slave nodes a segment, β falls like h on a coarser slave, and a third of all pressures
+    move nothing on a finer one. The numerical test is that of Chapelle & Bathe, Computers & Structures 47 (1993)
+    537–545.
+    """
+    nodal = subject.traits.rules.penalty == "nodal"
+    meshes = [inf_sup_constant(scene, subject.for_case(scene.case()), nodal=nodal) for scene in refinements(case)]
+    segments, constants = (np.array([getattr(mesh, name) for mesh in meshes]) for name in ("segment", "constant"))
+    series = {
+        CONSTANT: constants,
+        SEGMENT: segments,
+        ZERO_COUNT: np.array([mesh.n_zero for mesh in meshes], dtype=np.float64),
+        MULTIPLIER_COUNT: np.array([mesh.n_multipliers for mesh in meshes], dtype=np.float64),
+    }
+    values = {ZEROS: float(series[ZERO_COUNT].max())}
+    if (constants > 0).all():
+        values[SLOPE] = float(np.polyfit(np.log(segments[-N_FITTED:]), np.log(constants[-N_FITTED:]), 1)[0])
+    tolerances = {ZEROS: 0.0, SLOPE: MOST_SLOPE}
+    details = {"β on the finest mesh": float(constants[-1])}
+    return Measurement(check_all(values, tolerances), details=details, series=series)

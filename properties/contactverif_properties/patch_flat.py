@@ -1,4 +1,4 @@
-"""The patch test on the interface alone: a uniform penetration of flat surfaces gives the exact forces.
+"""The patch test on the interface alone: flat surfaces that penetrate uniformly, and straight slaves that are tilted.
 
 Who passes the test of a class of meshes passes that of each smaller class. A formulation that states the larger promise
 alone is asked about all.
@@ -11,31 +11,59 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.cases import Cases, random_source
 from contactverif.contract.errors import ContractError
-from contactverif.contract.interface import PLANE
-from contactverif.contract.measurement import Measurement, check_all
+from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights, nodal_surface_weights
+from contactverif.problems.flat_faces import equal_area_states
+from contactverif.problems.flat_states import equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
+from contactverif.strategies.straight import steep_cases, tilted_cases
 from contactverif.strategies.surfaces import (
     flat_surface_cases,
     matched_surface_cases,
     overhung_surface_cases,
+    tilted_plane_cases,
 )
-from contactverif_properties.shared import uniform_pressure
-from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.kinks import explain_by_kink
-from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING, gap_quantity, gap_tolerance
-from contactverif_properties.shared.solved_patch import point_errors
-from contactverif_properties.shared.worst_force import total_force, worst_force
+from contactverif_properties import roundoff
+from contactverif_properties.applicability import may_act_twice, promise_normal, promise_single, refuse_unknown_total
+from contactverif_properties.exact_forces import (
+    consistent_forces,
+    directions,
+    distance_from_line,
+    exact_slave_forces,
+    forces_of_penetration,
+    knows_linear_total,
+    measure_transmission,
+    node_gaps,
+    normal_of,
+    point_errors,
+    push_apart,
+    pushing_forces,
+    slave_forces,
+    total_force,
+    uniform_state,
+    unit_forces,
+    worst_force,
+)
+from contactverif_properties.kinks import explain_by_kink
+from contactverif_properties.roundoff import (
+    COORDINATE_ROUNDING,
+    gap_quantity,
+    gap_tolerance,
+    rounding_distance,
+)
+from contactverif_properties.states import FrozenState
 
 FORCE = gap_quantity("error of a nodal force")
 TOTAL = gap_quantity("error of the total force")
@@ -60,7 +88,7 @@ _define = partial(Property.define, family="patch")
     cases=Cases.random(flat_cases),
     cases_in_space=Cases.random(flat_surface_cases),
     promise=lambda traits: traits.promises.patch.flat,
-    exact=uniform_pressure.forces_of_penetration,
+    exact=forces_of_penetration,
     usual_undecided=WITHOUT_TOLERANCE,
     asks=WITH_BARRIER,
 )
@@ -91,16 +119,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
     """
     most = 0.0 if subject.traits.promises.translation_stable else case.largest_coordinate / case.shortest_segment
-    return _unless_end_is_lost(case, partial(uniform_pressure.measure_transmission, FORCE, subject=subject), most)
-
-
-def refuse_unknown_total(traits: Traits) -> str:
-    """Return why the total force is unknown from the traits, or an empty string if they say enough."""
-    if traits.rules.penalty == "nodal":
-        return "there are no distributed springs"
-    if traits.rules.penalty is None or traits.rules.area is None:
-        return "the traits `penalty` and `area` are not both stated, so the total is unknown"
-    return ""
+    return _unless_end_is_lost(case, partial(measure_transmission, FORCE, subject=subject), most)
 
 
 @_define(
@@ -137,10 +156,10 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     formulation = subject.for_case(case)
     stretched = replace(case, interface=interface)
     state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
-    exact = uniform_pressure.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
+    exact = forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.rules.area == "reference":
         exact = exact * stretch ** (interface.dim - 1)
-    total = uniform_pressure.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
+    total = pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
     error = float(np.linalg.norm(total - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
     undecided = ""
@@ -149,16 +168,6 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
         undecided = explain_by_kink(state, rounding, {"forces": error})
     finding = total_force(total, exact) if value > tolerance else None
     return Measurement([TOTAL.check(value, tolerance)], undecided, finding=finding)
-
-
-def promise_single(traits: Traits) -> bool | None:
-    """Return the promise for meshes with master nodes on slave nodes and in the middle of slave segments."""
-    return True if traits.promises.patch.flat else traits.promises.patch.single
-
-
-def promise_normal(traits: Traits) -> bool | None:
-    """Return the promise for meshes with master nodes on slave nodes."""
-    return True if promise_single(traits) else traits.promises.patch.normal
 
 
 def measure_class(case: Case, subject: Subject) -> Measurement:
@@ -181,9 +190,9 @@ def _unless_end_is_lost(case: Case, measure: Callable[[Case], Measurement], most
 
 def _measure_once(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
-    transmission = uniform_pressure.measure_transmission(FORCE, case, subject=subject)
+    transmission = measure_transmission(FORCE, case, subject=subject)
     numbers = [*transmission.numbers]
-    state = uniform_pressure.uniform_state(case, subject)
+    state = uniform_state(case, subject)
     if state.has_points and subject.traits.rules.enforcement != "barrier":  # Its gaps are open, its pressures its own.
         tolerance = gap_tolerance(case, case.parameter("penetration"))
         gap, pressure = point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
@@ -232,7 +241,7 @@ def _move_ends_inwards(case: Case) -> Case | None:
 _define_class = partial(
     _define,
     quantities=(FORCE, GAP, PRESSURE),
-    exact=uniform_pressure.forces_of_penetration,
+    exact=forces_of_penetration,
     usual_undecided=WITHOUT_TOLERANCE,
     asks=WITH_BARRIER,
 )
@@ -337,7 +346,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
         weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
     else:
         weights = nodal_surface_weights(interface, case.parameters["plane"], both_surfaces=unbiased)
-    exact = spring * uniform_pressure.push_apart(case, weights, 1.0)
+    exact = spring * push_apart(case, weights, 1.0)
     forces = -state.forces
     if unbiased:
         likeness = float((forces * exact).sum())
@@ -398,7 +407,7 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
         raise ContractError(f"Traits.published_forces: found {', '.join(sorted(strangers))}; needed {needed}")
     if case.name not in traits.evidence.published_forces:
         consistent = traits.promises.patch.flat and traits.rules.penalty == "distributed"
-        return uniform_pressure.consistent_forces(case, 1.0) if consistent else None
+        return consistent_forces(case, 1.0) if consistent else None
     slave, master = parse_forces(traits.evidence.published_forces[case.name])
     slave_x, master_x = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     if (len(slave), len(master)) != (len(slave_x), len(master_x)):
@@ -413,7 +422,239 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
 
 def _forces_of_unit(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_nodes, 2) over penalty × penetration, or those of unit multipliers."""
-    state = uniform_pressure.uniform_state(case, subject, 1.0)
+    state = uniform_state(case, subject, 1.0)
     if state.case.n_multipliers:
-        return np.asarray(-uniform_pressure.unit_forces(state).sum(axis=1).reshape(-1, 2))
+        return np.asarray(-unit_forces(state).sum(axis=1).reshape(-1, 2))
     return -state.forces / (subject.penalty(case) * case.parameter("penetration"))
+
+
+_END_SPRINGS = "Nodal springs are n + 1 for n segments, and roundoff may lose the two halves at the ends."
+MOST = Quantity("your springs, over ε̂ L", "k (1 + 1/n) + u(8Z/|g| + 4N + 128)", f"k is 1 or 2 passes. {_END_SPRINGS}")
+LEAST = Quantity(
+    "your springs, over ε̂ L, at least",
+    "k (1 − 1/n) − u(8Z/|g| + 4N + 128)",
+    f"As above. {_END_SPRINGS}",
+    sense="at least",
+)
+
+
+LARGEST_PUSH = 5.0
+PUSH = Quantity(
+    "largest force on a node, over ε̂ |g| of a mean segment",
+    f"{LARGEST_PUSH:g} k",
+    "k is 1 or 2 passes. Two segments of at most 1.5 mean segments meet at a node; dual shape functions take up to 5/3 "
+    "of them.",
+)
+
+
+@Property.define(
+    id="total-stiffness",
+    rank=350,
+    family="patch",
+    quantities=(MOST, LEAST, PUSH),
+    cases=Cases.from_list(equal_length_states),
+    cases_in_space=Cases.from_list(equal_area_states),
+    promise=lambda traits: True,
+    asks=frozenset({"penalty"}),
+)
+def total_stiffness(case: Case, subject: Subject) -> Measurement:
+    """The springs of a flat interface have the stiffness ε̂ L together, or 2 ε̂ L in two passes.
+
+    **Question.** Slave and master are flat, equally long, and penetrate each other by the same depth everywhere. Is the
+    force the penalty times the penetration times the length, or twice that?
+
+    **Why it matters.** The penalty is the one number that a user gives, and an error of its factor shows in nothing but
+    the penetration. Most questions about sizes are asked of those who state `penalty` and `area`. This one is asked of
+    everybody, whatever is promised, so that no formulation is three times too stiff in silence.
+
+    **How it is judged.** The number is the force that pushes the slave over ε̂ |g| L, and likewise that on the master;
+    the worse of both counts. It must lie within 1/n of 1, or within 2/n of 2 where the traits leave room for springs on
+    both surfaces; n is the number of slave segments, 8, 16 or 304. So a stiffness that is wrong by 0.4 % shows, and so
+    does a master that gets more than the slave. The largest force on a node is that of a few mean segments, so that a
+    number of a segment that overflows shows. Nodal springs of ε̂ L/n at n + 1 nodes give 1 + 1/n. A node that faces the
+    end of the master exactly may be lost to roundoff, which takes no more than 1/n either. Segments have the mean
+    length 1, so that it does not matter whether the unit of the penalty is stated. A factor of 2 on one pass looks like
+    two passes, so the row says that the springs are 2 ε̂ L, unless the traits say `unbiased`. In space L is the area,
+    and n is the number of slave nodes, 25 or 144; each has the mean area 1.
+
+    A law that is not linear has no stiffness. The state is asked again at half the depth, and where the number changes
+    by more than u(8Z/|g| + 4N + 128), it is kept as a detail and not judged.
+
+    **Undecided.** Never.
+    """
+    n, traits, depth = _count_springs(case), subject.traits, case.parameter("penetration")
+    away = np.zeros_like(case.positions)
+    away[: case.interface.n_slave_nodes] = depth / 2 * normal_of(case)
+    parameters = {**case.parameters, "penetration": np.array(depth / 2)}
+    half = replace(case, z=(case.positions + away).reshape(-1), parameters=parameters)
+    (springs, opposite, largest), (shallow, *_) = _springs(case, subject), _springs(half, subject)
+    tolerance = gap_tolerance(half, depth / 2, rounding_distance(case, traits))
+    details = {"springs over ε̂ L": springs}
+    if abs(shallow - springs) > 2 * tolerance * abs(springs):
+        return Measurement(details=details)
+    passes = 2 if springs > np.sqrt(2) and may_act_twice(traits) else 1
+    numbers = [
+        MOST.check(max(springs, opposite), passes * (1 + 1 / n) + tolerance),
+        LEAST.check(min(springs, opposite), passes * (1 - 1 / n) - tolerance),
+        PUSH.check(largest, LARGEST_PUSH * passes),
+    ]
+    finding = (
+        None if passes == 1 or traits.promises.unbiased else Finding(_say(springs, "two passes, or twice too stiff"))
+    )
+    if any(number.ratio > 1 for number in numbers):
+        right = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if may_act_twice(traits) else "")
+        if abs(opposite - springs) > abs(springs) / n:
+            right = f"the master gets {opposite:#.3g} ε̂ L; {right}"
+        finding = Finding(_say(springs, right))
+    return Measurement(numbers, details=details, finding=finding)
+
+
+def _say(springs: float, remark: str) -> str:
+    """Return a sentence about the stiffness of all springs over ε̂ L."""
+    return f"your springs are {springs:#.3g} ε̂ L: {remark}"
+
+
+def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
+    """Return the forces that push the slave out of the master, and the master out of the slave, over ε̂ |g| L.
+
+    The third number is the largest force on a node over that of a slave segment of mean length, or of the mean area of
+    a slave node.
+    """
+    pushes = -uniform_state(case, subject).forces @ normal_of(case)
+    size = case.penalty * case.parameter("penetration") * case.slave_measure
+    slave, master = np.split(pushes / size, [case.interface.n_slave_nodes])
+    largest = float(np.abs(pushes).max()) / size * _count_springs(case)
+    return float(slave.sum()), -float(master.sum()), largest
+
+
+def _count_springs(case: Case) -> int:
+    """Return the number of slave segments, or of slave nodes in space."""
+    interface = case.interface
+    return len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes
+
+
+OFF_NORMAL = roundoff.stated_gap_quantity("part of the force off the normal")
+TILTED_TOTAL = roundoff.stated_gap_quantity("error of the total force")
+TILTED_NODAL = roundoff.stated_gap_quantity("error of a nodal force")
+TILTED, STEEP = "tilted by 3° to 35°", "tilted by 35° to 89°"
+
+
+@random_source("contactverif_properties.straight_slaves.resultant_cases")
+def resultant_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+    """Return {kind: strategy} of tilted and of steep slaves; None for a given mesh."""
+    tilted, steep = tilted_cases(interface), steep_cases(interface)
+    return {TILTED: tilted, STEEP: steep} if tilted is not None and steep is not None else None
+
+
+def refuse_unknown_direction(traits: Traits) -> str:
+    """Return why the direction of the forces is unknown from the traits, or an empty string if they state it."""
+    stated = traits.rules.force_along is not None
+    return "" if stated else "the trait `force_along` is not stated, so the direction of the force is unknown"
+
+
+def _tolerance(case: Case, traits: Traits) -> float:
+    """Return `STATED_GAP_TOLERANCE` as a number, for the mean penetration."""
+    return roundoff.gap_tolerance(case, abs(float(node_gaps(case).mean())), roundoff.rounding_distance(case, traits))
+
+
+@Property.define(
+    id="patch.tilted.resultant",
+    rank=250,
+    family="patch",
+    quantities=(OFF_NORMAL, TILTED_TOTAL),
+    cases=Cases.by_kind(resultant_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
+    kinds=(TILTED, STEEP),
+    promise=lambda traits: True if traits.rules.force_along else None,
+    applicable=refuse_unknown_direction,
+)
+def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
+    """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
+
+    **Question.** A straight slave is tilted against a flat master by 3° to 89°, and penetrates it with all its length.
+    In space it is a plane, tilted by up to 19°. Is the force on the slave ε̂ ∫ |g| ds, along the normal that the traits
+    name?
+
+    **Why it matters.** Flat patch tests never tilt a surface. A pressure that falls with the tilt, for example with its
+    cosine squared, passes all of them, and is wrong on every curved part.
+
+    **How it is judged.** The gap is linear along the slave, so its integral is exact for every rule: points with
+    weights that balance, cells, nodal areas. The trait `gap` names the normal along which gaps are measured,
+    `force_along` that along which contact pushes, `area` the configuration of ds. The first number is the part of the
+    total force off that normal, over the total. The second is the error of the total force over its exact size, where
+    `penalty` and `area` are stated. Multipliers that are pressures are uniform here, and nodal springs are asked for
+    the direction alone. The tolerance is u(8Z/|g| + 4N + 128), where Z is the diameter of a formulation that promises
+    `translation_stable`, and the largest coordinate of any other.
+
+    In half of the cases the tilt is 35° to 89°, and no coordinate is rounded. Gaps along the slave's normal are up to
+    57 times those along the master's there, and yet no longer than two master segments, so that every search finds
+    them. A formulation that states no rule `gap` may overlook a slave so steep, and give no force at all.
+
+    **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
+    changes the answer by a quarter of the error or more.
+    """
+    traits, total = subject.traits, slave_forces(case, subject).sum(axis=0)
+    if not total.any() and _may_overlook(case, traits):
+        return Measurement()
+    normal = directions(case)[0 if traits.rules.force_along == "master normal" else 1]
+    push, across = float(total @ normal), distance_from_line(total, normal)
+    broken = "" if push > 0 else "nothing pushes the slave out of the master"
+    values = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}
+    errors = {OFF_NORMAL: across}
+    if knows_linear_total(traits):
+        exact = float(np.linalg.norm(exact_slave_forces(case, traits).sum(axis=0)))
+        errors[TILTED_TOTAL] = abs(push - exact)
+        values[TILTED_TOTAL] = errors[TILTED_TOTAL] / exact
+    tolerance = _tolerance(case, traits)
+    error = max((error for name, error in errors.items() if values[name] > tolerance), default=0.0)
+    formulation, undecided = subject.for_case(case), ""
+    if error and not formulation.n_multipliers(case.interface):
+        reach = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
+        undecided = explain_by_kink(FrozenState.at(formulation, case), reach, {"forces": error})
+    return Measurement(check_all(values, tolerance), undecided, broken)
+
+
+def _may_overlook(case: Case, traits: Traits) -> bool:
+    """Return whether no stated rule says that the slave sees what it is so steep to."""
+    return case.kind == STEEP and traits.rules.gap is None
+
+
+def refuse_unknown_integral(traits: Traits) -> str:
+    """Return why no exact nodal force follows from the traits, or an empty string if one does."""
+    if traits.rules.enforcement == "multiplier":
+        return "multipliers have pressures of their own, not those of a gap"
+    if not knows_linear_total(traits):
+        return "the traits `penalty`, `area`, `gap` and `force_along` do not state all of the integral"
+    return ""
+
+
+@Property.define(
+    id="patch.tilted.nodal",
+    rank=370,
+    family="patch",
+    quantities=(TILTED_NODAL,),
+    cases=Cases.random(tilted_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
+    promise=lambda traits: traits.promises.integrates_linear_gap,
+    applicable=refuse_unknown_integral,
+)
+def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
+    """Each node of a straight, tilted slave gets the exact integral of its linear gap.
+
+    **Question.** A straight slave is tilted against a flat master and penetrates it with all its length, so that the
+    gap is linear. Is the force on each node of the slave ε̂ ∫ N_i |g| ds?
+
+    **Why it matters.** A method that integrates a linear pressure exactly takes bending and Hertz-like pressures on
+    coarse meshes better than one that knows constant pressures alone. Many good methods do not: those with points in
+    the middle of parts, and mortar methods, whose pressures come from weighted means.
+
+    **How it is judged.** The largest error of a nodal force on the slave counts over the total. Gap, direction and
+    lengths follow from the traits as in `patch.tilted.resultant`. The tolerance is u(8Z/|g| + 4N + 128), likewise.
+
+    **Undecided.** Never: the slave is in contact with all its length, and far from the ends of the master.
+    """
+    exact, forces = exact_slave_forces(case, subject.traits), slave_forces(case, subject)
+    error = float(np.linalg.norm(forces - exact, axis=1).max()) / float(np.linalg.norm(exact.sum(axis=0)))
+    number = TILTED_NODAL.check(error, _tolerance(case, subject.traits))
+    finding = worst_force(case.interface, forces, exact) if number.ratio > 1 else None
+    return Measurement([number], idle=not forces.any(), finding=finding)

@@ -1,4 +1,10 @@
-"""The patch test solved: two elastic bodies under a uniform pressure find the exact stress, forces and gap."""
+"""The patch test solved: two elastic bodies under a uniform pressure find the exact stress, forces and gap.
+
+The patch test asks about the residual alone, so Newton's method differentiates the residual by itself. The
+formulation's own tangent serves only where a difference confirms it. A whole code is judged by its displacements:
+a is the accuracy that it states, M the stiffer body's oedometer modulus, U the largest displacement, ℓ the shortest
+segment, p the exact pressure, and κ the condition of the bodies' condensed stiffness.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +15,325 @@ from typing import Any
 
 import numpy as np
 
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import Cases
-from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.engine import EngineAnswer
+from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.mechanics.accuracy import Solution, shape_integrals
+from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.mechanics.solving import solve_by_engine
+from contactverif.mechanics.trace import Trace
 from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
+from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
 from contactverif.strategies.solids import UNIFORM, block_cases, dead_zone_cases, variant_cases
-from contactverif_properties.patch_flat import promise_normal, promise_single
-from contactverif_properties.shared import solved_patch
+from contactverif_properties.applicability import promise_normal, promise_single
+from contactverif_properties.exact_forces import (
+    consistent_forces,
+    exact_solution,
+    gap_error,
+    nearest_multipliers,
+    normal_of,
+    point_errors,
+)
+from contactverif_properties.newton_method import end_details
+from contactverif_properties.states import FrozenState
+
+OWN_PRESSURE = "mean pressure over that of hard contact"
+CODE_ITERATIONS = "iterations until the code said that it converged"
+ALMOST = UNIT_ROUNDOFF**0.5  # A node is covered up to this share of its length.
+POSITION_ROUNDINGS = 64.0  # A node balances about 8 springs to 8 roundoffs.
+_TERMS = "a (1 + M U/(ℓ p)) + 1e-12 κ + 64 u X ε̂/p"
+_REASON = "It is that of the forces that the bodies need, and a stiff spring turns rounded positions X into a force"
+REPORTED_FORCES = Quantity("error of a contact force that the code reports", _TERMS, f"{_REASON}.")
+REPORTED_PRESSURES = Quantity(
+    "error of a contact pressure that the code reports",
+    f"({_TERMS}) L/m",
+    f"{_REASON}, on the length m of a node.",
+)
+
+
+def measure_engine(
+    case: Case, subject: EngineSubject, penalty: float, quantities: tuple[Quantity, Quantity, Quantity, Quantity]
+) -> Measurement:
+    """Return the errors of stress, slave forces, master forces and gap of a scene whose pressure is uniform.
+
+    Forces are those that the bodies need; what a rigid body needs is not known. A code with a stiffness of its own is
+    judged by its own mean pressure, and neither its gap nor what it reports is asked. Forces and pressures that other
+    codes report are judged.
+    """
+    traits, stress, gap = subject.engine_traits, quantities[0], quantities[3]
+    scene = replace(scene_of(case), penalty=penalty)
+    solution, answer = solve_by_engine(scene, subject, linear=True)
+    if answer is None:
+        return Measurement(undecided=solution.no_solution)
+    details = {CODE_ITERATIONS: float(answer.iterations)}
+    if solution.no_solution:
+        return Measurement(undecided=solution.no_solution, details=details)
+    pressure = float(pressure_of(case, penalty if traits.enforcement == "penalty" else np.inf))
+    if traits.enforcement == "own":
+        mean = _mean_pressure(case, solution)
+        details[OWN_PRESSURE] = mean / pressure
+        pressure = mean if mean > 0 else pressure
+    q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
+    values = {stress: stress_error(scene, scene.stresses(q), pressure)}
+    values |= dict(zip(quantities[1:3], _force_errors(case, scene, solution, pressure), strict=True))
+    tolerance = engine_tolerance(scene, solution, traits.accuracy, pressure)
+    tolerances = dict.fromkeys(values, tolerance)
+    if traits.enforcement != "own":
+        rounding = POSITION_ROUNDINGS * UNIT_ROUNDOFF * case.largest_coordinate * penalty / pressure
+        reported = _judge_reports(answer, case, scene, pressure)
+        values |= {quantity: error for quantity, (error, _) in reported.items()}
+        tolerances |= {quantity: (tolerance + rounding) / share for quantity, (_, share) in reported.items()}
+        penetration = pressure / penalty if traits.enforcement == "penalty" else 0.0
+        state = replace(case, z=solution.state.z, penalty=penalty)
+        values[gap] = gap_error(state, penetration, pressure / penalty)
+        tolerances[gap] = tolerance * (1 + penalty * float(case.parameters["compliance"].sum()))
+    return Measurement(check_all(values, tolerances), details=details)
+
+
+def _judge_reports(
+    answer: EngineAnswer, case: Case, scene: Scene, pressure: float
+) -> dict[Quantity, tuple[float, float]]:
+    """Return the largest error of a nodal force that a code reports, over p L, and of a pressure, over p.
+
+    Beside each stands the share of the slave's length L that carries it: all, or the shortest length of a node. The
+    pressures are those of nodes of the slave that the master covers with both their segments.
+    """
+    errors: dict[Quantity, tuple[float, float]] = {}
+    exact, n_slave = consistent_forces(case, pressure), case.interface.n_slave_nodes
+    if answer.contact_forces is not None:
+        differences = np.linalg.norm(answer.contact_forces[scene.nodes_in_reach] - exact, axis=1)
+        errors[REPORTED_FORCES] = float(differences.max() / (pressure * case.slave_length)), 1.0
+    if answer.pressures is not None:
+        places = np.argsort(np.argsort(scene.nodes_in_reach[:n_slave]))  # Reports are in the order of the numbers.
+        lengths = shape_integrals(case.interface.slave, case.interface.nodes)[:n_slave]
+        covered = np.linalg.norm(exact[:n_slave], axis=1) >= (1 - ALMOST) * pressure * lengths
+        shares = lengths[covered] / case.slave_length
+        differences = np.abs(answer.pressures[places][covered] / pressure - 1)
+        errors[REPORTED_PRESSURES] = float(differences.max(initial=0.0)), float(shares.min(initial=1.0))
+    return errors
+
+
+def _mean_pressure(case: Case, solution: Solution) -> float:
+    """Return the mean pressure on the slave where the master covers it."""
+    normal, n_slave = normal_of(case), case.interface.n_slave_nodes
+    force, length = (
+        float((forces[:n_slave] @ normal).sum()) for forces in (solution.forces, consistent_forces(case, 1.0))
+    )
+    return force / length
+
+
+def _force_errors(case: Case, scene: Scene, solution: Solution, pressure: float) -> tuple[float, float]:
+    """Return the largest error of a nodal force on the slave and on the master, over p L."""
+    errors = np.linalg.norm(solution.forces - consistent_forces(case, pressure), axis=1)
+    rigid = np.concatenate(
+        [np.full(len(body.contact_nodes), body.rigid) for body in (scene.bodies[i] for i in scene.bodies_in_reach)]
+    )
+    errors[rigid] = 0.0
+    slave, master = np.split(errors / (pressure * case.slave_length), [case.interface.n_slave_nodes])
+    return float(slave.max()), float(master.max())
+
+
+def engine_tolerance(scene: Scene, solution: Solution, accuracy: float, pressure: float) -> float:
+    """Return a (1 + M U/(ℓ p)) + 1e-12 κ: displacements that are wrong by a U strain the shortest segment.
+
+    U is at most the size of the interface, or a body that flies away would excuse itself.
+    """
+    modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
+    nodes = scene.interface.nodes
+    shortest = min(float(side.lengths(nodes).min()) for side in (scene.interface.slave, scene.interface.master))
+    displacement = min(float(np.abs(solution.displacements).max()), float(np.ptp(nodes, axis=0).max()))
+    return float(accuracy * (1 + modulus * displacement / (shortest * pressure)) + 1e-12 * _condition(scene))
+
+
+def _condition(scene: Scene) -> float:
+    """Return the condition κ of the condensed stiffness, without the motions that it does not resist."""
+    stiffness = scene.stiffness if isinstance(scene.stiffness, np.ndarray) else scene.stiffness.toarray()
+    sizes: FloatArray = np.abs(np.linalg.eigvalsh(stiffness)) if len(stiffness) else np.ones(1)
+    resisted = sizes[sizes > len(sizes) * UNIT_ROUNDOFF * sizes.max()]
+    return float(resisted.max() / resisted.min())
+
+
+ITERATIONS = 25  # A method that transmits a uniform pressure needs one iteration. The others need a few more.
+SAME_SOLUTION = 2.0**-10  # A solution this close to the exact one, over the penetration, counts as the same one.
+
+REASON = (
+    "κ, the greater of ε̂h and the stiffer body's E over the softer body's E, measures the condition of the matrix. "
+    "r is the shortest segment over the longest. "
+    "A gap p/ε̂ is a difference of positions X, and a node balances about 8 springs to 8 roundoffs. "
+    "Displacements U are rounded, which makes stresses M U/ℓ on the shortest segment."
+)
+STRESS = Quantity("stress error", STRESS_TOLERANCE, REASON)
+SLAVE_FORCES = Quantity("slave force error", STRESS_TOLERANCE, REASON)
+MASTER_FORCES = Quantity("master force error", STRESS_TOLERANCE, REASON)
+GAP = Quantity(
+    "gap error",
+    f"({STRESS_TOLERANCE}) (1 + ε̂ ΣH/M)",
+    f"{REASON} Where no spring measures a height, the bodies hold it, and they give way by ΣH/M under a unit pressure.",
+)
+PRESSURE = Quantity(
+    "pressure error",
+    PRESSURE_TOLERANCE,
+    f"{REASON} The shortest segment carries what the force of the longest one lacks.",
+)
+MULTIPLIERS = Quantity(
+    "multiplier error",
+    f"({STRESS_TOLERANCE})/s",
+    f"{REASON} s is the smallest singular value of the loads of unit multipliers on the bodies over the largest one.",
+)
+QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE, REPORTED_FORCES, REPORTED_PRESSURES)
+
+
+def measure_once(case: Case, subject: Subject) -> Measurement:
+    """Solve the scene of the case at its own penalty, or with multipliers, and return the errors."""
+    if subject.traits.rules.enforcement == "multiplier" and not isinstance(subject, EngineSubject):
+        return measure_with_multipliers(case, subject)
+    return measure_at_penalty(case, subject, case.penalty)
+
+
+def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurement:
+    """Solve the scene of the case with a penalty method at a distributed penalty ε̂, and return its errors.
+
+    Stress error: the largest entry of σ − σ_exact at the Gauss points over p. Slave and master force errors: the
+    largest error of a nodal force over p L (`force_errors`). Gap error: the largest error of a node's height, or of a
+    reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p; it is missing where the
+    formulation reports none, or is nodal and so knows forces only.
+    """
+    if isinstance(subject, EngineSubject):
+        return measure_engine(case, subject, penalty, (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP))
+    scene, pressure = scene_of(case), pressure_of(case, penalty)
+    formulation = subject.for_interface(case.interface, penalty)
+    exact = exact_unknowns(scene, pressure, penalty)
+    trace, q = solve_patch(scene, formulation, exact, pressure / penalty)
+    state = replace(case, z=scene.positions(q), penalty=penalty)
+    contact = contact_at(state, trace, formulation)
+    values = _errors(contact, scene, q, pressure)
+    values[GAP] = gap_error(state, pressure / penalty, pressure / penalty)
+    if contact.has_points:
+        gap, reported = point_errors(contact, penalty, pressure)
+        values[GAP] = max(values[GAP], gap)
+        if subject.traits.rules.penalty != "nodal":
+            values[PRESSURE] = reported
+    roundoff = uniform_tolerances(state, scene, pressure)
+    tolerances = _tolerances(case, penalty, roundoff.stress) | {PRESSURE: roundoff.pressure}
+    return Measurement(check_all(values, tolerances), details=end_details(trace))
+
+
+def _errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> dict[Quantity, float]:
+    """Return the errors of stresses and forces in the state at the unknowns q (n_free,)."""
+    slave, master = force_errors(state, scene, q, pressure)
+    stress = stress_error(scene, scene.stresses(q), pressure)
+    return {STRESS: stress, SLAVE_FORCES: slave, MASTER_FORCES: master}
+
+
+def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, float]:
+    """Return one tolerance for stresses and forces; that of gaps is 1 + ε̂ ΣH/M times as large."""
+    factor = 1 + penalty * float(case.parameters["compliance"].sum())
+    return dict.fromkeys((STRESS, SLAVE_FORCES, MASTER_FORCES), tolerance) | {GAP: tolerance * factor}
+
+
+def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
+    """Solve the scene of the case as a saddle point and return its errors against the solution without penetration.
+
+    Where the exact solution is a solution of the formulation, to roundoff, it counts in place of one that Newton's
+    method found less exactly: a saddle point that is nearly singular spoils what Newton's method finds, and not the
+    fact that the exact solution is one. The penalty ε̂ serves as the scale c, and as the measure of gaps. Multipliers
+    are compared with p where they are pressures; where they are not unique, those nearest to the exact ones count.
+    """
+    scene, pressure, penalty = scene_of(case), pressure_of(case, np.inf), case.penalty
+    formulation = subject.for_case(case)
+    exact = exact_solution(scene, case, subject, formulation)
+    multipliers = exact[scene.n_free :]
+
+    def measure_errors(u: FloatArray) -> Measurement:
+        """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
+        q = u[: scene.n_free]
+        state = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
+        nearest, sharpness = nearest_multipliers(state, scene, formulation, multipliers)
+        state = state.with_multipliers(nearest)
+        values = _errors(FrozenState.at(formulation, state), scene, q, pressure)
+        values[GAP] = gap_error(state, 0.0, pressure / penalty)
+        tolerance = uniform_tolerances(state, scene, pressure).stress
+        tolerances = _tolerances(case, penalty, tolerance)
+        if subject.traits.rules.penalty == "distributed":
+            loaded = multipliers != 0  # The multiplier of a node that faces nothing is 0.
+            values[MULTIPLIERS] = float(np.abs(nearest[loaded] / pressure - 1).max(initial=0.0))
+            tolerances[MULTIPLIERS] = tolerance / sharpness
+        return Measurement(check_all(values, tolerances))
+
+    trace, u = solve_patch(scene, formulation, exact, pressure / penalty)
+    measurement = measure_errors(u)
+    fails = any(number.value > number.tolerance for number in measurement.numbers)
+    if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
+        measurement = measure_errors(exact)
+    return replace(measurement, details=end_details(trace))
+
+
+def solve_patch(
+    scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
+) -> tuple[Trace, FloatArray]:
+    """Solve a scene from its exact solution; return Newton's trace and the unknowns (n_free + n_multipliers,) to judge.
+
+    A formulation that passes is in balance there and does not move. Large motions have other solutions too, which
+    nobody asks for. A formulation that is not in balance there is judged where it comes nearest to balance afterwards.
+    """
+    trace = solve(scene, formulation, start=exact, iterations=ITERATIONS, use_tangent=False, solution_only=True)
+    return trace, trace.u[-1] if is_solved(trace, exact, penetration) else nearest_to_balance(trace)
+
+
+def is_solved(trace: Trace, exact: FloatArray, penetration: float) -> bool:
+    """Return whether Newton's method converged to the exact solution (n_free + n_multipliers,)."""
+    distance = np.abs(trace.solution - exact[: trace.scene.n_free]).max(initial=0.0)
+    return trace.converged and bool(distance <= SAME_SOLUTION * penetration)
+
+
+def nearest_to_balance(trace: Trace) -> FloatArray:
+    """Return the start (n_free + n_multipliers,) if it is nearly in balance, else the later iterate nearest to it."""
+    balanced = trace.roundings[0] <= NEAR_CONVERGENCE or len(trace.u) == 1
+    iterate: FloatArray = trace.u[0 if balanced else 1 + np.argmin(trace.roundings[1:])]
+    return iterate
+
+
+def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> FrozenState:
+    """Return the formulation in a state, on the pairing of Newton's last iterate if it is that one."""
+    if np.array_equal(state.z, trace.z):
+        return FrozenState(formulation, state, trace.pairing)
+    return FrozenState.at(formulation, state)
+
+
+def forces_to_draw(case: Case) -> FloatArray:
+    """Return the exact forces (n_nodes, 2) at the penalty of the case, for pictures."""
+    return consistent_forces(case, pressure_of(case, case.penalty))
+
+
+def force_errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> tuple[float, float]:
+    """Return the largest error of a nodal force on the slave and on the master, over p L.
+
+    Forces are judged twice: those that the bodies need to be in balance with the unknowns q (n_free,), and those that
+    the formulation gives. They differ where the formulation found no balance, and at
+    rollers, which take what the bodies do not need.
+    """
+    by_bodies = scene.nodal_forces(q)
+    by_contact, case = -state.forces, state.case
+    first = 0
+    for index in scene.bodies_in_reach:
+        last = first + len(scene.bodies[index].contact_nodes)
+        if scene.bodies[index].rigid:
+            by_bodies[first:last] = by_contact[first:last]
+        first = last
+    exact = consistent_forces(case, pressure)
+    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
+    errors /= pressure * case.slave_length
+    n_slave = case.interface.n_slave_nodes
+    return float(errors[:n_slave].max()), float(errors[n_slave:].max())
+
 
 HIGH = 1e3  # The high penalty over the moderate penalty of a case.
 SLOPE = "slope over penalties (−1 if it locks)"
@@ -31,12 +346,12 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
     penalty.
     """
     if subject.traits.rules.enforcement == "multiplier":
-        return solved_patch.measure_once(case, subject)
-    moderate = solved_patch.measure_at_penalty(case, subject, case.penalty)
-    high = solved_patch.measure_at_penalty(case, subject, HIGH * case.penalty)
+        return measure_once(case, subject)
+    moderate = measure_at_penalty(case, subject, case.penalty)
+    high = measure_at_penalty(case, subject, HIGH * case.penalty)
     if not (moderate.numbers and high.numbers):  # A whole code may find no solution.
         return moderate if moderate.undecided else high
-    errors = moderate.values[solved_patch.STRESS.name], high.values[solved_patch.STRESS.name]
+    errors = moderate.values[STRESS.name], high.values[STRESS.name]
     slope = float(np.log(errors[1] / errors[0]) / np.log(HIGH)) if min(errors) > 0 else 0.0
     return Measurement(
         [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
@@ -65,10 +380,8 @@ def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -
     return Cases.from_list(make, on_place=on_scene, needs=UNIFORM)
 
 
-_define = partial(Property.define, family="patch", bodies=True, engines=True, exact=solved_patch.forces_to_draw)
-_define_at_two_penalties = partial(
-    _define, quantities=(*solved_patch.QUANTITIES, *map(_at_high, solved_patch.QUANTITIES), solved_patch.MULTIPLIERS)
-)
+_define = partial(Property.define, family="patch", bodies=True, engines=True, exact=forces_to_draw)
+_define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_high, QUANTITIES), MULTIPLIERS))
 
 
 @_define_at_two_penalties(
@@ -157,7 +470,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
 @_define(
     id="patch.variants",
     rank=680,
-    quantities=(*solved_patch.QUANTITIES, solved_patch.MULTIPLIERS),
+    quantities=(*QUANTITIES, MULTIPLIERS),
     cases=Cases.random(variant_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
@@ -174,7 +487,7 @@ def patch_variants(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never, as in `patch.flat.solve`.
     """
-    return solved_patch.measure_once(case, subject)
+    return measure_once(case, subject)
 
 
 def _widen_tolerance(quantity: Quantity) -> Quantity:
@@ -186,7 +499,7 @@ def _widen_tolerance(quantity: Quantity) -> Quantity:
 @_define(
     id="patch.dead-zone",
     rank=620,
-    quantities=tuple(map(_widen_tolerance, (*solved_patch.QUANTITIES, solved_patch.MULTIPLIERS))),
+    quantities=tuple(map(_widen_tolerance, (*QUANTITIES, MULTIPLIERS))),
     cases=Cases.random(dead_zone_cases),
     promise=lambda traits: traits.promises.patch.overhang,
 )
@@ -205,7 +518,7 @@ def patch_dead_zone(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never, as in `patch.flat.solve`.
     """
-    measurement = solved_patch.measure_once(case, subject)
+    measurement = measure_once(case, subject)
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     covered = min(slave.max(), master.max()) - max(slave.min(), master.min())
     ratio = float(np.ptp(slave) / covered)

@@ -9,8 +9,8 @@ from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Quantity
 from contactverif.plugins.registry import load_properties, property_ids
 from contactverif.sampling.draw import Sampling, draw_cases
-from contactverif_properties.patch_curved import count_bare
-from contactverif_properties.shared.engine_patch import REPORTED_FORCES, REPORTED_PRESSURES
+from contactverif_properties.patch_bent import count_bare
+from contactverif_properties.patch_solved import REPORTED_FORCES, REPORTED_PRESSURES
 
 MUTANTS = {
     "engine.purity": "softer at every call",

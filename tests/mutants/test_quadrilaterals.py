@@ -12,8 +12,8 @@ from wrong_surfaces import STS, by_rule
 from contactverif import Case, Subject
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, skewed_surface_cases, surface_cases
-from contactverif_properties.shared.roundoff import gap_quantity
-from contactverif_properties.shared.uniform_pressure import measure_transmission
+from contactverif_properties.exact_forces import measure_transmission
+from contactverif_properties.roundoff import gap_quantity
 from contactverif_surfaces.cell_points import gauss_points
 
 

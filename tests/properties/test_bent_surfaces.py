@@ -13,8 +13,8 @@ from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.kinked_patch import KinkedPatch, kinked_patch
 from contactverif.problems.shrink_fit import FIT, RingStudy
-from contactverif_properties import patch_curved
-from contactverif_properties.patch_curved import bound_of_rings
+from contactverif_properties import patch_bent
+from contactverif_properties.patch_bent import bound_of_rings
 
 BENT = ("patch.curved", "patch.kinked", "accuracy.arc")
 
@@ -232,7 +232,7 @@ def test_multipliers_have_the_pressure_without_springs() -> None:
 def test_an_end_that_is_lost_for_want_of_a_tolerance_is_no_accusation() -> None:
     """The foot of the last node lies 1e-3 of a segment past the master. Whole rings have no ends."""
     strict = load_subject("nts-ar:tau=0")
-    quarter = patch_curved._measure(RingStudy(FIT, "inner", 1e2), 2, strict, quarters=1)
+    quarter = patch_bent._measure(RingStudy(FIT, "inner", 1e2), 2, strict, quarters=1)
     assert quarter.values["error of the mean force on the slave"] > 3e-3
     question = load_property("patch.curved")
     outcome = judge_as(Verdict.PASS, question, question.cases(None)[0], strict)

@@ -7,13 +7,8 @@ import pytest
 from subjects import load_subject
 
 from contactverif import Case, Interface, Subject
-from contactverif_properties.shared.any_state import freeze_state
-from contactverif_properties.shared.conditioning import (
-    count_tangent_roundings,
-    difference_quotient,
-    measure_conditioning,
-)
-from contactverif_properties.shared.frozen_state import FrozenState
+from contactverif_properties.roundoff import count_tangent_roundings, difference_quotient, measure_conditioning
+from contactverif_properties.states import FrozenState, freeze_state
 
 
 def bent_case() -> Case:

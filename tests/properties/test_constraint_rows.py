@@ -11,8 +11,7 @@ import contactverif_mortar
 from contactverif import Subject, Verdict, judge_case, named_case
 from contactverif.problems.flat_states import flat_master, flat_state
 from contactverif.run.run import run
-from contactverif_properties.pushes import lift_slave, unilateral
-from contactverif_properties.shared.constraint_rows import check_constraint_rows
+from contactverif_properties.compressive import check_constraint_rows, lift_slave, unilateral
 
 PRESSURES = ("mortar-lm:normals=averaged", "two-pass/vts-me-lm", "two-pass/mortar-dual-lm", "vts-ppt-lm:n=1")
 

@@ -13,7 +13,7 @@ from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.sliding import _opens_at_once, sliding_cases
-from contactverif_properties.continuity import N_STEPS, continuity, find_jumps
+from contactverif_properties.balance import N_STEPS, continuity, find_jumps
 
 
 def cases(examples: int) -> tuple[Case, ...]:

@@ -16,9 +16,8 @@ from contactverif.problems.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.run.run import run
 from contactverif.strategies.solids import dead_zone_cases
-from contactverif_properties.patch_solved import patch_dead_zone, patch_flat_solve, patch_variants
-from contactverif_properties.shared.solved_patch import gap_error, measure_once
-from contactverif_properties.shared.uniform_pressure import consistent_forces
+from contactverif_properties.exact_forces import consistent_forces, gap_error
+from contactverif_properties.patch_solved import measure_once, patch_dead_zone, patch_flat_solve, patch_variants
 
 RIGHT = ("sts", "mortar", "mortar-dual", "mortar-lm", "mortar-dual-lm", "vts-ppt-balanced", "vts-ppt:free_end=cover")
 WRONG = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt:free_end=extend", "chen-hisada")

@@ -17,8 +17,13 @@ from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import variant_cases
-from contactverif_properties.patch_solved import SLOPE, measure_two_penalties, patch_flat_solve, patch_variants
-from contactverif_properties.shared.solved_patch import measure_at_penalty
+from contactverif_properties.patch_solved import (
+    SLOPE,
+    measure_at_penalty,
+    measure_two_penalties,
+    patch_flat_solve,
+    patch_variants,
+)
 
 
 def textbook() -> Case:

@@ -12,7 +12,7 @@ import contactverif_nts
 from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.plugins.registry import property_ids
-from contactverif_properties.hard_solved import covered_share
+from contactverif_properties.hard import covered_share
 
 HARD = [name for name in property_ids() if name.startswith("hard.")]
 STATES = [name for name in HARD if not load_property(name).bodies]

@@ -6,7 +6,7 @@ from math import hypot
 import numpy as np
 import pytest
 from exact_projection import project_point
-from subjects import load_subject
+from subjects import load_property, load_subject
 
 from contactverif.contract.case import Case
 from contactverif.problems.flat_states import (
@@ -22,8 +22,7 @@ from contactverif.problems.flat_states import (
     touching_states,
 )
 from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
-from contactverif_properties.hard_flat import exact_forces
-from contactverif_properties.shared.applicability import knows_total
+from contactverif_properties.applicability import knows_total
 
 TURNS = (UPRIGHT, TURNED, STEEP)
 FLAT_STATES = [*offset_states(), *deep_states(), *node_hit_states(), *search_states(), *tiny_segment_states()]
@@ -56,7 +55,7 @@ def test_each_point_of_the_slave_is_nearest_to_the_flat_part(case: Case) -> None
 
 @pytest.mark.parametrize("case", FLAT_STATES, ids=lambda case: case.name)
 def test_the_exact_forces_of_a_flat_state_balance(case: Case) -> None:
-    forces = exact_forces(case)
+    forces = load_property("hard.offset").exact(case)
     size = np.abs(forces).sum()
     assert np.abs(forces.sum(axis=0)).max() <= 1e-15 * size
     arms = case.positions - case.positions[0]

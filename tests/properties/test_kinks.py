@@ -12,14 +12,14 @@ from contactverif import Subject, Verdict
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.diagnosis.flat_state import flat_state
-from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.kinks import (
+from contactverif_properties.kinks import (
     explain_by_kink,
     find_kink,
     is_like_its_surroundings,
     measure_jump,
     measure_jump_of_slope,
 )
+from contactverif_properties.states import FrozenState
 
 REACH = 1e-6
 

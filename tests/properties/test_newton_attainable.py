@@ -8,7 +8,7 @@ from contactverif.mechanics.changed_scenes import snap
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
-from contactverif_properties.newton_attainable import OFFSETS, examine, newton_attainable, settle
+from contactverif_properties.newton_method import OFFSETS, examine, newton_attainable, settle
 
 # Virtual slave nodes lie off master nodes, and nothing of the scene is a multiple of the way.
 SCENE = "c-prime:penalty=1e4"

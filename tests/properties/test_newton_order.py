@@ -16,11 +16,11 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.run import run
-from contactverif_properties.newton_attainable import newton_attainable
-from contactverif_properties.newton_convergence import (
+from contactverif_properties.newton_method import (
     DISTANCES,
     SERIES,
     fit_order,
+    newton_attainable,
     newton_history,
     newton_order,
     spectral_radius,

@@ -10,7 +10,7 @@ import contactverif_nts
 from contactverif import Case, Subject, Traits, Verdict, judge_case
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import solid_cases
-from contactverif_properties.newton_units import STEPS, newton_units
+from contactverif_properties.newton_method import STEPS, newton_units
 
 
 def draw(examples: int) -> tuple[Case, ...]:

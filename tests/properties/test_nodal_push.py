@@ -8,7 +8,7 @@ from subjects import Changed, change_verbs, load_subject
 
 from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif_nts import vts_ppt
-from contactverif_properties.pushes import nodal_push
+from contactverif_properties.compressive import nodal_push
 
 SLAVE = [[0.446875, -0.875], [1.446875, -0.375]]
 CORNER = Interface.from_chains(SLAVE, [[1.005, 0.0], [1.0025, -0.5], [0.0025, -0.5], [0.0, 0.0]])

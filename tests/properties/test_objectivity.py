@@ -9,7 +9,7 @@ from handmade import Handmade, Springs, case, over_a_node, subject
 from subjects import judge_as, load_subject
 
 from contactverif import Case, Interface, Verdict, judge_case
-from contactverif_properties.frames import objectivity
+from contactverif_properties.invariants import objectivity
 
 SEEDS = range(1, 30)
 

@@ -20,8 +20,8 @@ from contactverif_properties.purity import (
     REPEATED,
     TANGENT,
     purity,
+    renumber,
 )
-from contactverif_properties.shared.interleaved_calls import renumber
 
 
 class Pure(Handmade):

@@ -7,7 +7,7 @@ import pytest
 from handmade import case
 
 from contactverif.contract.traits import Promises, Traits
-from contactverif_properties.shared import roundoff
+from contactverif_properties import roundoff
 
 U = 2.0**-53
 

@@ -17,6 +17,7 @@ from contactverif.sampling.draw import draw_cases
 from contactverif_properties.balance import RADII, symmetric
 from contactverif_properties.invariants import (
     BEHIND,
+    BITS,
     CLOSED,
     FAR,
     exchange_roles,
@@ -26,8 +27,7 @@ from contactverif_properties.invariants import (
     renumbering,
     renumbering_cases,
 )
-from contactverif_properties.shared.any_state import random_directions
-from contactverif_properties.shared.same_answer import BITS
+from contactverif_properties.states import random_directions
 
 PROMISED_BY_ALL = ("mirror", "renumbering", "remote")
 EXAMPLES = 10

@@ -7,7 +7,7 @@ from textbook_springs import NodalMultipliers
 
 from contactverif import Case, Subject, Verdict, judge_case
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
-from contactverif_properties.stability_solutions import CONSTANT, SEGMENT, SLOPE, ZEROS
+from contactverif_properties.multipliers import CONSTANT, SEGMENT, SLOPE, ZEROS
 
 QUESTION = load_property("stability.inf-sup")
 COARSER, FINER, MATCHING = refinement_cases()

@@ -15,10 +15,8 @@ from subjects import load_subject, measure_case
 
 from contactverif import Abilities, Case, PatchPromises, Promises, Rules, Subject, Traits
 from contactverif.sampling.draw import draw_cases
-from contactverif_properties.shared.any_state import move_state
-from contactverif_properties.shared.linear_gaps import node_gaps
-from contactverif_properties.shared.uniform_pressure import forces_of_penetration
-from contactverif_properties.stability_forces import (
+from contactverif_properties.exact_forces import forces_of_penetration, node_gaps
+from contactverif_properties.stability import (
     FORCES_THERE,
     LARGEST_DENOMINATOR,
     TOTAL_THERE,
@@ -26,6 +24,7 @@ from contactverif_properties.stability_forces import (
     refuse_unknown_forces,
     stability_local,
 )
+from contactverif_properties.states import move_state
 
 
 @cache

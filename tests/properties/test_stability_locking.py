@@ -19,8 +19,7 @@ from contactverif.problems.wave_blocks import (
     wave_cases,
 )
 from contactverif.run.run import run
-from contactverif_properties.shared.wave_answer import answer_to_wave
-from contactverif_properties.stability_solutions import DRIFT, ROUGHNESS
+from contactverif_properties.stability import DRIFT, ROUGHNESS, answer_to_wave
 
 QUESTION = load_property("stability.locking")
 CASES = {case.name: case for case in wave_cases()}

@@ -10,9 +10,14 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
 from contactverif.run.run import run
-from contactverif_properties.shared.conditioning import CONDITION, ERROR, FORCE_ERROR
-from contactverif_properties.stability_forces import SWEPT_ROUNDINGS, ExactMotion, move_swept, stability_sweep
-from contactverif_properties.stability_solutions import stability_stiffness
+from contactverif_properties.roundoff import CONDITION, ERROR, FORCE_ERROR
+from contactverif_properties.stability import (
+    SWEPT_ROUNDINGS,
+    ExactMotion,
+    move_swept,
+    stability_stiffness,
+    stability_sweep,
+)
 
 
 def state_named(name: str) -> Case:

@@ -11,8 +11,8 @@ from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.translations import KINDS
-from contactverif_properties.shared.any_state import move_state
-from contactverif_properties.stability_forces import FORCES, stability_translation
+from contactverif_properties.stability import FORCES, stability_translation
+from contactverif_properties.states import move_state
 
 
 @cache

@@ -13,9 +13,9 @@ from textbook_springs import CentredSprings
 
 from contactverif import Case, Interface, Verdict, judge_case
 from contactverif.sampling.draw import draw_cases
-from contactverif_properties.shared.linear_gaps import directions, exact_slave_forces, node_gaps
-from contactverif_properties.shared.same_answer import BITS
-from contactverif_properties.straight_slaves import STEEP, TILTED
+from contactverif_properties.exact_forces import directions, exact_slave_forces, node_gaps
+from contactverif_properties.invariants import BITS
+from contactverif_properties.patch_flat import STEEP, TILTED
 
 IDS = ("patch.tilted.resultant", "patch.tilted.nodal", "locality.bend")
 EXAMPLES = 8

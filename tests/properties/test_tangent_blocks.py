@@ -18,10 +18,20 @@ from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import smooth_cases
 from contactverif.testing.failure_text import explain
-from contactverif_properties.shared.any_state import freeze_state
-from contactverif_properties.shared.block_derivatives import Groups, plan_moves, single_moves
-from contactverif_properties.shared.tangent_blocks import BLOCK, COMPLEX_BLOCK, LACKING, judge_of, scatter
-from contactverif_properties.tangent_entries import measure_blocks, tangent_long, tangent_sparsity
+from contactverif_properties.states import freeze_state
+from contactverif_properties.tangent import (
+    BLOCK,
+    COMPLEX_BLOCK,
+    LACKING,
+    Groups,
+    judge_of,
+    measure_blocks,
+    plan_moves,
+    scatter,
+    single_moves,
+    tangent_long,
+    tangent_sparsity,
+)
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write

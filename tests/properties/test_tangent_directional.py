@@ -10,8 +10,8 @@ from handmade import Handmade, case, over_a_node, subject
 from subjects import judge_as
 
 from contactverif import Case, Interface, Promises, Traits, Verdict, judge_case
-from contactverif_properties.shared.any_state import random_directions
-from contactverif_properties.tangent_directional import (
+from contactverif_properties.states import random_directions
+from contactverif_properties.tangent import (
     CENTRAL,
     COMPLEX,
     NOT_ANALYTIC,

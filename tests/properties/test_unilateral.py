@@ -12,8 +12,8 @@ from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.run.run import run
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_properties.pushes import allowed_pushes, lift_slave, nodal_push, unilateral
-from contactverif_properties.shared.frozen_state import FrozenState
+from contactverif_properties.compressive import allowed_pushes, lift_slave, nodal_push, unilateral
+from contactverif_properties.states import FrozenState
 
 
 class Springs:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from contactverif.problems.named_states import named_case
-from contactverif_properties.shared.uniform_pressure import forces_of_penetration
-from contactverif_properties.shared.worst_force import total_force, worst_force
+from contactverif_properties.exact_forces import forces_of_penetration, total_force, worst_force
 
 
 def test_a_factor_at_a_free_end_is_named() -> None:

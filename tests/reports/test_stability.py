@@ -15,7 +15,7 @@ from contactverif.contract.counterexample import counterexamples, find_counterex
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.problems.stability_states import stability_scenes, stability_states
 from contactverif.studies.stability_study import run_stability
-from contactverif_properties.shared.conditioning import CONDITION, ERROR, FORCE_ERROR, MOST_ROUNDINGS
+from contactverif_properties.roundoff import CONDITION, ERROR, FORCE_ERROR, MOST_ROUNDINGS
 from contactverif_reports.draw.stability_figure import draw_stability, make_stability_figure
 from contactverif_reports.netcdf.read import case_ids, open_report, read_case, read_run
 from contactverif_reports.netcdf.write import write

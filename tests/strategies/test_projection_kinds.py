@@ -14,7 +14,7 @@ from contactverif.oracle.projection_kinds import KIND_TESTS
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.projection_situations import KINDS, cases_of_kind, projection_states
-from contactverif_properties.shared.exact_places import projected_cases
+from contactverif_properties.contact_points import projected_cases
 
 FIXED = settings(derandomize=True, database=None, deadline=None, phases=[Phase.generate, Phase.shrink])
 COUNT = 40  # The number of cases of each kind.

@@ -18,8 +18,7 @@ from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.run.worker_pool import worker_pool
 from contactverif.studies.comparison_study import find_differing, run_comparison
 from contactverif.studies.evaluation_cost import make_state, measure_costs
-from contactverif_properties.newton_convergence import newton_order
-from contactverif_properties.shared.newton_solution import solution_details
+from contactverif_properties.newton_method import newton_order, solution_details
 from contactverif_reports.compare.cells import ORDER, Cell, Paired
 from contactverif_reports.compare.comparison import CONVERGED, END, ITERATIONS, Comparison
 from contactverif_reports.compare.regression import ALPHA, Changes, NamedRun, compare_rows, few, shift, wandering

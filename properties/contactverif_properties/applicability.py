@@ -45,3 +45,22 @@ def may_act_twice(traits: Traits) -> bool:
     They do not where areas add up to the slave's length, or where nodal springs stand on the slave alone.
     """
     return bool(traits.promises.unbiased) if traits.rules.penalty == "nodal" else not knows_total(traits)
+
+
+def refuse_unknown_total(traits: Traits) -> str:
+    """Return why the total force is unknown from the traits, or an empty string if they say enough."""
+    if traits.rules.penalty == "nodal":
+        return "there are no distributed springs"
+    if traits.rules.penalty is None or traits.rules.area is None:
+        return "the traits `penalty` and `area` are not both stated, so the total is unknown"
+    return ""
+
+
+def promise_single(traits: Traits) -> bool | None:
+    """Return the promise for meshes with master nodes on slave nodes and in the middle of slave segments."""
+    return True if traits.promises.patch.flat else traits.promises.patch.single
+
+
+def promise_normal(traits: Traits) -> bool | None:
+    """Return the promise for meshes with master nodes on slave nodes."""
+    return True if promise_single(traits) else traits.promises.patch.normal

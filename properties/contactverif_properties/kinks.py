@@ -22,9 +22,8 @@ from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.interface import PLANE
 from contactverif.oracle import kink_margin
 from contactverif.problems.lifted_states import activation_margin
-from contactverif_properties.shared.any_state import random_directions
-from contactverif_properties.shared.frozen_state import FrozenState
-from contactverif_properties.shared.roundoff import COORDINATE_ROUNDING
+from contactverif_properties.roundoff import COORDINATE_ROUNDING
+from contactverif_properties.states import FrozenState, random_directions
 
 N_DIRECTIONS = 4  # The number of random directions in which a state is moved to look for a jump.
 N_AROUND = 16  # The number of those, forth and back, in which the answers around a kink are looked for.

@@ -1,0 +1,936 @@
+"""The contact points that a formulation reports, beside what is exact at their places, and the sums over them.
+
+A point is formed in rationals from the stored nodes of its slave segment or face, and the reported place on it. Its
+reported position is rounded at its distance from the origin, and serves for nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from math import sqrt
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.faces import TRIANGLE, turns_of
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.property import Property
+from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
+from contactverif.oracle.exact_choices import DEEP, closest_excess, seen_excess
+from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
+from contactverif.oracle.exact_faces import ExactFacePoints, FaceLattice, FaceView, covered_shares
+from contactverif.oracle.exact_points import (
+    ExactPoints,
+    Lattice,
+    View,
+    closest_view,
+    positions,
+    run_against,
+    slave_normal_view,
+)
+from contactverif.strategies import general_cases, tie_cases
+from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
+from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
+from contactverif_properties.roundoff import WEIGHT_REASON, WEIGHT_ROUNDINGS, rounding_distance, sum_slave_forces
+from contactverif_properties.states import Pass, any_cases, freeze_state, split_passes
+
+LARGER_MESHES = ("larger random mesh", "larger mesh, exact ties")
+PROJECTED_KINDS = (*KINDS, *LARGER_MESHES)
+CLOSEST = "closest point"
+CELLS = ("cells", "cells and nodes")
+
+LOCAL_REASON = (
+    "A gap is a difference of the lengths L of both segments and |P − A|, each rounded a few times; along the slave's "
+    "normal over the cosine. A kernel that centres its coordinates rounds them at D; X takes the place of D where the "
+    "traits do not promise `translation_stable`."
+)
+FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ, which moves a foot by |gap| uD/ℓ."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reported:
+    """The answers of a formulation in a state."""
+
+    state: Case  # With multipliers, if the formulation has any.
+    forces: FloatArray  # The position rows of the residual, of shape (n_nodes, dim).
+    points: ContactPoints
+    traits: Traits
+
+    @classmethod
+    def from_case(cls, case: Case, subject: Subject) -> Reported:
+        """Ask a formulation about a case without multipliers."""
+        frozen = freeze_state(case, subject)
+        forces, points = frozen.formulation.answers([frozen.call("residual"), frozen.call("contact_points")])
+        return cls(
+            frozen.case, forces[: case.interface.n_unknowns].reshape(case.positions.shape), points, subject.traits
+        )
+
+    @property
+    def passes(self) -> Iterator[Pass]:
+        """The points by pass."""
+        return split_passes(self.state, self.points)
+
+    @property
+    def distant(self) -> float:
+        """The length Z at which a point may be rounded."""
+        return rounding_distance(self.state, self.traits)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """The points of a pass that name a place on a slave segment and a master segment.
+
+    A scale is the length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over
+    the cosine; infinite where the rule sees nothing of the segment.
+    """
+
+    interface: Interface  # In the roles of the pass.
+    lattice: Lattice
+    reported: ContactPoints
+    exact: ExactPoints
+    view: View  # Of the reported master segment, by the rule of the formulation.
+    scale: FloatArray  # (n_points,), as are the others.
+    gap_scale: FloatArray  # Past an end of the master segment by ξ', its ends are extrapolated: D ξ' is added.
+    # Rounding its ends at D turns the segment of length ℓ whose normal is taken by uD/ℓ, which moves the foot by
+    # |gap| uD/ℓ. So |gap| D/ℓ is added too.
+    foot_scale: FloatArray
+    facing: BoolArray  # True where the slave segment and the master segment run against each other.
+
+    @classmethod
+    def from_pass(cls, each: Pass, rule: str | None, distant: float) -> Places:
+        """Return the places of a pass; `rule` is the trait `gap`, `distant` where points may be rounded, a length."""
+        points = each.points.select(name_places(each.points) & (each.points.master_segment >= 0))
+        lattice = Lattice.from_state(each.interface, each.z)
+        exact = ExactPoints.at(lattice, points.slave_segment, points.c)
+        look = closest_view if rule == CLOSEST else slave_normal_view
+        view = look(lattice, exact, points.master_segment)
+        with np.errstate(divide="ignore"):
+            over, xi = np.where(view.cosine > 0, 1 / np.abs(view.cosine), np.inf), view.xi.floats()
+        carrier = view.master_length if rule == CLOSEST else view.slave_length
+        size = view.lengths + distant
+        gap_size = size + distant * np.maximum(0, np.maximum(-xi, xi - 1))
+        foot_size = gap_size + distant * np.abs(view.gap.floats()) / carrier
+        scales = (size * over, gap_size * over, foot_size * over)
+        facing = run_against(lattice, exact, points.master_segment)
+        return cls(each.interface, lattice, points, exact, view, *scales, facing)
+
+
+def name_places(points: ContactPoints) -> BoolArray:
+    """Return which points (n_points,) name a place on their surface."""
+    placed = np.isfinite(points.slave_shape).all(axis=1) if points.slave_shape.shape[1] else np.isfinite(points.c)
+    return np.asarray((points.slave_segment >= 0) & placed)
+
+
+@random_source("contactverif_properties.shared.exact_places.projected_cases")
+def projected_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
+    """Return {kind: strategy} of `PROJECTED_KINDS`, or one strategy for states of a given interface."""
+    if interface is not None:
+        return st.one_of(projection_states(interface), any_cases(interface))
+    return projections_by_kind() | dict(zip(LARGER_MESHES, (general_cases(), tie_cases()), strict=True))
+
+
+def largest(values: FloatArray) -> float:
+    """Return the largest of some values ≥ 0; NaN if one is NaN, 0 if there are none."""
+    return float(np.max(values, initial=0.0))
+
+
+define_projection = partial(
+    Property.define,
+    family="projection",
+    cases=Cases.by_kind(projected_cases),
+    kinds=PROJECTED_KINDS,
+    promise=lambda traits: True,
+    needs=frozenset({"contact_points"}),
+)
+
+FLAT, TILTED = "flat faces", "tilted and warped faces"
+
+
+@random_source("contactverif_properties.shared.face_places.projected_faces")
+def projected_faces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+    """Return flat cases in space, and tilted and warped ones."""
+    cases = {FLAT: flat_surface_cases(interface), TILTED: surface_cases(interface)}
+    if interface is not None and interface.slave.faces.shape[1] + interface.master.faces.shape[1] > 2 * TRIANGLE:
+        return None  # A foot on a quadrilateral is a root, and no exact number.
+    return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
+
+
+ON_FACES = Cases.by_kind(projected_faces)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FacePlaces:
+    """The points of a pass that name a place on a slave face and a master face, and what is exact there."""
+
+    interface: Interface  # In the roles of the pass.
+    lattice: FaceLattice
+    reported: ContactPoints
+    exact: ExactFacePoints
+    view: FaceView  # Of the reported master face, by the rule of the formulation.
+    # (n_points,) The length of which rounding is a share: 2 (L + |P − A| + D + |gap| D/h) Π ℓ/h over the cosine. L are
+    # the longest edges of both faces, |P − A| is the way from the point to a corner. Rounding the corners of a face at
+    # D turns it by D over its height h. Coordinates in a slave face of length ℓ and height h round a place by ℓ/h along
+    # it, and the shape functions of the master face change over its own height. So the product is over both faces.
+    scale: FloatArray
+    carrier_height: FloatArray  # (n_points,) The height of the face whose normal is taken.
+    # (n_points,) The weight over the square of the lengths, 1 at most. A corner of a cell is a quotient by the width of
+    # the cell. So the error of a place counts by the area that it moves.
+    share: FloatArray
+
+    @classmethod
+    def from_pass(cls, each: Pass, rule: str | None, distant: float) -> FacePlaces:
+        """Return the places of a pass; `rule` is the trait `gap`, `distant` where points may be rounded, a length."""
+        named = name_places(each.points) & (each.points.master_segment >= 0)
+        points = each.points.select(named & ~each.points.weighted)
+        lattice = FaceLattice.from_state(each.interface, each.z)
+        exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
+        view = FaceView.of_faces(lattice, exact, points.master_segment, closest=rule == CLOSEST)
+        carriers = each.positions[each.interface.slave.faces[points.slave_segment]]
+        slave_height = each.interface.slave.heights(each.positions)[points.slave_segment]
+        carrier = view.heights if rule == CLOSEST else slave_height
+        edges, gap = _longest_edges(view.corners), np.abs(view.gap.floats())
+        slave_edges = _longest_edges(carriers)
+        size = edges + slave_edges + np.linalg.norm(view.corners, axis=2).max(axis=1, initial=0.0)
+        size += distant * (1 + gap / carrier)
+        with np.errstate(divide="ignore"):
+            slender = edges / view.heights * slave_edges / slave_height
+            scale = 2 * size * slender / np.maximum(view.cosine, 0.0)
+        share = np.minimum(np.abs(points.weight) / size**2, 1.0)
+        return cls(each.interface, lattice, points, exact, view, scale, carrier, share)
+
+    @property
+    def depth_inside(self) -> FloatArray:
+        """The depth of each foot (n_points,) inside its face, a length; negative outside."""
+        depth: FloatArray = self.view.shape.floats().min(axis=1, initial=np.inf) * self.view.heights
+        return depth
+
+    @property
+    def beside_border(self) -> BoolArray:
+        """True for feet (n_points,) that may lie past the border of the master, by roundoff or more."""
+        free = self.interface.master.neighbours[self.reported.master_segment] < 0
+        past = self.view.shape.floats() * self.view.heights[:, None] <= 4 * UNIT_ROUNDOFF * self.scale[:, None]
+        return np.asarray((np.roll(free, -1, axis=1) & past).any(axis=1))  # Edge b + 1 is opposite corner b.
+
+    def closest_excess(self) -> FloatArray:
+        """Return how much farther each point's face (n_points,) is than another one with a foot inside, a length."""
+        n_master, n_points = len(self.lattice.master), len(self.reported.gap)
+        point, face = np.divmod(np.arange(n_points * n_master), n_master)
+        exact = ExactFacePoints(self.exact.place[point], self.exact.weight[point], self.exact.outward[point])
+        view = FaceView.of_faces(self.lattice, exact, face, closest=True)
+        rounding = 4 * UNIT_ROUNDOFF * self.scale[point] * (1 + _longest_edges(view.corners) / view.heights)
+        inside = view.shape.floats().min(axis=1, initial=np.inf) * view.heights > rounding
+        gap = np.where(inside, np.abs(view.gap.floats()), np.inf).reshape(n_points, n_master)
+        excess: FloatArray = np.abs(self.view.gap.floats()) - gap.min(axis=1, initial=np.inf)
+        return np.maximum(excess, 0.0)
+
+
+def _longest_edges(corners: FloatArray) -> FloatArray:
+    """Return the longest edge (n,) of faces with corners (n, n_corners, 3)."""
+    longest: FloatArray = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    return longest
+
+
+def place_errors(case: Case, subject: Subject) -> tuple[list[float], bool]:
+    """Return the largest errors of gap, foot, normal and position, and whether no point is active."""
+    reported = Reported.from_case(case, subject)
+    values = np.zeros(4)
+    for each in reported.passes:
+        places = FacePlaces.from_pass(each, subject.traits.rules.gap, reported.distant)
+        points, view, facing = places.reported, places.view, np.isfinite(places.scale)
+        edges = _longest_edges(view.corners)
+        turned = 1 + reported.distant / places.carrier_height
+        foot = np.abs(view.shape.errors(points.master_shape)).max(axis=1, initial=0.0) * edges
+        normal = np.linalg.norm(view.normal.errors(points.normal), axis=1)
+        errors = np.abs(view.gap.errors(points.gap)) / places.scale, foot / places.scale, normal / turned
+        on_faces = [largest(_of_active(error, points)[facing]) for error in errors]
+        values = np.maximum(
+            values, [*on_faces, largest(_face_position_errors(each) / reported.state.largest_coordinate)]
+        )
+    return values.tolist(), not reported.points.active.any()
+
+
+def _face_position_errors(each: Pass) -> FloatArray:
+    """Return the errors of the reported positions (n_points,) of all points that name a place, a length."""
+    points = each.points.select(name_places(each.points))
+    lattice = FaceLattice.from_state(each.interface, each.z)
+    exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
+    place = replace(exact.positions, below=exact.positions.below * lattice.scale)
+    return _of_active(np.abs(place.errors(points.position)).max(axis=1, initial=0.0), points)
+
+
+def _of_active(errors: FloatArray, points: ContactPoints) -> FloatArray:
+    """Return errors, with 0 in place of NaN where a point is idle."""
+    return np.where(np.isnan(errors) & ~points.active, 0.0, errors)
+
+
+def face_errors(case: Case, subject: Subject) -> tuple[float, str, bool]:
+    """Return the largest excess of a distance over its scale, how the contract is broken, and whether all is idle."""
+    reported = Reported.from_case(case, subject)
+    rule, value, broken = subject.traits.rules.gap, 0.0, ""
+    for each in reported.passes:
+        places = FacePlaces.from_pass(each, rule, reported.distant)
+        counted = places.view.faces_it
+        if rule == CLOSEST:
+            excess = places.closest_excess()
+        else:
+            excess = np.where(places.beside_border, 0.0, np.maximum(-places.depth_inside, 0.0)) * places.share
+        value = max(value, largest((excess / places.scale)[counted]))
+        if (places.reported.active & ~counted & (places.share > 4 * UNIT_ROUNDOFF)).any():
+            broken = "a master face does not face the slave face of its point"
+    return value, broken, not reported.points.active.any()
+
+
+def count_decisions(reported: Reported) -> tuple[int, int]:
+    """Return how many decisions for contact are wrong in a state, and how many points are decided."""
+    wrong = decided = 0
+    for each in reported.passes:
+        places = FacePlaces.from_pass(each, reported.traits.rules.gap, reported.distant)
+        points, gap = places.reported, places.view.gap.floats()
+        certain = places.view.faces_it & (points.weight != 0) & (np.abs(gap) > 4 * UNIT_ROUNDOFF * places.scale)
+        certain &= places.depth_inside > 4 * UNIT_ROUNDOFF * places.scale
+        weighted = each.points.select(each.points.weighted)
+        sure = np.abs(weighted.gap) > 4 * UNIT_ROUNDOFF * (reported.state.diameter + reported.distant)
+        wrong += int((certain & (points.active != (gap < 0))).sum())
+        wrong += int((sure & (weighted.active != (weighted.gap < 0))).sum())
+        decided += int(certain.sum()) + int(sure.sum())
+    return wrong, decided
+
+
+def area_error(each: Pass, rule: str | None, areas: FloatArray, distant: float) -> float:
+    """Return the error of the sums of weights over the scale of areas, face by face where points lie on one.
+
+    The slave faces have the areas (n_faces,) in the configuration of the trait `area`. An area is a product of lengths
+    of which each is rounded at D, so its scale is L D; on needles the longest edge is more than √A.
+    """
+    points, whole = each.points.select(name_places(each.points)), float(areas.sum())
+    length = max(sqrt(whole), float(_longest_edges(each.positions[each.interface.slave.faces]).max()))
+    scale = len(areas) * length * (length + distant)
+    if rule is None:
+        return (float(points.weight.sum()) - whole) / scale
+    if rule == CLOSEST:
+        return _missing_or_excess(points, whole, covered=_are_all_nodes(each, points)) / scale
+    shares = np.array([float(share) for share in covered_shares(FaceLattice.from_state(each.interface, each.z))])
+    if (shares > 1).any():  # Master faces lie behind one another.
+        return 0.0
+    if rule not in CELLS:
+        return _missing_or_excess(points, whole, covered=bool((shares == 1).all())) / scale
+    expected, sums = shares * areas, np.bincount(points.slave_segment, points.weight, len(areas))
+    errors = sums - expected
+    return abs(float(errors.sum())) / scale if points.weighted.any() else float(np.abs(errors).max()) / scale
+
+
+def _missing_or_excess(points: ContactPoints, area: float, *, covered: bool) -> float:
+    """Return how much weights (n_points,) are more than an area, or also less where all of it is covered."""
+    excess = float(points.weight.sum()) - area
+    return abs(excess) if covered else max(excess, 0.0)
+
+
+def _are_all_nodes(each: Pass, points: ContactPoints) -> bool:
+    """Return whether the points are the slave nodes, all of them."""
+    corners = each.interface.slave.faces[points.slave_segment, points.slave_shape.argmax(axis=1)]
+    whole = (points.slave_shape == 1).any(axis=1).all()
+    return bool(whole) and len(np.unique(corners)) == each.interface.n_slave_nodes
+
+
+def refuse_without_rule(traits: Traits) -> str:
+    """Return why places cannot be judged, or an empty string where the trait `gap` states a rule."""
+    return "" if traits.rules.gap is not None else "the trait `gap` states no rule of projection"
+
+
+# Two ends of an overlap are scalar products of two terms, each rounded by 2u of the lengths.
+OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
+# A search may call segments tied whose distances differ by so little, and no gap shows which of them it took.
+TIED = 1e-12
+FARTHER = Quantity(
+    "distance beyond the nearest segment", "1e-12", "A search may call segments tied that differ by less."
+)
+
+
+@define_projection(
+    id="projection.segment", rank=320, quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=refuse_without_rule
+)
+def projection_segment(case: Case, subject: Subject) -> Measurement:
+    """Each contact point is measured against the master segment that the stated rule names.
+
+    **Question.** A formulation states by which rule a point gets its master segment: the closest one, or the nearest
+    that its slave segment sees along its normal. Does each point that it reports have a segment by that rule?
+
+    **Why it matters.** A wrong segment is a wrong gap, a wrong normal and a force on wrong nodes. It happens where
+    search is hard: past free ends, at sharp vertices, where the nearest node is not on the nearest segment. Meshes for
+    tests rarely have such places, and assemblies do.
+
+    **How it is judged.** The point is formed in rationals from the stored nodes and c. The number is how much farther
+    the reported segment is than the nearest, a length that is exact, over the lengths of which a gap is a difference.
+    It must be at most 1e-12. So a tie needs no rule: of segments at the same distance any is right. Along the slave's
+    normal, a segment must face the slave and be met by the line. Of one that is seen edge-on, rounding may leave an
+    overlap: a point whose weight is at most 8u of those lengths may name it. For `cells` it may be the nearest at the
+    point or in the middle of its overlap, and segments beyond two lengths of both are no rivals.
+
+    In space a master face must look at the slave. Along the slave's normal the foot lies in it, or past the border of
+    the master. By the closest point no face with a foot inside is nearer. Lengths are those of `projection.place`.
+
+    **Undecided.** Never. The number of exact ties is a detail. A point that names no segment is not judged here.
+    """
+    if case.interface.dim != PLANE:
+        value, broken, idle = face_errors(case, subject)
+        return Measurement([FARTHER.check(value, TIED)], broken=broken, idle=idle)
+    reported = Reported.from_case(case, subject)
+    rule, value, ties, broken = subject.traits.rules.gap, 0.0, 0, ""
+    for each in reported.passes:
+        places = Places.from_pass(each, rule, reported.distant)
+        segments = places.reported.master_segment
+        if rule == CLOSEST:
+            excess, tied = closest_excess(places.lattice, places.exact, segments)
+            ties += int((tied > 1).sum())
+        else:
+            carrier = places.reported.slave_segment
+            excess = seen_excess(places.lattice, places.exact, carrier, segments, cells=rule in CELLS)
+        facing = places.view.cosine > 0
+        value = max(value, largest(excess[facing] / places.scale[facing]))
+        rounded = places.reported.weight <= OVERLAP_ROUNDOFF * (places.view.lengths + reported.distant)
+        if not (facing | rounded).all():
+            broken = "a master segment does not face the slave segment of its point"
+    return Measurement(
+        [FARTHER.check(value, TIED)],
+        broken=broken,
+        details={"tied points": ties},
+        idle=not reported.points.active.any(),
+    )
+
+
+GAP = Quantity("error of the gap", "4u", LOCAL_REASON)
+XI = Quantity("error of ξ", "4u", FOOT_REASON)
+NORMAL = Quantity(
+    "error of the normal",
+    "8u (1 + D/ℓ)",
+    "A difference, a root and a division are rounded, and ends at uD turn a segment.",
+)
+POSITION = Quantity("error of the position", "4u", "Two products and their sum are rounded, relative to X.")
+_ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
+
+
+@define_projection(
+    id="projection.place",
+    rank=70,
+    quantities=(GAP, XI, NORMAL, POSITION),
+    cases_in_space=ON_FACES,
+    applicable=refuse_without_rule,
+)
+def projection_place(case: Case, subject: Subject) -> Measurement:
+    """Position, ξ, normal and gap of each contact point are those of its place.
+
+    **Question.** A contact point lies at c on a slave segment and is measured against a master segment. Are its
+    position, its foot ξ, its normal and its gap those of that place, by the rule that the formulation states?
+
+    **Why it matters.** Forces follow from these numbers. A gap that is formed from coordinates, n·x − n·x₁, loses a
+    digit for each power of ten of the distance from the origin. A foot that is clipped to the segment hides that a
+    point lies past its end. No patch test on a small mesh near the origin sees either.
+
+    **How it is judged.** The point is formed in rationals from the stored nodes and c, never from the reported
+    position. Gap and ξ may differ by 4u(L + |P − A| + D) from the exact ones: L are the lengths of both segments, P is
+    the point, A the first node of the master segment, and D the diameter of the interface. So a gap that small may have
+    either sign. ξ is multiplied by its segment's length; |gap| D/ℓ is added for it, since a segment of length ℓ whose
+    ends are rounded turns, and a foot moves by the angle times the gap. Past an end of the segment by ξ', D (1 + ξ')
+    takes the place of D. The normal is compared as a vector, 8u (1 + D/ℓ). The position is rounded where it is, 4uX.
+    Along the slave's normal the first tolerance is over the cosine of the angle between the segments. X takes the place
+    of D where the traits do not promise `translation_stable`: points that are formed first are rounded there.
+
+    In space the shape functions of a foot take the place of ξ, times the longest edge of their face. The lengths are
+    2 (L + |P − A| + D + |gap| D/h) Π ℓ/h over the cosine, with the longest edge ℓ and the height h of both faces:
+    coordinates in a slave face round a place by ℓ/h, and shape functions of the master change over its height.
+
+    **Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted
+    node is a mean, and is not judged here.
+    """
+    tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
+    if case.interface.dim != PLANE:
+        on_faces, idle = place_errors(case, subject)
+        return Measurement(check_all(dict(zip(_ROUNDINGS, on_faces, strict=True)), tolerances), idle=idle)
+    reported = Reported.from_case(case, subject)
+    values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
+    for each in reported.passes:
+        places = Places.from_pass(each, subject.traits.rules.gap, reported.distant)
+        for name, errors in (*_errors(places, reported.distant), (POSITION, _position_errors(each, far))):
+            values[name] = float(np.maximum(values[name], largest(errors)))
+    return Measurement(check_all(values, tolerances), idle=not reported.points.active.any())
+
+
+def _errors(places: Places, distant: float) -> Iterator[tuple[Quantity, FloatArray]]:
+    """Yield the name of each quantity with its errors, NaN only where an active point has NaN."""
+    points, view = places.reported, places.view
+    facing = np.isfinite(places.scale)
+    counted = facing & ~points.weighted
+    yield GAP, _size(view.gap.errors(points.gap) / places.gap_scale, points.active)[counted]
+    length = view.master_length / places.foot_scale
+    yield XI, _size(view.xi.errors(points.xi) * length, points.active)[facing]
+    carrier = np.minimum(view.master_length, view.slave_length)  # Rounding the ends of a segment turns it.
+    turns = view.normal.errors(points.normal)
+    yield NORMAL, _size(np.hypot(turns[:, 0], turns[:, 1]) / (1 + distant / carrier), points.active)[facing]
+
+
+def _position_errors(each: Pass, far: float) -> FloatArray:
+    """Return the errors of positions over X, of all points that name a place, whether they see a master or not."""
+    points = each.points.select(name_places(each.points))
+    lattice = Lattice.from_state(each.interface, each.z)
+    exact = ExactPoints.at(lattice, points.slave_segment, points.c)
+    shifts = positions(lattice, exact).errors(points.position) / far
+    return _size(np.abs(shifts).max(axis=1, initial=0.0), points.active)
+
+
+def _size(errors: FloatArray, active: BoolArray) -> FloatArray:
+    """Return |errors|; 0 in place of NaN where a point is idle."""
+    return np.where(np.isnan(errors) & ~active, 0.0, np.abs(errors))
+
+
+LARGE_UNIT = 2.0**-32
+WRONG = Quantity("wrong decisions", "0", "A decision is right or wrong; what roundoff or a rule decides is left out.")
+
+
+def refuse_other_decisions(traits: Traits) -> str:
+    """Return why the decision is not known from the gap, or an empty string."""
+    if traits.rules.enforcement == "multiplier":
+        return "the enforcement is by a multiplier, which decides in its own way"
+    if traits.rules.gap == "cells and nodes":
+        return "the slave nodes decide, and the points do not"
+    return refuse_without_rule(traits)
+
+
+@define_projection(
+    id="projection.activity", rank=50, quantities=(WRONG,), cases_in_space=ON_FACES, applicable=refuse_other_decisions
+)
+def projection_activity(case: Case, subject: Subject) -> Measurement:
+    """A contact point is active exactly where its gap is closed and its foot is on the master.
+
+    **Question.** Is a contact point active exactly where its gap is not open and its foot lies on the surface?
+
+    **Why it matters.** One wrong decision is a force that is missing or one too many. An absolute epsilon in the
+    decision works for parts in millimetres and fails for the same part in metres. A decision taken from a neighbour is
+    right on every flat patch.
+
+    **How it is judged.** The exact gap of the point to its reported segment decides. The number of wrong decisions must
+    be 0. A weighted node is judged by the weighted gap that it reports.
+
+    **Undecided.** A point is left out where formulations may decide either way: a gap of roundoff, 4u(L + |P − A| + D);
+    a foot past a free end by up to one segment, since each formulation has its own tolerance τ; an idle point whose
+    slave segment does not face the master, or that has no weight; a penetration of more than two lengths of both
+    segments. Details say how many points were decided and how many were left out. Multipliers have their own decision,
+    λ − c g ≥ 0, and pressures that are interpolated between nodes have the nodes' decision, which is not reported; both
+    are not asked.
+    """
+    both = [Reported.from_case(state, subject) for state in (case, _in_large_unit(case))]
+    wrong, decided = zip(*map(_count if case.interface.dim == PLANE else count_decisions, both), strict=True)
+    samples = [each.points for each in both]
+    homeless = any(
+        (points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))).any()
+        for points in samples
+    )
+    n_points = sum(len(points.c) for points in samples)
+    return Measurement(
+        [WRONG.check(float(sum(wrong)), 0.0)],
+        broken="an active point names no place or no master segment" if homeless else "",
+        details={"decided points": sum(decided), "points left out": n_points - sum(decided)},
+        idle=not decided[0],
+    )
+
+
+def _in_large_unit(case: Case) -> Case:
+    """Return the state with all lengths divided by 2^32, which rounds nothing; the penalty stays."""
+    interface = case.interface.at(case.interface.nodes * LARGE_UNIT)
+    return replace(case, interface=interface, z=case.z * LARGE_UNIT)
+
+
+def _count(reported: Reported) -> tuple[int, int]:
+    """Return how many decisions are wrong in one state, and how many points are decided."""
+    rule, wrong, decided = reported.traits.rules.gap, 0, 0
+    for each in reported.passes:
+        weighted = each.points.select(each.points.weighted)
+        local = Places.from_pass(each, rule, reported.distant)
+        certain, closed = _decide(local, rule)
+        wrong += int((certain & (local.reported.active != closed)).sum())
+        decided += int(certain.sum())
+        sure = np.abs(weighted.gap) > 4 * UNIT_ROUNDOFF * (reported.state.diameter + reported.distant)
+        wrong += int((sure & (weighted.active != (weighted.gap < 0))).sum())
+        decided += int(sure.sum())
+    return wrong, decided
+
+
+def _decide(places: Places, rule: str | None) -> tuple[BoolArray, BoolArray]:
+    """Return at which points (n_points,) every right formulation decides alike, and whether it decides for contact."""
+    points, view = places.reported, places.view
+    rounding, foot_rounding = 4 * UNIT_ROUNDOFF * places.gap_scale, 4 * UNIT_ROUNDOFF * places.foot_scale
+    gap, xi, length = view.gap.floats(), view.xi.floats(), view.master_length
+    past = np.stack([-xi, xi - 1], axis=1) * length[:, None]  # Past the first end, and past the second.
+    certain = (np.abs(gap) > rounding) & (np.abs(gap) <= DEEP * (length + view.slave_length)) & ~points.weighted
+    if rule != CLOSEST:
+        return certain & (past < -foot_rounding[:, None]).all(axis=1), gap < 0
+    free = places.interface.master.neighbours[points.master_segment] < 0
+    beyond = free & (past >= length[:, None])
+    near_end = free & ~beyond & (past > -foot_rounding[:, None])
+    usable = points.active | (places.facing & (points.weight != 0))
+    return certain & usable & ~near_end.any(axis=1), (gap < 0) & ~beyond.any(axis=1)
+
+
+ENDS_REASON = "An end that a master node cuts is a quotient of differences; X is added unless points keep their digits."
+WEIGHT = Quantity("weight against the area's ends", "16u", ENDS_REASON)
+ENDS = Quantity("area outside its segment, its point or its neighbour", "16u", ENDS_REASON)
+SUM = Quantity("error of the sum of weights", "192u", f"{WEIGHT_REASON} Nodes that are covered by less are left out.")
+
+
+@define_projection(
+    id="projection.area",
+    rank=210,
+    quantities=(WEIGHT, ENDS, SUM),
+    cases_in_space=ON_FACES,
+    applicable=lambda traits: "" if traits.rules.penalty == "distributed" else "there are no distributed springs",
+)
+def projection_area(case: Case, subject: Subject) -> Measurement:
+    """Areas of competence and weights add up to the slave's length, or to what of it is covered.
+
+    **Question.** Each contact point stands for a length of the slave, its weight. Do the weights add up, and are the
+    ends of the areas where the weights say?
+
+    **Why it matters.** The weight is the stiffness of a point. A length that is counted twice, or not at all, is a
+    contact that is too stiff or too soft in one place. A sum over the whole interface hides it where two errors cancel.
+
+    **How it is judged.** All points are reported, active or not. A weight is ≥ 0, or negative by rounding. Where ends
+    are reported of a point inside its segment, in either order, the weight is the length between them, in the
+    configuration of the trait `area` (without the trait, in either); the point lies between them, and areas of one
+    segment do not overlap: 16u of the interface's diameter. The sum of the weights is held against an exact length,
+    192u of the diameter for each segment. Cells cover what the slave sees along its normal, segment by segment. Closest
+    points add up to the slave's length; unless the trait `patch.overhang` is False, they need to only where the whole
+    slave faces one master chain in all its normals. Points that look along the slave's normal need to where all of the
+    slave sees the master. Elsewhere the sum is at most the slave's length; without a rule in the trait `gap`, that is
+    asked only where the slave faces one master chain as above, since cells of averaged normals overlap where a master
+    folds back.
+
+    In space a weight is an area, and areas have no ends. The sums are over the diameter
+    and the longest edge, or the area's root. Closest points add up to the slave's area where they are all its nodes.
+
+    **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is
+    deeper than two lengths, is not measured. A nodal penalty has no areas and is not asked.
+    """
+    reported = Reported.from_case(case, subject)
+    in_space = case.interface.dim != PLANE
+    values = dict.fromkeys((SUM,) if in_space else (WEIGHT, ENDS, SUM), 0.0)
+    one_pass = not reported.points.on_master.any()
+    for each in reported.passes:
+        lengths = _lengths(each, subject.traits)
+        if in_space:
+            rule, distant = subject.traits.rules.gap, reported.distant
+            values[SUM] = max(values[SUM], min(area_error(each, rule, length, distant) for length in lengths))
+            continue
+        trials = [_Areas(each, subject.traits, length, reported.distant, one_pass).errors() for length in lengths]
+        best = min(trials, key=lambda trial: max(trial.values()))
+        values = {name: max(value, best[name]) for name, value in values.items()}
+    tolerances = {name: {SUM: 64 + WEIGHT_ROUNDINGS}.get(name, 16) * UNIT_ROUNDOFF for name in values}
+    fits = values[SUM] <= tolerances[SUM]
+    return Measurement(
+        check_all(values, tolerances), broken=_area_breach(reported, fits=fits), idle=not reported.points.active.any()
+    )
+
+
+def _area_breach(reported: Reported, *, fits: bool) -> str:
+    """Return how the points break the contract, or an empty string; `fits` says that weights have the right sums.
+
+    Idle points are left out if no point is idle, and lengths are missing.
+    """
+    points = reported.points
+    # What a cell of no more than rounding covers may have either sign.
+    rounding = 16 * UNIT_ROUNDOFF * reported.distant ** (reported.state.interface.dim - 1)
+    if not (points.weight >= -rounding).all():
+        return "a weight is negative or NaN"
+    length = sum(float(_lengths(each, reported.traits)[0].sum()) for each in reported.passes)
+    if not fits and points.active.all() and float(points.weight.sum()) < length:
+        return "every reported point is active, and a part of the slave is missing: report idle points, find all cells"
+    return ""
+
+
+def _lengths(each: Pass, traits: Traits) -> list[FloatArray]:
+    """Return the lengths or areas (n_faces,) of the slave in the configurations in which they may be measured."""
+    current, reference = (each.interface.slave.measures(nodes) for nodes in (each.positions, each.interface.nodes))
+    return {"current": [current], "reference": [reference], None: [current, reference]}[traits.rules.area]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Areas:
+    """The points of a pass, the lengths of the slave segments, and the length at which a point may be rounded.
+
+    The trait `patch.overhang` speaks of the sum of all passes, so it says something here if there is one.
+    """
+
+    each: Pass
+    traits: Traits
+    length: FloatArray
+    distant: float
+    one_pass: bool
+
+    def errors(self) -> dict[Quantity, float]:
+        """Return the errors of weights, ends and sums by name."""
+        points = self.each.points
+        ends = np.stack([points.area_from, points.area_to])
+        within = np.abs(points.c) < 1  # A node may stand for parts of two segments, and its ends for one of them.
+        given = np.isfinite(ends).all(axis=0) & name_places(points) & within
+        whole = replace(points, area_from=ends.min(axis=0), area_to=ends.max(axis=0)).select(given)
+        current = self.each.interface.slave.lengths(self.each.positions)
+        size = float(np.hypot(*np.ptp(self.each.positions, axis=0))) + self.distant  # Rounding is a share of it.
+        scale = len(current) * float((size * self.length / current).max())
+        low, high, on = whole.area_from, whole.area_to, whole.slave_segment
+        stretch = self.length[on] / current[on]
+        weights = np.where(whole.weight > 0, np.abs(whole.weight - (high - low) / 2 * self.length[on]), 0.0)
+        outside = np.maximum.reduce([low - whole.c, whole.c - high, -1 - low, high - 1, _overlaps(whole)], initial=0.0)
+        return {
+            WEIGHT: largest(weights / (size * stretch)),
+            ENDS: largest(outside / 2 * current[on] / size),
+            SUM: largest(np.array(list(self._sum_errors(scale)))),
+        }
+
+    def _sum_errors(self, scale: float) -> Iterator[float]:
+        """Yield the errors of sums of weights over the lengths that they are formed from, the scale."""
+        points, rule = self.each.points, self.traits.rules.gap
+        total, whole = float(points.weight.sum()), float(self.length.sum())
+        lattice = Lattice.from_state(self.each.interface, self.each.z)
+        if rule in CELLS:
+            yield from self._cell_errors(Coverage.along_slave_normals(lattice), scale)
+        elif rule is not None or lies_in_shadow(lattice, self.each.interface):
+            missing = abs(total - whole) if self._covers_all(lattice) else 0.0
+            yield max(total - whole, missing) / scale
+
+    def _covers_all(self, lattice: Lattice) -> bool:
+        """Return whether the weights of the points must add up to the slave's length."""
+        rule, covers = self.traits.rules.gap, self.traits.promises.patch.overhang
+        if rule == CLOSEST:
+            return (covers is False and self.one_pass) or lies_in_shadow(lattice, self.each.interface)
+        if rule is None:
+            return False
+        coverage = Coverage.along_slave_normals(lattice)
+        return bool(coverage.clear.all() and (coverage.share.floats() == 1).all())
+
+    def _cell_errors(self, coverage: Coverage, scale: float) -> Iterator[float]:
+        """Yield the errors of sums over the cells, segment by segment where points lie on one segment."""
+        points = self.each.points
+        expected = coverage.share.floats() * self.length
+        if points.weighted.any():
+            if coverage.clear.all():
+                yield abs(float(points.weight.sum()) - float(expected.sum())) / scale
+            return
+        named = points.select(name_places(points))
+        sums = np.bincount(named.slave_segment, named.weight, len(self.length))
+        yield largest(np.abs(sums - expected)[coverage.clear]) / scale
+
+
+def _overlaps(points: ContactPoints) -> FloatArray:
+    """Return how far each area reaches over the next one on its segment, in c; 0 where there is none with a weight."""
+    order = np.lexsort([points.c, points.slave_segment])
+    overlaps = np.zeros(len(order))
+    if len(order) > 1:
+        now, following = order[:-1], order[1:]
+        same: BoolArray = points.slave_segment[now] == points.slave_segment[following]
+        carrying = (points.weight[now] > 0) & (points.weight[following] > 0)
+        overlaps[now] = np.where(same & carrying, points.area_to[now] - points.area_from[following], 0.0)
+    return overlaps
+
+
+STRAIGHT = 2.0**-26  # Normals of a straight slave, whose nodes are rounded far away, differ by less than this.
+UNIT = Quantity("length of the normal less 1", "8u", "A difference, a root and a division are rounded.")
+FORCES = Quantity(
+    "pressures against the slave's forces",
+    "u(8D/min(g, ℓ) + 4N) + Δn",
+    "Both are sums of N rounded gaps and normals; a straight slave is rounded too.",
+)
+FOOT = Quantity(
+    "position − foot against gap × normal",
+    "16u",
+    "Each vector is a sum of rounded products, and a segment whose ends are rounded turns by uD/ℓ.",
+)
+LAW = Quantity("pressure against −ε̂ × gap", "8u", "The gap may be formed anew for the pressure.")
+
+
+@define_projection(id="projection.forces", rank=40, quantities=(UNIT, FORCES, FOOT, LAW), cases_in_space=ON_FACES)
+def projection_forces(case: Case, subject: Subject) -> Measurement:
+    """The pressures at the contact points are the forces on the slave, and their gaps are what the places show.
+
+    **Question.** Are the pressures at the contact points, over their weights and along their normals, the forces that
+    the formulation puts on the slave?
+
+    **Why it matters.** Engineers look at contact pressures and gaps, and not at nodal forces. A report that is not what
+    was computed misleads them, and no other question sees it: the forces are right.
+
+    **How it is judged.** These identities hold for right formulations whether they pass the patch test or not:
+
+    - A point with a pressure has a normal of length 1 (8u). A pressure is a number ≥ 0. An idle point carries nothing.
+    - A nodal force has the weight 1. A weighted node lies at a node, not inside a segment.
+    - −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
+      the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment. Points of a
+      second pass push the master, and the slave by reaction; or each surface has its own points alone (half passes).
+    - Position − foot = gap × normal as vectors, where the trait `gap` states a rule and the point is no weighted node.
+      Foot and gap along the slave's normal are quotients by the cosine between the surfaces, and rounding the ends of a
+      segment turns its normal by uD/ℓ, both of which is allowed for.
+    - Pressure = −ε̂ × gap at active points, for a penalty whose traits state the configuration of areas (and with it
+      that it is linear), except where pressures are interpolated between nodes.
+
+    Sums are compared over Σ|R|, with u(8D/min(g, ℓ) + 4N). Vectors are compared over X, |gap| D/ℓ and the lengths that
+    they are formed from, with 16u, and pressures over ε̂ times the gap and D, with 8u. X takes the place of the
+    diameter D where the traits do not promise `translation_stable`. In space vectors are compared over X and the
+    lengths of `projection.place`.
+
+    **Undecided.** Never. What does not hold for a formulation by its traits is not measured.
+    """
+    reported = Reported.from_case(case, subject)
+    points, state = reported.points, reported.state
+    distance = reported.distant
+    values = {UNIT: _normal_error(points)}
+    tolerances = {UNIT: 8 * UNIT_ROUNDOFF}
+    if (difference := _force_difference(reported)) is not None:
+        values[FORCES], tolerance = _compare_forces(reported, difference)
+        tolerances[FORCES] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
+    if subject.traits.rules.gap is not None:
+        values[FOOT] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
+        tolerances[FOOT] = 16 * UNIT_ROUNDOFF
+    if _has_linear_law(subject.traits):
+        penalty = 1.0 if state.n_multipliers else subject.penalty(state)
+        active = points.select(points.active)
+        errors = np.abs(active.pressure + penalty * active.gap) / (penalty * (np.abs(active.gap) + distance))
+        values[LAW] = largest(errors)
+        tolerances[LAW] = 8 * UNIT_ROUNDOFF
+    return Measurement(
+        check_all(values, tolerances), broken=_breach(points, subject.traits), idle=not points.active.any()
+    )
+
+
+def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, float]:
+    """Return a difference of forces over Σ|R|, and its tolerance.
+
+    A gap of roundoff may give a pressure in one place and none in the other. So Σ|R| counts for no less than a
+    penetration of u D gives.
+    """
+    state = reported.state
+    stiffness = state.penalty * state.slave_measure  # Force per length of penetration.
+    size = max(sum_slave_forces(state, reported.forces), UNIT_ROUNDOFF * reported.distant * stiffness)
+    reach = min(size / stiffness, state.shortest_segment)
+    tolerance = UNIT_ROUNDOFF * (8 * reported.distant / reach + 4 * state.n_segments)
+    return float(np.abs(difference).max()) / size, tolerance
+
+
+def _breach(points: ContactPoints, traits: Traits) -> str:
+    """Return how the points break the contract, or an empty string."""
+    inside = (points.slave_shape < 1).all(axis=1) if points.slave_shape.shape[1] else np.abs(points.c) < 1
+    if (points.weighted & inside).any():
+        return "a weighted node lies inside a segment"
+    if traits.rules.penalty == "nodal" and (points.weight[points.active] != 1).any():
+        return "a nodal force has a weight other than 1"
+    if not (points.pressure[points.active] >= 0).all():
+        return "a pressure at an active point is negative or NaN"
+    if np.nan_to_num(points.pressure[~points.active]).any():
+        return "an idle point carries a pressure"
+    return ""
+
+
+def _normal_error(points: ContactPoints) -> float:
+    """Return the largest difference of a normal's length from 1, where a point has a pressure or a normal."""
+    counted = (points.pressure > 0) | np.isfinite(points.normal).all(axis=1)
+    return largest(np.abs(_norms(points.normal[counted]) - 1))
+
+
+def _norms(vectors: FloatArray) -> FloatArray:
+    """Return the lengths (n,) of vectors (n, dim)."""
+    return np.hypot(vectors[:, 0], vectors[:, 1]) if vectors.shape[1] == PLANE else np.linalg.norm(vectors, axis=1)
+
+
+def _force_difference(reported: Reported) -> FloatArray | None:
+    """Return Σ pressure × weight × normal + ΣR of the slave (dim,), or None where the two need not be equal.
+
+    A second pass pushes the master. What it does to the slave is the reaction, if forces balance.
+    """
+    points = reported.points
+    size = sum_slave_forces(reported.state, reported.forces)
+    balanced = np.abs(reported.forces.sum(axis=0)).max() <= UNIT_ROUNDOFF * 64 * reported.state.n_segments * size
+    if points.on_master.any() and not balanced:  # `balance.force` asks for that.
+        return None
+    if _bend(reported) > STRAIGHT:
+        return None
+    carrying = points.pressure > 0
+    pushes = (points.pressure * points.weight)[carrying, None] * points.normal[carrying]
+    slave, master = (pushes[points.on_master[carrying] == side].sum(axis=0) for side in (False, True))
+    forces = reported.forces[: reported.state.interface.n_slave_nodes].sum(axis=0)
+    both = slave - master + forces
+    # In half passes each surface is pushed by its own points alone, and hands nothing on.
+    alone = max(slave + forces, master - forces, key=lambda difference: float(np.abs(difference).max()))
+    nearest: FloatArray = min(both, alone, key=lambda difference: float(np.abs(difference).max()))
+    return nearest
+
+
+def _bend(reported: Reported) -> float:
+    """Return by how much the normals of the slave differ where weighted nodes lie on it; 0 if there are none.
+
+    A pressure between two nodes acts along the normal of its segment, and is reported along that of a node.
+    """
+    bend = 0.0
+    for each in reported.passes:
+        if each.points.weighted.any():
+            ends = each.positions[each.interface.slave.faces]
+            if each.interface.dim == PLANE:
+                ways = (ends[:, 1] - ends[:, 0]) / each.interface.slave.lengths(each.positions)[:, None]
+            else:
+                ways = turns_of(ends).sum(axis=1)
+                ways /= _norms(ways)[:, None]
+            bend = max(bend, float(np.ptp(ways, axis=0).max()))
+    return bend
+
+
+def _thinness(reported: Reported) -> float:
+    """Return the largest slave segment over the weight of an active weighted node on it; 0 if there are none.
+
+    Dual shapes on a covered share of a segment are differences of places, which are rounded by u over that share.
+    """
+    thinness = 0.0
+    for each in reported.passes if reported.state.interface.dim == PLANE else ():
+        points = each.points.select(each.points.weighted & each.points.active & name_places(each.points))
+        length = each.interface.slave.lengths(each.positions)[points.slave_segment]
+        with np.errstate(divide="ignore"):
+            thinness = max(thinness, largest(length / points.weight))
+    return thinness
+
+
+def _foot_error(each: Pass, reported: Reported) -> float:
+    """Return the largest |position − foot − gap × normal| over the lengths that these vectors are formed from.
+
+    A foot along the slave's normal is a quotient by the cosine of the angle between the surfaces, and so is its gap. So
+    the lengths are over that cosine. A kernel that rounds nodes at D turns the segment whose normal it takes by uD/ℓ,
+    which moves the end of gap × normal by |gap| uD/ℓ, and ξ past an end by |ξ| uD/ℓ.
+    """
+    if each.interface.dim != PLANE:
+        places = FacePlaces.from_pass(each, reported.traits.rules.gap, reported.distant)
+        points, nodes = places.reported, each.positions[each.interface.master.faces]
+        foot = np.einsum("qk,qki->qi", points.master_shape, nodes[points.master_segment])
+        errors = points.position - foot - points.gap[:, None] * points.normal
+        return largest(_norms(errors) / (np.abs(each.positions).max() + places.scale))
+    named = name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
+    points = each.points.select(named & np.isfinite(each.points.gap))
+    first, second = np.swapaxes(each.positions[each.interface.master.segments[points.master_segment]], 0, 1)
+    arm, along = points.position - first, second - first
+    errors = arm - points.xi[:, None] * along - points.gap[:, None] * points.normal
+    far = np.abs(each.positions).max()
+    length = np.hypot(along[:, 0], along[:, 1])
+    carrier = each.interface.slave.lengths(each.positions)[points.slave_segment]
+    if reported.traits.rules.gap == CLOSEST:
+        carrier = length
+    size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * length
+    size += reported.distant * (np.abs(points.gap) / carrier + np.abs(points.xi))
+    cosine = np.abs(along[:, 0] * points.normal[:, 1] - along[:, 1] * points.normal[:, 0]) / length
+    return largest(np.hypot(errors[:, 0], errors[:, 1]) * cosine / size)
+
+
+def _has_linear_law(traits: Traits) -> bool:
+    """Return whether a pressure is −ε̂ × the gap that is reported beside it."""
+    if traits.rules.enforcement != "penalty" or traits.rules.gap in (None, "cells and nodes"):
+        return False
+    return traits.rules.penalty == "distributed" and traits.rules.area is not None

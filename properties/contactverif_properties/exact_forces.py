@@ -1,0 +1,414 @@
+"""The exact forces of a uniform pressure on a flat interface, and of a linear gap on a straight slave; the worst force.
+
+A formulation measures the gap along the master's normal or along the slave's, and pushes along one of them. Its traits
+`gap` and `force_along` say which. Gaps are computed in rationals from the stored nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.case import Case
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import PLANE, Interface, Surface
+from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import Traits
+from contactverif.mechanics.linear import RANK_ROUNDOFF
+from contactverif.mechanics.scene import Scene
+from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights
+from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
+from contactverif_properties.roundoff import COORDINATE_ROUNDING, gap_tolerance
+from contactverif_properties.states import FrozenState
+
+COMPONENTS = {2: "x and y", 3: "x, y and z"}  # The components of a vector in words, by their number.
+_ASIDE = 2.0**-20  # The part of a force that may point aside by roundoff if both lie on one line.
+
+
+def worst_force(
+    interface: Interface, forces: FloatArray, exact: FloatArray, names: tuple[str, str] = ("force", "exact")
+) -> Finding:
+    """Return the force at the node where it errs most, beside the exact one, in the words of `names`.
+
+    The forces (n, dim) push all nodes, or those of the slave alone. If both lie on one line, the finding has two
+    numbers, counted along the exact force, with their ratio; else the components of both.
+    """
+    node = int(np.linalg.norm(forces - exact, axis=1).argmax())
+    return _beside(describe_node(interface, node), forces[node], exact[node], names)
+
+
+def total_force(total: FloatArray, exact: FloatArray) -> Finding:
+    """Return the total force (dim,) on the slave beside the exact one, as `worst_force` does for a node."""
+    return _beside("all slave nodes together", total, exact, ("force", "exact"))
+
+
+def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, str]) -> Finding:
+    """Return a force beside the one that is right: one number of each if they lie on one line."""
+    line = right if right.any() else force
+    direction = line / np.linalg.norm(line)
+    aside = distance_from_line(force, direction)
+    if not aside <= _ASIDE * float(np.abs(np.stack([force, right])).max()):
+        return Finding(f"{place}, {COMPONENTS[len(force)]}", tuple(force), tuple(right), "N", *names)
+    along, size = float(force @ direction), float(right @ direction)
+    return Finding(place, (along,), (size,), "N", *names, _tell_ratio(along, size) if size else "")
+
+
+def _tell_ratio(force: float, right: float) -> str:
+    """Return a force over the right one in words, and by how much it differs from 1 if four digits do not say that."""
+    ratio, difference = f"ratio {force / right:.4g}", (force - right) / right
+    if ratio != "ratio 1" or difference == 0:
+        return ratio
+    return f"{ratio} {'+' if difference > 0 else '−'} {abs(difference):.2g}"
+
+
+def distance_from_line(force: FloatArray, direction: FloatArray) -> float:
+    """Return the part of a force (dim,) across a unit vector (dim,)."""
+    if len(force) == PLANE:
+        return abs(float(force[0] * direction[1] - force[1] * direction[0]))
+    return float(np.linalg.norm(np.cross(force, direction)))
+
+
+def describe_node(interface: Interface, node: int) -> str:
+    """Return a node in words: its side, its number, and whether the side ends there."""
+    on_slave = node < interface.n_slave_nodes
+    surface = interface.slave if on_slave else interface.master
+    at_border = surface.neighbours < 0
+    if interface.dim != PLANE:  # A border edge runs from its corner to the next one.
+        at_border = at_border | np.roll(at_border, 1, axis=1)
+    border = "(free end)" if interface.dim == PLANE else "(border)"
+    return f"{'slave' if on_slave else 'master'} node {node}{f' {border}' if node in surface.faces[at_border] else ''}"
+
+
+def normal_of(case: Case) -> FloatArray:
+    """Return the unit normal (dim,) out of the master of a flat case: in the plane, to the left of the slave's way."""
+    if case.interface.dim != PLANE:
+        return case.parameters["normal"]
+    along = case.parameters["direction"]
+    return np.array([-along[1], along[0]])
+
+
+def gap_error(case: Case, penetration: float, size: float) -> float:
+    """Return by how much a node departs from a plane slave at `penetration` below a plane master, over `size`.
+
+    A slave node beside the master stands for the place opposite the master's end, since what overhangs may bend.
+    """
+    heights = case.positions @ normal_of(case)
+    n_slave = case.interface.n_slave_nodes
+    slave, master = np.split(case.parameters["along"], [n_slave])
+    order = np.argsort(slave)
+    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
+    level = heights[n_slave:].mean()
+    errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
+    return float(errors.max() / size)
+
+
+def push_apart(case: Case, weights: FloatArray, pressure: float) -> FloatArray:
+    """Return the forces (n_nodes, dim) of a pressure over weights (n_nodes,), which push the two bodies apart."""
+    sides = np.where(np.arange(len(weights)) < case.interface.n_slave_nodes, 1.0, -1.0)
+    return pressure * (sides * weights)[:, None] * normal_of(case)
+
+
+def consistent_forces(case: Case, pressure: float) -> FloatArray:
+    """Return the forces (n_nodes, dim) by which a uniform pressure pushes the nodes of a flat case, exactly.
+
+    They are p ∫N_i over the part of the line that both surfaces cover, in rationals. The parameters `along` (n_nodes,)
+    and `direction` (2,) say where the nodes lie on the line. In space `plane` (n_nodes, 2) says where they lie, and
+    `domain` is what both surfaces cover.
+    """
+    if case.interface.dim != PLANE:
+        plane, domain = case.parameters["plane"], case.parameters["domain"]
+        return push_apart(case, uniform_surface_weights(case.interface, plane, domain), pressure)
+    return push_apart(case, uniform_pressure_weights(case.interface, case.parameters["along"]), pressure)
+
+
+def forces_of_penetration(case: Case) -> FloatArray:
+    """Return the consistent forces (n_nodes, dim) of the pressure ε̂ |g| of a flat case with a uniform penetration."""
+    return consistent_forces(case, case.penalty * case.parameter("penetration"))
+
+
+def uniform_state(case: Case, subject: Subject, pressure: float | None = None) -> FrozenState:
+    """Return the formulation in the state of a case; multipliers, if any, are all the pressure, ε̂ |g| by default."""
+    if pressure is None:
+        pressure = case.penalty * case.parameter("penetration")
+    return FrozenState.with_multiplier(subject.for_case(case), case, pressure)
+
+
+def pushing_forces(state: FrozenState) -> FloatArray:
+    """Return the forces (n_nodes, dim) that push the nodes; of multipliers, if there are any, theirs alone."""
+    if state.case.n_multipliers:
+        return -(unit_forces(state) @ state.case.multipliers).reshape(state.case.interface.nodes.shape)
+    return -state.forces
+
+
+def forces_of_gap(case: Case, subject: Subject, exact: FloatArray) -> tuple[FloatArray, float]:
+    """Return the forces (n_nodes, dim) of a state that penetrates uniformly, to be compared with the exact ones.
+
+    With multipliers only the distribution of the forces can be right or wrong, and not their size. Uniform multipliers
+    count if they are pressures, scaled to the exact total. If they are nodal forces, those count that come nearest to
+    the exact forces. The second number is the largest multiplier over the mean one, by which roundoff grows; it is 1
+    without nodal multipliers. Of a barrier, whose law is its own, the forces are scaled to the exact total, too.
+    """
+    state = uniform_state(case, subject)
+    n = case.interface.n_slave_nodes
+    if subject.traits.rules.enforcement == "barrier":
+        return _scale_to_total(-state.forces, exact, n), 1.0
+    if not state.case.n_multipliers:
+        return -state.forces, 1.0
+    transfer = -unit_forces(state)
+    if subject.traits.rules.penalty == "nodal":
+        multipliers = np.linalg.lstsq(transfer, exact.reshape(-1), rcond=None)[0]
+        mean = float(np.abs(multipliers).mean())
+        largest = float(np.abs(multipliers).max()) / mean if mean > 0 else 1.0
+        return (transfer @ multipliers).reshape(exact.shape), largest
+    return _scale_to_total((transfer @ state.case.multipliers).reshape(exact.shape), exact, n), 1.0
+
+
+def _scale_to_total(forces: FloatArray, exact: FloatArray, n_slave: int) -> FloatArray:
+    """Return forces (n_nodes, dim) times the factor with which those on the slave press as the exact ones do."""
+    total, exact_total = forces[:n_slave].sum(axis=0), exact[:n_slave].sum(axis=0)
+    projection = float(total @ exact_total)
+    return forces * (float(exact_total @ exact_total) / projection if projection > 0 else 1.0)
+
+
+def measure_transmission(quantity: Quantity, case: Case, subject: Subject) -> Measurement:
+    """Measure the largest |F − F_exact| of a uniform penetration over the force on the slave.
+
+    In space it counts over the largest exact force on a node, which is the larger share of meshes with more nodes.
+    The tolerance is `GAP_TOLERANCE`, times the largest nodal multiplier over the mean one.
+    """
+    exact = forces_of_penetration(case)
+    if case.interface.dim == PLANE:
+        size = float(np.linalg.norm(exact[: case.interface.n_slave_nodes].sum(axis=0)))
+    else:
+        size = float(np.linalg.norm(exact, axis=1).max())
+    forces, largest = forces_of_gap(case, subject, exact)
+    error = float(np.linalg.norm(forces - exact, axis=1).max())
+    number = quantity.check(error / size, gap_tolerance(case, case.parameter("penetration")) * largest)
+    return Measurement([number], finding=worst_force(case.interface, forces, exact) if number.ratio > 1 else None)
+
+
+def unit_forces(state: FrozenState) -> FloatArray:
+    """Return what a unit of each multiplier adds to the position rows of the residual (n_unknowns, n_multipliers).
+
+    On a frozen pairing the residual is affine in the multipliers. What it holds without any multiplier, as that of an
+    augmented Lagrangian does, is subtracted. The formulation is asked with multipliers as large as those of the case,
+    rounded to a power of two: roundoff would hide a unit beside a large penalty force.
+    """
+    case = state.case
+    n, count = case.interface.n_unknowns, case.n_multipliers
+    largest = float(np.abs(case.multipliers).max(initial=0.0))
+    size = 2.0 ** round(np.log2(largest)) if largest > 0 else 1.0
+    multipliers = np.vstack([size * np.eye(count), np.zeros(count)])
+    states = np.hstack([np.broadcast_to(case.z[:n], (count + 1, n)), multipliers])
+    forces = state.residual_at(states)[:, :n]
+    columns: FloatArray = (forces[:-1] - forces[-1]).T / size
+    return columns
+
+
+def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulation, pressure: float) -> FloatArray:
+    """Return the multipliers (n_multipliers,) that stand for a uniform pressure in the exact state of the case.
+
+    They are the pressure itself where it gives the exact forces. Else they are the multipliers ≥ 0 that come nearest to
+    those. A multiplier that transmits nothing, as that of a node that faces nothing, is 0.
+    """
+    state = FrozenState.with_multiplier(formulation, case, pressure)
+    uniform, transfer = state.case.multipliers.copy(), -unit_forces(state)
+    exact = consistent_forces(case, pressure).reshape(-1)
+    from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
+
+    nearest: FloatArray = nnls(transfer, exact)[0]  # The formulation would release one below 0.
+    if subject.traits.rules.penalty != "nodal":
+        uniform[~transfer.any(axis=0)] = 0.0
+        errors = [float(np.abs(transfer @ candidate - exact).max()) for candidate in (uniform, nearest)]
+        if errors[0] <= max(2 * errors[1], 1e-12 * float(np.abs(exact).max())):
+            return uniform
+    return nearest
+
+
+def exact_solution(scene: Scene, case: Case, subject: Subject, formulation: CheckedFormulation) -> FloatArray:
+    """Return the unknowns of the exact solution of a uniform scene, and the multipliers behind them if there are any.
+
+    Where multipliers enforce contact, nothing penetrates, whatever the penalty of the case.
+    """
+    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
+    pressure = pressure_of(case, penalty)
+    exact = exact_unknowns(scene, pressure, penalty)
+    if not formulation.n_multipliers(case.interface):
+        return exact
+    state = replace(case, z=scene.positions(exact))
+    return np.append(exact, exact_multipliers(state, subject, formulation, pressure))
+
+
+def nearest_multipliers(
+    case: Case, scene: Scene, formulation: CheckedFormulation, exact: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return, of all multipliers that load the bodies as those of a solved case do, the nearest to the exact ones.
+
+    A combination of multipliers that loads no body may be added to a solution. Such combinations exist where
+    multipliers are not unique, and on a rigid master, where only the sum of the nodal forces counts. The second number
+    is the smallest singular value of the loads of unit multipliers on the bodies over the largest one: forces that are
+    wrong by roundoff leave the multipliers uncertain by roundoff over that number.
+    """
+    solution = case.multipliers
+    loads = scene.transformation.T @ unit_forces(FrozenState.at(formulation, case))
+    _, sizes, directions = linalg.svd(loads)
+    rank = int((sizes > RANK_ROUNDOFF * max(loads.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
+    free = directions[rank:]
+    nearest: FloatArray = solution + free.T @ (free @ (exact - solution))
+    return nearest, float(sizes[rank - 1] / sizes[0]) if rank else 1.0
+
+
+ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that measure along the master's normal.
+
+
+def knows_linear_total(traits: Traits) -> bool:
+    """Return whether the traits say what the total force of a linear gap is."""
+    stated = traits.rules.penalty == "distributed" and None not in (traits.rules.area, traits.rules.force_along)
+    return stated and (traits.rules.gap is not None or traits.rules.enforcement == "multiplier")
+
+
+def slave_forces(case: Case, subject: Subject) -> FloatArray:
+    """Return the forces (n_slave_nodes, dim) that push the slave; multipliers are all `uniform_multiplier`."""
+    forces = pushing_forces(uniform_state(case, subject, uniform_multiplier(case)))
+    return forces[: case.interface.n_slave_nodes]
+
+
+def uniform_multiplier(case: Case) -> float:
+    """Return the pressure of a mean gap along the master's normal, ε̂ |g|."""
+    return case.penalty * abs(float(node_gaps(case).mean()))
+
+
+def node_gaps(case: Case) -> FloatArray:
+    """Return the gaps (n_slave_nodes,) of the slave's nodes along the master's normal, each rounded once."""
+    if case.interface.dim != PLANE:
+        corners = _largest_face(case, case.interface.master)
+        normal = _normal_of_face(corners)
+        heights = (_exact(case.positions[: case.interface.n_slave_nodes]) - corners[0]) @ normal
+        return np.array([float(height) for height in heights]) / sqrt(normal @ normal)
+    first, second = _longest_segment(case)
+    along, arms = second - first, _exact(case.positions[: case.interface.n_slave_nodes]) - first
+    areas = arms[:, 0] * along[1] - arms[:, 1] * along[0]
+    return np.array([float(area) for area in areas]) / sqrt(along @ along)
+
+
+def directions(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the unit normals (dim,) along the master's and along the slave's, both out of the master."""
+    if case.interface.dim != PLANE:
+        faces = [_largest_face(case, side) for side in (case.interface.master, case.interface.slave)]
+        of_master, of_slave = (_unit(_normal_of_face(corners)) for corners in faces)
+        return of_master, -of_slave
+    ends = _longest_segment(case), _exact(case.positions[case.interface.slave.segments[0]])
+    (x, y), (x_slave, y_slave) = (second - first for first, second in ends)
+    return (
+        np.array([float(y), -float(x)]) / sqrt(x * x + y * y),
+        np.array([-float(y_slave), float(x_slave)]) / sqrt(x_slave * x_slave + y_slave * y_slave),
+    )
+
+
+def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
+    """Return the exact integrals ε̂ ∫N_i |g| ds n (n_slave_nodes, dim) that push the slave's nodes.
+
+    The traits `gap` and `force_along` name the normals, `area` the configuration of ds. With multipliers the pressure
+    is `uniform_multiplier` everywhere. The sum is the total of every formulation with these traits.
+    """
+    interface, (of_master, of_slave) = case.interface, directions(case)
+    measures = interface.slave.measures(interface.nodes if traits.rules.area == "reference" else case.positions)
+    depths = -node_gaps(case) / (1.0 if traits.rules.gap in ALONG_MASTER else float(of_master @ of_slave))
+    pressures = case.penalty * depths
+    if traits.rules.enforcement == "multiplier":
+        pressures = np.full_like(pressures, uniform_multiplier(case))
+    nodal = np.zeros(interface.n_slave_nodes)
+    if interface.dim == PLANE:
+        for (a, b), length in zip(interface.slave.segments, measures, strict=True):
+            nodal[a] += length * (2 * pressures[a] + pressures[b]) / 6
+            nodal[b] += length * (pressures[a] + 2 * pressures[b]) / 6
+    else:  # ∫ N_i N_j over a triangle is a twelfth of its area, and a sixth for i = j.
+        for face, area in zip(interface.slave.faces, measures, strict=True):
+            nodal[face] += area * (pressures[face] + pressures[face].sum()) / 12
+    return np.outer(nodal, of_master if traits.rules.force_along == "master normal" else of_slave)
+
+
+def _longest_segment(case: Case) -> NDArray[Any]:
+    """Return the exact ends (2, 2) of the longest master segment, on whose line all others lie."""
+    master = case.interface.master
+    return _exact(case.positions[master.segments[int(np.argmax(master.lengths(case.positions)))]])
+
+
+def _largest_face(case: Case, surface: Surface) -> NDArray[Any]:
+    """Return the exact corners (3, 3) of the largest triangle of a plane surface."""
+    return _exact(case.positions[surface.faces[int(np.argmax(surface.measures(case.positions)))]])
+
+
+def _normal_of_face(corners: NDArray[Any]) -> NDArray[Any]:
+    """Return the exact normal (3,) of a triangle, as long as twice its area, out of its body."""
+    (a, b, c), (d, e, f) = corners[1] - corners[0], corners[2] - corners[0]
+    return np.array([b * f - c * e, c * d - a * f, a * e - b * d], dtype=object)
+
+
+def _unit(vector: NDArray[Any]) -> FloatArray:
+    """Return an exact vector (3,) over its length."""
+    return np.array([float(entry) for entry in vector]) / sqrt(vector @ vector)
+
+
+def _exact(points: FloatArray) -> NDArray[Any]:
+    """Return points as an array of fractions."""
+    return np.array([Fraction(value) for value in points.reshape(-1).tolist()], dtype=object).reshape(points.shape)
+
+
+def point_errors(state: FrozenState, penalty: float, pressure: float) -> tuple[float, float]:
+    """Return the largest error of a reported gap over p/ε̂, and of a reported pressure over p.
+
+    Idle points do not count if they have no weight, no master segment, or lie beside the master. The error of the
+    pressure is infinite if no point counts.
+    """
+    points = state.points
+    in_contact = points.active | (points.master_segment >= 0) & ~beside_master(state.case, points)
+    counted = (points.weight != 0) & in_contact
+    gaps = np.where(counted, points.gap, -pressure / penalty)  # A gap is NaN where it is meaningless.
+    gap = float(np.nanmax(np.abs(gaps * penalty / pressure + 1), initial=0.0))
+    pressures = np.where(points.active, points.pressure, 0.0)[counted]
+    if not len(pressures):
+        return gap, np.inf
+    return gap, float(np.abs(pressures - pressure).max(initial=0.0) / pressure)
+
+
+def beside_master(case: Case, points: ContactPoints) -> BoolArray:
+    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end; in space none does.
+
+    A point that names no place on its surface does not lie beside the other. Where the master covers the slave, no
+    point of the slave does. A point of a second pass lies on the master, and the other surface is the slave.
+    """
+    beside = np.zeros(len(points.c), bool)
+    if case.interface.dim != PLANE:
+        return beside
+    covered = not overhangs(case)
+    rounding = COORDINATE_ROUNDING * case.largest_coordinate
+    interface, along = case.interface, case.parameters["along"]
+    for surface, other, second in (
+        (interface.slave, interface.master, False),
+        (interface.master, interface.slave, True),
+    ):
+        here = (points.on_master == second) & (points.slave_segment >= 0)
+        if here.any() and (second or not covered):
+            ends, c = along[surface.segments[points.slave_segment[here]]], points.c[here]
+            place = (1 - c) / 2 * ends[:, 0] + (1 + c) / 2 * ends[:, 1]
+            beside[here] = ~_faces(place, other, along, rounding)
+    return beside
+
+
+def _faces(place: FloatArray, surface: Surface, along: FloatArray, rounding: float) -> BoolArray:
+    """Return which places (n,) along the interface a surface covers, up to `rounding` from its free ends."""
+    ends = along[surface.segments]  # (n_segments, 2)
+    inwards = np.sign(ends[:, ::-1] - ends)
+    ends = ends + np.where(surface.neighbours < 0, rounding, -rounding) * inwards
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    covered: BoolArray = ((place[:, None] >= low) & (place[:, None] <= high)).any(axis=1)
+    return covered

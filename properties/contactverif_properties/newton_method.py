@@ -1,0 +1,769 @@
+"""Newton's method: its order and history, other units of length and force, and the accuracy that it attains.
+
+Distances from a solution are lengths: a multiplier counts as the length that changes the forces by as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import ceil, frexp, inf, ldexp, log, log2
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+from scipy import linalg
+
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
+from contactverif.contract.case import Case
+from contactverif.contract.cases import Cases
+from contactverif.contract.errors import ContractError
+from contactverif.contract.interface import Interface
+from contactverif.contract.measurement import Measurement, Quantity, check_all
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.property import Property
+from contactverif.contract.subject import Call, Subject
+from contactverif.mechanics.changed_scenes import change_units, move, snap
+from contactverif.mechanics.linear import Step, scale_factors
+from contactverif.mechanics.newton import MAX_ITERATIONS, solve
+from contactverif.mechanics.scene import Scene, scene_of
+from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
+from contactverif.mechanics.trace import End, Trace
+from contactverif.strategies.solids import closed_cases, solid_cases
+from contactverif_properties.applicability import (
+    promise_exact_tangent,
+    refuse_dependent_multipliers,
+    refuse_unknown_pressure,
+)
+from contactverif_properties.kinks import find_kink
+from contactverif_properties.roundoff import (
+    COORDINATE_ROUNDING,
+    MOST_ROUNDINGS,
+    Conditioning,
+    conditioning_of,
+    difference_quotient,
+    forces_quantity,
+    ratio,
+)
+from contactverif_properties.states import FrozenState, random_directions
+
+# With a right tangent most solutions take fewer iterations. What takes more is found with differences as well, which
+# make use of a tangent that they confirm.
+FEW_ITERATIONS = 12
+LOAD_STEPS = (4, 16)  # The numbers of load steps that are tried where a solution in one step is not found.
+
+
+def find_solution(system: System) -> Trace:
+    """Solve the scene with the formulation's own tangent, else with differences, else with differences in load steps.
+
+    A wrong tangent may never get there, and is judged at the solution all the same. Full steps may miss a solution
+    that is there, because they overshoot into another pairing.
+    """
+    for use_tangent, load_steps in ((True, 1), *((False, number) for number in (1, *LOAD_STEPS))):
+        trace = solve(
+            system.scene,
+            system.formulation,
+            use_tangent=use_tangent,
+            load_steps=load_steps,
+            iterations=FEW_ITERATIONS if use_tangent else MAX_ITERATIONS,
+            solution_only=not use_tangent,
+        )
+        if trace.converged:
+            break
+    return trace
+
+
+def solution_floor(scene: Scene, solution: FloatArray, units: FloatArray, condition: float) -> float:
+    """Return the distance from a solution, a length, below which roundoff decides: max(1e3 u/cond, 30 u X).
+
+    The solution is (n_free + n_multipliers,), as are the units of its unknowns that correspond to a unit of length
+    (`scale_factors`). The reciprocal condition of the matrix there is above 0.
+    """
+    size = float(np.abs(solution / units).max() + np.abs(scene.imposed_displacements).max())
+    solved_to = 1e3 * UNIT_ROUNDOFF / condition * size
+    rounded_to = 30 * UNIT_ROUNDOFF * float(np.abs(scene.positions(solution[: scene.n_free])).max())
+    return max(solved_to, rounded_to)
+
+
+def is_untouched(trace: Trace) -> bool:
+    """Return whether the formulation gives no force at the last iterate, so that only the bodies were solved."""
+    return not trace.forces[: trace.scene.interface.n_unknowns].any()
+
+
+def end_details(trace: Trace) -> dict[str, float]:
+    """Return how a solution ended, its iterations, and how many multipliers were redundant, if there are any."""
+    details = {"end": float(trace.end), "iterations": float(trace.n_iterations)}
+    if len(trace.multipliers):
+        details["redundant multipliers"] = float(trace.deficiency)
+    return details
+
+
+def solution_details(trace: Trace) -> dict[str, float]:
+    """Return the details of `end_details`, the number of changes of the pairing, and the last residual."""
+    return end_details(trace) | {
+        "changes of pairing": float((trace.changes > 0).sum()),
+        "last residual in roundoffs": float(trace.roundings[-1]),
+    }
+
+
+NEAR = 1e-4  # The order shows once the residual is below this share of the first one.
+NOISE = 32.0  # Roundoffs of a residual that count as converged where nothing lower is reached.
+SHORT = 3  # A whole solution of so few iterations needs no explanation.
+LONG = 10  # With an exact tangent and one pairing, Newton's method ends within so many iterations or never does.
+SPARE = 3  # Iterations allowed beyond those that double the digits.
+SERIES = {"residual": "N", "energy norm": "N m", "changes of the pairing": "1", "reciprocal condition": "1"}
+FINAL_ITERATIONS = Quantity(
+    "final iterations",
+    "⌈log2(log ρ_end / log ρ)⌉ + 3",
+    "Once the pairing has settled and the residual is at ρ ≤ 1e-4 of the first, each step doubles the digits. "
+    "Three iterations are to spare.",
+)
+DISTANCES = tuple(3.0 * 10.0 ** (-k / 2) for k in range(4, 12))  # From 3e-2 to 1e-5, over the shortest segment.
+N_DIRECTIONS = 2
+N_FITTED = 3  # The number of distances, the nearest ones, that a slope is fitted to.
+RISING = 0.02  # A slope that grows by more than this between neighbours has not settled yet.
+EXACT = 1e-2  # A floor up to this share of the shortest distance cannot hide linear convergence.
+LINEAR, QUADRATIC = 1.1, 1.9  # A slope up to the first is linear, one from the second on is quadratic.
+ORDER = Quantity(
+    "order of one Newton step",
+    "1.9",
+    "From states of the same pairing, |u1 − u*| falls like |u0 − u*|², less what is left of the third power.",
+    sense="at least",
+)
+
+
+def history(trace: Trace) -> dict[str, FloatArray]:
+    """Return the series of a solution by iterate, under the names of SERIES."""
+    columns = (trace.residuals, trace.energies, trace.changes.astype(np.float64), trace.conditions)
+    return dict(zip(SERIES, columns, strict=True))
+
+
+_define = partial(
+    Property.define,
+    family="newton",
+    cases=Cases.random(solid_cases),
+    promise=promise_exact_tangent,
+    needs=frozenset({"tangent"}),
+    applicable=refuse_dependent_multipliers,
+    bodies=True,
+    usual_undecided=0.004,
+)
+
+
+@_define(id="newton.history", rank=560, quantities=(FINAL_ITERATIONS,), series=SERIES)
+def newton_history(case: Case, subject: Subject) -> Measurement:
+    """Once the pairing has settled, Newton's method falls to roundoff in a few iterations.
+
+    **Question.** A whole scene is solved. From the first iterate that has the final pairing and a residual of at most
+    1e-4 of the first, how many iterations lead down to roundoff?
+
+    **Why it matters.** This is what a user sees: the last lines of a solver's log. With an exact tangent each step
+    doubles the correct digits.
+
+    **How it is judged.** The number of iterations must be at most ⌈log2(log ρ_end / log ρ)⌉ + 3, for a residual that
+    begins at ρ and ends at ρ_end, both over the first residual: each step doubles the digits, and 3 are to spare. The
+    whole history is kept: residuals, energy norms, changes of the pairing, conditions. A scene whose pairing does not
+    settle is solved again in 4 load steps, and in 16.
+
+    **Undecided.** Where the pairing changes to the last iterate, which is normal on kinked surfaces, where there is no
+    pairing to tell whether a kink is in the way, and where the residual has a noise that roundoff does not explain.
+    """
+    system = System(scene_of(case), subject.for_case(case))
+    trace = solve(system.scene, system.formulation)
+    undecided = _find_excuse(system, trace)
+    for load_steps in LOAD_STEPS:  # Smaller load steps overshoot less, so that the pairing may settle.
+        if not undecided:
+            break
+        trace = solve(system.scene, system.formulation, load_steps=load_steps)
+        undecided = _find_excuse(system, trace)
+    details, series = solution_details(trace), history(trace)
+    if undecided:
+        return Measurement(details=details, series=series, undecided=undecided)
+    begin = _first_final_iterate(system, trace)
+    arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NOISE))
+    iterations = float(max(arrived[0] - begin, 0)) if _is_solved(trace) else inf
+    details["finite"] = float(iterations <= 1)
+    return Measurement(
+        [FINAL_ITERATIONS.check(iterations, float(_allowed_iterations(trace, begin)))],
+        details=details,
+        series=series,
+        idle=is_untouched(trace),
+    )
+
+
+def _settling_iterate(system: System, trace: Trace) -> int:
+    """Return the last iterate at which the pairing changed in more than entries that no force depends on, or 0."""
+    for number in np.flatnonzero(trace.changes > 0)[::-1].tolist():
+        if not _gives_same_forces(system, trace.u[number], trace.pairings[number], trace.pairings[number - 1]):
+            return int(number)
+    return 0
+
+
+def _gives_same_forces(system: System, u: FloatArray, pairing: Pairing | None, other: Pairing | None) -> bool:
+    """Return whether two pairings give the same forces at u bit by bit: roundoff may decide what else they hold.
+
+    Far from its own state a pairing may give no forces at all.
+    """
+    try:
+        return pairing == other or bool((system.forces(u, pairing) == system.forces(u, other)).all())
+    except ContractError:
+        return False
+
+
+def _is_solved(trace: Trace) -> bool:
+    return trace.converged or (trace.end is End.STAGNATED and bool(trace.roundings.min() <= NOISE))
+
+
+def _find_excuse(system: System, trace: Trace) -> str:
+    """Return why the solution decides nothing about the tangent, or an empty string."""
+    last, settled = len(trace.residuals) - 1, _settling_iterate(system, trace)
+    if _is_solved(trace):
+        return f"the pairing does not settle: {trace.end.label}" if settled == last > SHORT else ""
+    if last - settled < LONG:
+        return f"the pairing does not settle: {trace.end.label}"
+    if trace.changes.max() < 0:
+        return f"there is no pairing that could tell whether a kink is in the way: {trace.end.label}"
+    if trace.end is End.STAGNATED:
+        return "the residual has a noise that roundoff does not explain"
+    return ""
+
+
+def _first_final_iterate(system: System, trace: Trace) -> int:
+    """Return the first iterate with the final pairing and a residual of at most NEAR of the first one."""
+    settled = _settling_iterate(system, trace)
+    near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
+    near = near[near >= settled]
+    return int(near[0]) if len(near) else settled
+
+
+def _allowed_iterations(trace: Trace, begin: int) -> int:
+    """Return ⌈log2(log ρ_end / log ρ)⌉ + 3, with residuals over the first one."""
+    rho, rho_end = (
+        max(residual / trace.residuals[0], np.finfo(float).tiny)
+        for residual in (trace.residuals[begin], trace.floors[-1])
+    )
+    return ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
+
+
+@_define(id="newton.order", rank=460, quantities=(ORDER,))
+def newton_order(case: Case, subject: Subject) -> Measurement:
+    """One Newton step from near a solution ends at a distance of second order.
+
+    **Question.** A Newton step starts at a small distance from the solution of a random scene, with the pairing of the
+    solution. How fast does the distance after the step fall with the distance before it?
+
+    **Why it matters.** A tangent with a forgotten term may still converge, but slowly: an analysis then takes more
+    iterations and smaller load steps. One step near the solution shows the order; the residuals of a whole solution
+    often hide it.
+
+    **How it is judged.** Steps start at distances of 3e-2 to 1e-5 ℓ in two random directions. The measured number is
+    the slope of log |u1 − u*| over log |u0 − u*| at the three nearest distances where |u1 − u*| is above 1e3 u cond;
+    the lower direction counts. It must be at least 1.9, since Newton's method has 2 less what is left of the third
+    power. There is no number where the step meets the solution exactly. If the slope is near 1, the rate and the
+    spectral radius of I − K⁻¹ ∂R/∂u are kept beside it.
+
+    **Undecided.** Where Newton's method finds no solution, where the matrix has no inverse, where too few states near
+    the solution pair like it, and where the derivative by differences gives no better order.
+
+    **Source.** Zavarise & De Lorenzis (2009), Fig. 30, where the spectral radius is the rate of the basic version.
+    """
+    scene = scene_of(case)
+    system = System(scene, subject.for_case(case))
+    trace = find_solution(system)
+    details = solution_details(trace)
+    if not trace.converged:
+        return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
+    solution = trace.u[-1]
+    matrix, _ = system.matrix(solution, trace.pairing)
+    condition = system.step(matrix, np.zeros(system.size)).condition
+    if condition <= system.size * UNIT_ROUNDOFF:
+        return Measurement(details=details, undecided="the matrix has no inverse at the solution")
+    steps = fit_steps(system, case, trace, matrix, condition)
+    details["rate"], details["steps"] = steps.rate, float(steps.count)
+    if np.isnan(steps.order):
+        return Measurement(details=details, undecided="a kink: too few states near the solution pair like it")
+    undecided = ""
+    if steps.order < QUADRATIC:
+        by_differences = replace(system, use_tangent=False)
+        exact, _ = by_differences.matrix(solution, trace.pairing)
+        details["spectral radius"] = spectral_radius(matrix, exact)
+        if not fit_steps(by_differences, case, trace, exact, condition, [steps.worst]).order >= QUADRATIC:
+            undecided = "a kink: with the derivative by differences, Newton's order is no better"
+    linear = steps.order == inf  # One step solves a linear problem, which has no order.
+    return Measurement(
+        [] if linear else [ORDER.check(steps.order, QUADRATIC)],
+        details=details,
+        undecided=undecided,
+        idle=is_untouched(trace),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The order and rate of single Newton steps from around a solution."""
+
+    order: float  # The lower order of the directions; NaN if none decides.
+    rate: float  # The higher rate of the directions.
+    count: int  # The number of steps that started with the pairing of the solution.
+    worst: int  # The direction with the lowest order.
+
+
+def fit_steps(
+    system: System,
+    case: Case,
+    trace: Trace,
+    matrix: Any,
+    condition: float,
+    directions: Sequence[int] = range(N_DIRECTIONS),
+) -> Steps:
+    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
+
+    The matrix is the one at the solution, and the condition its reciprocal condition. Directions have numbers.
+    """
+    solution, pairing, length = trace.u[-1], trace.pairing, case.shortest_segment
+    units = scale_factors(matrix, system.scene.n_free)[1]
+    floor = solution_floor(system.scene, solution, units, condition)
+    fits, count = [], 0
+    for direction in random_directions(case.seed, N_DIRECTIONS, system.size)[list(directions)]:
+        before, after = [], []
+        distances = [distance * length for distance in DISTANCES]
+        states = [solution + distance * direction * units for distance in distances]
+        alike = _pair_alike(system, case, pairing, states, distances)
+        near = [place for place, is_alike in zip(zip(distances, states, strict=True), alike, strict=True) if is_alike]
+        both = system.forces_and_tangents([u for _, u in near], pairing)
+        for (distance, u), (forces, tangent) in zip(near, both, strict=True):
+            matrix = system.stiffness + system.contact_stiffness(u, pairing, tangent)
+            step = system.step(matrix, -system.balance(u, forces)).change
+            count += 1
+            before.append(distance)
+            after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
+        fits.append(fit_order(np.array(before), np.array(after), floor))
+    numbered = [(*fit, number) for number, fit in zip(directions, fits, strict=True)]
+    decisive = [fit for fit in numbered if not np.isnan(fit[0])] or [(np.nan, np.nan, 0)]
+    order, _, worst = min(decisive)
+    return Steps(order, max(rate for _, rate, _ in decisive), count, worst)
+
+
+def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
+    """Fit the slope of log after over log before at the nearest distances above the floor, where roundoff decides.
+
+    Distances (n_steps,) from the solution before a step descend; those after it are infinite where the matrix had no
+    inverse. The slope is infinite where even the longest distance ends at the floor: one step is exact. It is NaN where
+    there are too few distances, or where it is below 2 and still rises towards 2 as they fall. Behind it comes the
+    ratio after/before at the nearest distance.
+    """
+    if not len(before):
+        return np.nan, np.nan
+    above = after > floor
+    if not above.any():  # The step is exact, unless roundoff would hide as much as a linear rate.
+        return (inf, 0.0) if floor <= EXACT * before.min() else (np.nan, np.nan)
+    # Once at the floor, always at the floor: an error that rises again at a shorter distance is noise.
+    last = int(np.argmin(above)) if not above.all() else len(above)
+    before, after = before[:last][-N_FITTED:], after[:last][-N_FITTED:]
+    if len(before) < N_FITTED:
+        return np.nan, np.nan
+    if not np.isfinite(after).all():
+        return 0.0, inf
+    slopes = np.diff(np.log(after)) / np.diff(np.log(before))
+    if LINEAR < slopes[-1] < QUADRATIC and slopes[-1] > slopes[0] + RISING:
+        return np.nan, np.nan
+    return float(slopes.mean() if slopes[-1] < QUADRATIC else slopes[-1]), float(after[-1] / before[-1])
+
+
+def spectral_radius(matrix: Any, exact: Any) -> float:
+    """Return the spectral radius of I − K⁻¹ ∂R/∂u, the rate of Newton's method with K (Fig. 30 of the paper)."""
+    rest = np.eye(matrix.shape[0]) - linalg.solve(dense(matrix), dense(exact))
+    return float(np.abs(linalg.eigvals(rest)).max())
+
+
+def _pair_alike(
+    system: System, case: Case, pairing: Pairing | None, states: Sequence[FloatArray], reaches: Sequence[float]
+) -> list[bool]:
+    """Return which states have the forces of the solution's pairing, or without one, around which there is no kink."""
+    if pairing is not None:
+        pairings = [system.pair(u) for u in states]  # All are asked for before one is looked at.
+        return [_gives_same_forces(system, u, pairing, other) for u, other in zip(states, pairings, strict=True)]
+    around = (replace(case, z=system.state(u), n_multipliers=system.n_multipliers) for u in states)
+    return [
+        not find_kink(FrozenState(system.formulation, state, None), reach)
+        for state, reach in zip(around, reaches, strict=True)
+    ]
+
+
+LARGEST_LENGTH, LARGEST_MODULUS = 60, 30  # The largest exponents of 2 and of 4.
+STEP_ROUNDINGS = 1e3  # A linear system is solved to so many roundoffs over its reciprocal condition.
+ITERATIONS = 20  # A method that wanders longer takes steps like those before.
+POSITION_ROUNDINGS = 30.0  # A position, and a difference quotient, are rounded to so many roundoffs.
+STEPS = Quantity(
+    "difference of a step in other units",
+    "1 (times what roundoff does)",
+    "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew, and the "
+    "matrix passes that on by its condition.",
+)
+
+
+@Property.define(
+    id="newton.units",
+    rank=570,
+    family="newton",
+    quantities=(STEPS,),
+    cases=Cases.random(solid_cases),
+    promise=lambda traits: True,
+    applicable=refuse_unknown_pressure,
+    bodies=True,
+)
+def newton_units(case: Case, subject: Subject) -> Measurement:
+    """Newton's method takes the same steps in other units of length and force.
+
+    **Question.** A scene is solved. At each iterate the same step is taken with all lengths multiplied by 2^k and all
+    moduli by 4^j, penalty and loads with them. Are pairing and next iterate the same?
+
+    **Why it matters.** A problem in millimetres and megapascals is the one in metres and pascals. A small number that a
+    tangent or a decision on contact adds, to be safe from zero, has a unit: it is small in one system of units and
+    decides in another. It shows only in solving, as slow convergence or as another active set.
+
+    **How it is judged.** k and j are random, up to ±60 and ±30. Powers of two scale the four operations and square
+    roots exactly, so a formulation that uses nothing else gives the next iterate to the last bit. A power or an angle
+    is rounded anew. Then the difference of the two next iterates counts over what roundoff does to a step Δu, max(1e3 u
+    (|u| + |Δu|)/cond, 30 uX), with 30 (uX/ℓ)^(2/3) |Δu|/cond more where the tangent is a difference quotient. The
+    tolerance is 1. A pairing that differs, and a matrix that has an inverse in other units alone, fail in words.
+
+    **Undecided.** Where the state of the first pairing that differs lies at a kink.
+    """
+    # Strategies repeat seeds from case to case, so the units hang on the state too.
+    scene, random = scene_of(case), np.random.default_rng([case.seed, crc32(case.z.tobytes())])
+    k = int(random.integers(-LARGEST_LENGTH, LARGEST_LENGTH + 1))
+    j = int(random.integers(-LARGEST_MODULUS, LARGEST_MODULUS + 1))
+    length, modulus, penalty = 2.0**k, 4.0**j, subject.penalty(case)
+    distributed = subject.traits.rules.penalty == "distributed"
+    system = System(scene, subject.with_penalty(penalty))
+    rescaled = subject.with_penalty(penalty * modulus / (length if distributed else 1.0))
+    other = System(change_units(scene, length, modulus), rescaled)
+    factors = np.full(system.size, length)
+    factors[scene.n_free :] = modulus * (1.0 if distributed else length)
+
+    trace = solve(scene, system.formulation, iterations=ITERATIONS)
+    units = Units(system, other, factors)
+    differences, broken, undecided = [], "", ""
+    for number in range(len(trace.u)):
+        broken = units.compare_decisions(trace, number)
+        if broken:
+            undecided = explain_pairing(system, case, trace.u[number])
+            break
+        if number + 1 < len(trace.u):
+            differences.append(units.compare_step(case, trace, number))
+    details = solution_details(trace) | {"exponent of lengths": float(k), "exponent of moduli": 2.0 * j}
+    return Measurement(
+        [STEPS.check(max(differences, default=0.0), 1.0)],
+        undecided=undecided,
+        broken=broken,
+        details=details | {"steps that agree to the last bit": float(differences.count(0.0))},
+        idle=is_untouched(trace),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """A scene in two systems of units."""
+
+    system: System  # The scene in its own units and in others, with the formulation.
+    other: System
+    factors: FloatArray  # (n_free + n_multipliers,) The unit of each unknown in the other units.
+
+    def step(self, trace: Trace, number: int) -> Step:
+        """Return the Newton step in the other units from the iterate `number`, on the pairing of both."""
+        u, pairing = trace.u[number] * self.factors, trace.pairings[number]
+        # Asked as `solve` asks: forces of one call with the tangent may be rounded otherwise than forces alone.
+        forces, tangent = self.other.forces_and_tangent(u, pairing)
+        matrix, floor = self.other.assemble(u, pairing, forces, tangent)
+        return self.other.step(matrix, -self.other.balance(u, forces), floor)
+
+    def compare_decisions(self, trace: Trace, number: int) -> str:
+        """Return in words what differs in the other units at the iterate `number`, or an empty string."""
+        if trace.pairings[number] != self.other.pair(trace.u[number] * self.factors):
+            return f"at iterate {number} the pairing is another one in other units"
+        if number + 1 == len(trace.u) and trace.end is End.SINGULAR:
+            step = self.step(trace, number)
+            if step.change is not None and step.condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size:
+                return f"at iterate {number} the matrix has an inverse in other units alone"
+        return ""
+
+    def compare_step(self, case: Case, trace: Trace, number: int) -> float:
+        """Return the difference of the step from the iterate `number` over what roundoff does to it."""
+        u, after, condition = trace.u[number], trace.u[number + 1], float(trace.conditions[number])
+        change = self.step(trace, number).change
+        if change is None:
+            return np.inf if condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size else 0.0
+        difference = (u * self.factors + change) / self.factors - after
+        return measure_step(self.system, case, trace, number, difference) if difference.any() else 0.0
+
+
+def measure_step(system: System, case: Case, trace: Trace, number: int, difference: FloatArray) -> float:
+    """Return the difference (n_unknowns,) of the iterates after iterate `number` over what roundoff does to a step."""
+    u, units = trace.u[number], np.ones(system.size)
+    if system.n_multipliers:
+        units = scale_factors(system.matrix(u, trace.pairings[number])[0], system.scene.n_free)[1]
+    step = float(np.abs((trace.u[number + 1] - u) / units).max())
+    size = float(np.abs(u / units).max() + np.abs(system.scene.imposed_displacements).max()) + step
+    largest = float(np.abs(system.state(u)[: system.scene.interface.n_unknowns]).max())
+    solved_to = STEP_ROUNDINGS * UNIT_ROUNDOFF * size
+    quotient = 0.0
+    if "tangent" not in system.formulation.provides:
+        quotient = POSITION_ROUNDINGS * (UNIT_ROUNDOFF * largest / case.shortest_segment) ** (2 / 3) * step
+    condition = float(trace.conditions[number])
+    roundoff = max(ratio(solved_to, condition), POSITION_ROUNDINGS * UNIT_ROUNDOFF * largest)
+    return ratio(float(np.abs(difference / units).max()), roundoff + ratio(quotient, condition))
+
+
+def explain_pairing(system: System, case: Case, u: FloatArray) -> str:
+    """Return why another pairing at the unknowns u (n,) may be the fault of a kink, or an empty string."""
+    state = replace(case, z=system.state(u), n_multipliers=system.n_multipliers)
+    reach = COORDINATE_ROUNDING * state.largest_coordinate
+    return find_kink(FrozenState(system.formulation, state, system.pair(u)), reach)
+
+
+DIGITS = 32  # Coordinates are multiples of 2^-32 segments, so that the longest way rounds none.
+OFFSETS = (0, 5, 10, 15, 20)  # The ways: 2 to these powers, in segments.
+LOAD_SHARES = (1.0, 0.875, 0.75)  # If a jump of the forces leaves no solution under one load, another load has one.
+N_STEPS = 3  # From the solution near the origin, with the matrix there, a step leaves what roundoff does.
+ADDED = forces_quantity("roundings that the formulation adds")
+RESIDUAL = Quantity(
+    "attained residual",
+    "1 (times its roundoff)",
+    "A stored position is rounded to uX twice, and the bodies' forces to u(|S| |q| + |g|); 8 roundings allow for it.",
+)
+ERROR = Quantity(
+    "attained error of the solution",
+    "1 (times what that residual makes of it)",
+    "A residual r moves the solution by J⁻¹ r.",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """The solution of the scene near the origin, and what roundoff may do to it."""
+
+    system: System  # The scene with its formulation.
+    u: FloatArray  # (n_free + n_multipliers,) The unknowns.
+    pairing: Pairing | None  # The pairing.
+    # (n_free + n_multipliers, n_free + n_multipliers) The derivative J of the residual there, by differences.
+    matrix: FloatArray
+    units: FloatArray  # (n_free + n_multipliers,) The unit of each unknown that corresponds to a unit of length.
+    inverse: FloatArray  # (n_free + n_multipliers, n_free + n_multipliers) |J⁻¹|, entry by entry.
+    # (n_free + n_multipliers,) The change of the residual by a move of all nodes by a unit of length, Σ |K|.
+    contact: FloatArray
+    # (n_free + n_multipliers,) The sizes of the other terms of the residual, |S| |q| + |g| + |R| and those of
+    # multipliers.
+    terms: FloatArray
+    # What roundings of the positions relative to one another may change in the contact forces.
+    conditioning: Conditioning
+
+    def roundoff(self, largest: float) -> FloatArray:
+        """Return the roundoff (n_free + n_multipliers,) of the residual where the largest coordinate is `largest`."""
+        return ROUNDOFF_FACTOR * UNIT_ROUNDOFF * (self.contact * largest + self.terms)
+
+
+@dataclass(frozen=True, slots=True)
+class Attained:
+    """The residual and the accuracy that Newton's method attains in one place."""
+
+    added: float  # ω, the roundings that the formulation adds.
+    residual: float  # The attained residual over its roundoff.
+    error: float  # The distance from the solution over what that roundoff makes of it.
+    length: float  # That distance, a length.
+    undecided: str  # The reason why residual and error decide nothing; empty if they do.
+
+
+@Property.define(
+    id="newton.attainable",
+    rank=550,
+    family="newton",
+    quantities=(ADDED, RESIDUAL, ERROR),
+    cases=Cases.random(closed_cases),
+    promise=lambda traits: traits.promises.translation_stable,
+    applicable=refuse_dependent_multipliers,
+    bodies=True,
+    usual_undecided=0.002,
+)
+def newton_attainable(case: Case, subject: Subject) -> Measurement:
+    """Far from the origin, residual and accuracy are limited by the stored positions alone.
+
+    **Question.** A scene is solved, moved by an exact way of 2^0 to 2^20 segments, and solved again from its own
+    solution. At which residual does Newton's method come to rest, how far from the solution, and how much of that is
+    the fault of the formulation?
+
+    **Why it matters.** The unknowns are displacements, but a formulation gets positions, and these are stored to u
+    times the distance X from the origin. So a residual cannot fall below roundoff of the stored positions, and no
+    tolerance tighter than that ever ends the iterations. A formulation that rounds points at the same distance adds its
+    own errors to that.
+
+    **How it is judged.** First, the residual of the moved scene is compared with that of the same stored positions
+    moved back, which rounds nothing unless the way is shorter than the scene. A formulation that is stable under
+    translations differs by at most 16 roundings of the positions relative to one another (ω). Secondly, the residual at
+    which three more steps come to rest counts over its roundoff, 8u (|K| X + |S| |q| + |g| + |R|). K is a difference
+    quotient of the contact forces, S the stiffness and g the load of the bodies. Thirdly, the distance from the
+    solution counts over what a residual of that size makes of it, max |J⁻¹| 8u (…), with J = S + K. The largest number
+    of all ways is judged, and those of each way are kept as details.
+
+    **Undecided.** Where Newton's method finds no solution, under 7/8 and 3/4 of the load neither, where the matrix has
+    no inverse there, and where the solution is so near a kink that roundoff of the stored positions decides the
+    pairing.
+    """
+    segment = ldexp(0.5, frexp(case.shortest_segment)[1])  # The power of two below the shortest segment.
+    scene = snap(scene_of(case), segment * 2.0**-DIGITS)
+    for share in LOAD_SHARES:
+        system = System(_load_less(scene, share), subject.for_case(case))
+        trace = find_solution(system)
+        if trace.converged:
+            break
+    details = solution_details(trace) | {"share of the load": share}
+    if not trace.converged:
+        return Measurement(details=details, undecided=f"Newton found no solution: {trace.end.label}")
+    solution = examine(system, case, trace.u[-1])
+    if solution is None:
+        return Measurement(details=details, undecided="the matrix has no inverse at the solution")
+    places = dict(zip(OFFSETS, settle(solution, case, [segment * 2.0**power for power in OFFSETS]), strict=True))
+    for power, attained in places.items():
+        details |= {
+            f"{ADDED.name} at 2^{power}": attained.added,
+            f"{RESIDUAL.name} at 2^{power}": attained.residual,
+            f"{ERROR.name} at 2^{power}": attained.error,
+            f"error over the shortest segment at 2^{power}": attained.length / case.shortest_segment,
+        }
+    decided = [attained for attained in places.values() if not attained.undecided]
+    values = {ADDED: max(attained.added for attained in places.values())}
+    tolerances = {ADDED: MOST_ROUNDINGS}
+    if decided:
+        values[RESIDUAL] = max(attained.residual for attained in decided)
+        values[ERROR] = max(attained.error for attained in decided)
+        tolerances |= {RESIDUAL: 1.0, ERROR: 1.0}
+    return Measurement(check_all(values, tolerances), details=details, idle=is_untouched(trace))
+
+
+def _load_less(scene: Scene, share: float) -> Scene:
+    """Return the scene with a share of its loads and imposed displacements."""
+    if share == 1:
+        return scene
+    bodies = tuple(replace(body, imposed=share * body.imposed, load=share * body.load) for body in scene.bodies)
+    return replace(scene, bodies=bodies)
+
+
+def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
+    """Return the solution u (n_unknowns,) with what roundoff may do to it; None if the matrix has no inverse there.
+
+    The scene of the system lies near the origin.
+    """
+    scene, n_free, z = system.scene, system.scene.n_free, system.state(u)
+    case = replace(case, interface=scene.interface, z=z, n_multipliers=system.n_multipliers)
+    state = FrozenState(system.formulation, case, system.pair(u))
+    forces = state.residual
+    to_unknowns = dense(system.transformation).T  # (n_free + n_multipliers, n_unknowns + n_multipliers)
+    derivative = difference_quotient(state)
+    rows = to_unknowns @ derivative
+    matrix = dense(system.stiffness) + rows @ to_unknowns.T
+    condition = system.step(matrix, np.zeros(system.size)).condition
+    if condition <= system.size * UNIT_ROUNDOFF:
+        return None
+    # Supported nodes count too: where an axis is inclined, rounding moves a node off its support.
+    contact = np.abs(rows[:, : scene.interface.n_unknowns]).sum(axis=1)
+    terms = np.abs(rows[:, scene.interface.n_unknowns :]) @ np.abs(case.multipliers) + np.abs(to_unknowns) @ abs(forces)
+    terms[:n_free] += abs(scene.stiffness) @ np.abs(u[:n_free]) + np.abs(scene.load)
+    return Solution(
+        system=system,
+        u=u,
+        pairing=state.pairing,
+        matrix=matrix,
+        units=scale_factors(matrix, n_free)[1],
+        inverse=np.abs(linalg.inv(matrix)),
+        contact=contact,
+        terms=terms,
+        conditioning=conditioning_of(case, derivative, forces),
+    )
+
+
+@dataclass(slots=True, eq=False)
+class Place:
+    """The scene in another place, and how far Newton's method has come there."""
+
+    interface: Interface  # The moved interface.
+    way: float  # The move along both axes, a length.
+    u: FloatArray  # (n_free + n_multipliers,) The unknowns.
+    z: FloatArray = field(default_factory=lambda: np.zeros(0))  # The stored positions, multipliers behind them.
+    pairing: Pairing | None = None  # The pairing and the forces there.
+    forces: FloatArray = field(init=False)
+    residual: FloatArray = field(init=False)  # (n_free + n_multipliers,) The residual there.
+    added: float = 0.0  # The largest ω of all steps.
+    rests: list[Rest] = field(default_factory=list)  # The state after each step.
+
+    def moves(self, scene: Scene) -> bool:
+        """Store the positions at the unknowns, in the place of the scene's own; return whether one has changed."""
+        q, multipliers = np.split(self.u, [scene.n_free])
+        positions = self.interface.nodes.reshape(-1) + scene.imposed_displacements + scene.transformation @ q
+        before, self.z = self.z, np.concatenate([positions, multipliers])
+        return not np.array_equal(self.z, before)
+
+
+class Rest(NamedTuple):
+    """A state: its residual over its roundoff, its unknowns, its largest coordinate, its pairing."""
+
+    residual: float
+    u: FloatArray
+    largest: float
+    pairing: Pairing | None
+
+
+def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[Attained]:
+    """Let Newton's method come to rest in other places, from the solution near the origin."""
+    near = solution.system
+    places = [Place(move(near.scene.interface, way), way, solution.u) for way in ways]
+    take_forces(solution, places)
+    for _ in range(N_STEPS):
+        for place in places:
+            change = near.step(solution.matrix, -place.residual).change
+            assert change is not None  # The matrix has an inverse.
+            place.u = place.u + change
+        take_forces(solution, places)
+    return [_attain(solution, case, place) for place in places]
+
+
+def take_forces(solution: Solution, places: Sequence[Place]) -> None:
+    """Ask for the forces where stored positions have changed, and for those of the same positions moved back."""
+    near, n = solution.system, solution.system.scene.interface.n_unknowns
+    changed = [place for place in places if place.moves(near.scene)]
+    calls: list[Call] = []
+    for place in changed:
+        place.pairing = near.formulation.pair(place.interface, place.z)
+        back = np.concatenate([place.z[:n] - place.way, place.z[n:]])
+        calls += [
+            ("residual", place.interface, place.pairing, place.z),
+            ("residual", near.scene.interface, place.pairing, back),
+        ]
+    answers = near.formulation.answers(calls)
+    for place, forces, same in zip(changed, answers[::2], answers[1::2], strict=True):
+        place.added = max(place.added, solution.conditioning.count_roundings(forces - same))
+        place.forces = forces
+    for place in places:
+        place.residual = near.balance(place.u, place.forces)
+        largest = float(np.abs(place.z[:n]).max())
+        attained = over(np.abs(place.residual), solution.roundoff(largest))
+        place.rests.append(Rest(attained, place.u, largest, place.pairing))
+
+
+def _attain(solution: Solution, case: Case, place: Place) -> Attained:
+    """Return what the best of the states after the first step has attained."""
+    near = solution.system
+    rest = min(place.rests[1:], key=lambda rest: rest.residual)
+    allowed = float((solution.inverse @ solution.roundoff(rest.largest) / solution.units).max())
+    length = float(np.abs((rest.u - solution.u) / solution.units).max())
+    undecided = ""
+    if rest.pairing != solution.pairing or rest.pairing is None:
+        state = replace(case, interface=near.scene.interface, z=near.state(rest.u), n_multipliers=near.n_multipliers)
+        frozen = FrozenState(near.formulation, state, near.pair(rest.u))
+        undecided = find_kink(frozen, COORDINATE_ROUNDING * rest.largest)
+    return Attained(place.added, rest.residual, ratio(length, allowed), length, undecided)
+
+
+def over(sizes: FloatArray, floor: FloatArray) -> float:
+    """Return the largest ratio of two arrays (n,), entry by entry; 0/0 counts as 0."""
+    return max((ratio(float(size), float(least)) for size, least in zip(sizes, floor, strict=True)), default=0.0)

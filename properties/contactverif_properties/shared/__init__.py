@@ -1,4 +1,0 @@
-"""Code that several properties share: tolerances, kinks, states, exact forces, and solved scenes.
-
-Rule for the next editor: nothing here imports a property.
-"""
