@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,7 @@ def _dump(path: Path) -> Iterator[str]:
     try:
         from contactverif_reports.netcdf.read import read_run
     except ImportError:
-        from contactverif_reports.netcdf import read_run
+        read_run = import_module("contactverif_reports.netcdf").read_run
     run = read_run(path)
     not_loaded = [(item.formulation, item.reason) for item in run.not_loaded]
     yield f"signs {list(run.opposite_signs)} diagnoses {dict(run.diagnoses)} not loaded {not_loaded}"
@@ -242,7 +243,8 @@ def _cases_of(prop: Any, dim: int, examples: int) -> Any:
     try:
         from contactverif.sampling.draw import Sampling, draw_cases
     except ImportError:
-        from contactverif.sampling import Sampling, draw_cases
+        sampled = import_module("contactverif.sampling")
+        Sampling, draw_cases = sampled.Sampling, sampled.draw_cases
     sampling = Sampling.at(None, examples, 1)
     source = sampling.source(prop)
     if source is None or isinstance(source, tuple):
