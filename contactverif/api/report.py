@@ -140,13 +140,12 @@ class Report(Run):
         """
         import pandas as pd
 
-        from contactverif_reports.exchange.run_document import document_of
+        from contactverif_reports.exchange.run_document import row_values
 
         lines = []
-        for row in document_of(self).rows:
-            closest = row.closest
-            line = {name: getattr(row, name) for name in row.__struct_fields__}
-            del line["closest"], line["counterexample"]
+        for row in self.rows:
+            line = row_values(row)
+            closest = line.pop("closest")
             line["quantity"] = closest.name if closest else ""
             line["value"], line["tolerance"] = (closest.value, closest.tolerance) if closest else (None, None)
             lines.append(line)
@@ -171,7 +170,7 @@ class Report(Run):
         Parameters
         ----------
         path : str | os.PathLike[str]
-            The file; its suffix says what is written: ``.nc``, ``.html``, ``.json``, ``.xml`` (JUnit) or ``.sarif``.
+            The file; its suffix says what is written: ``.nc``, ``.html``, ``.json`` or ``.xml`` (JUnit).
 
         Raises
         ------

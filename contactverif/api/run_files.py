@@ -13,8 +13,7 @@ REPORT = ".nc"
 PAGE = ".html"
 JSON = ".json"
 JUNIT = ".xml"
-SARIF = ".sarif"
-RUN_FILES = (REPORT, PAGE, JSON, JUNIT, SARIF)
+RUN_FILES = (REPORT, PAGE, JSON, JUNIT)
 
 
 def run_writers(run: Run, report: Path | None) -> dict[str, Callable[[Path], None]]:
@@ -41,13 +40,7 @@ def run_writers(run: Run, report: Path | None) -> dict[str, Callable[[Path], Non
 
         write_junit(run, path)
 
-    def write_log(path: Path) -> None:
-        from contactverif.api.factory_places import factory_place
-        from contactverif_reports.exchange.sarif import write_sarif
-
-        write_sarif(run, path, factory_place)
-
-    return {REPORT: write_report, PAGE: write_html, JSON: write_document, JUNIT: write_suites, SARIF: write_log}
+    return {REPORT: write_report, PAGE: write_html, JSON: write_document, JUNIT: write_suites}
 
 
 def either(suffixes: Sequence[str]) -> str:

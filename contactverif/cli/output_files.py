@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from contactverif.api.run_files import JSON, JUNIT, PAGE, REPORT, SARIF, either
+from contactverif.api.run_files import JSON, JUNIT, PAGE, REPORT, either
 from contactverif.contract.errors import MisuseError
 
 PICTURES = (".png", ".svg")
@@ -21,7 +21,6 @@ LABELS = {
     MARKDOWN: "page",
     JSON: "JSON",
     JUNIT: "JUnit",
-    SARIF: "SARIF",
     ".png": "picture",
     ".svg": "picture",
     SOLVED_SCENE: "for ParaView",

@@ -12,16 +12,14 @@ from contactverif.cli.shared_options import ReportPath, ScreenOptions, output_op
 
 def report(
     path: ReportPath,
-    out: Annotated[
-        list[Path] | None, output_option("Write FILE.html, a page; or FILE.json, FILE.xml (JUnit), FILE.sarif.")
-    ] = None,
+    out: Annotated[list[Path] | None, output_option("Write FILE.html, a page; or FILE.json, FILE.xml (JUnit).")] = None,
     *,
     screen: ScreenOptions,
 ) -> None:
     """Show a stored report: its results here, or all of it as a page.
 
     The page is one file without links to other files. It can be read on a
-    phone and printed. Other programs read JSON, JUnit's XML and SARIF.
+    phone and printed. Other programs read JSON and JUnit's XML.
     Nothing is judged or solved again.
 
     \bExit status

@@ -92,8 +92,8 @@ FormulationNames = Annotated[
 ]
 EveryFormulation = Annotated[bool, typer.Option("--all", help="Take every installed formulation that wraps no other.")]
 RESULT_FILES = output_option(
-    "Write the results: FILE.nc a report, FILE.html a page, FILE.json, FILE.xml (JUnit) or FILE.sarif for other "
-    "programs. Repeatable."
+    "Write the results: FILE.nc a report, FILE.html a page, FILE.json or FILE.xml (JUnit) for other programs. "
+    "Repeatable."
 )
 PropertyGlobs = Annotated[
     list[str] | None,

@@ -14,6 +14,7 @@ from typing import Annotated
 
 import numpy as np
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics import newton
@@ -21,7 +22,6 @@ from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import DiskProblem, disk_on_foundation
 from contactverif_paper.paper_columns import Column
 from contactverif_paper.paper_formulations import PaperFormulation, subject_of
-from contactverif_reports.netcdf import schema
 
 PAPER = DiskProblem()
 ENERGY = 1e-15  # The paper's energy norm. Its unit is not said; here it is taken over the energy of the first step.

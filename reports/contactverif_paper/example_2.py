@@ -17,8 +17,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
+from contactverif.contract.columns import Group
 from contactverif.problems import hertz
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, disk_scene, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_round_ticks
@@ -27,8 +29,6 @@ from contactverif_paper.paper_formulations import NTS_AR, VTS_G, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_paper.patch_plots import edges_of
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (NTS_AR, VTS_G, VTS_ME, VTS_PPT)
 PRINTED_PEAK, PRINTED_ITERATIONS = 1.61e6, 4

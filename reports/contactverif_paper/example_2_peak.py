@@ -17,14 +17,14 @@ from typing import Annotated
 import numpy as np
 from matplotlib.figure import Figure
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.columns import Group
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, disk_scene, flatter, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, Series, add_legend, new_panels, plot_series, use_round_ticks
 from contactverif_paper.paper_columns import Column, Formulations, variables_of
 from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (VTS_ME, VTS_PPT, REFERENCE_AREAS)
 EXPLAINED = (VTS_ME, REFERENCE_AREAS)

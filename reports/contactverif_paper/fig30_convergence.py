@@ -18,7 +18,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray, dense
+from contactverif.contract.columns import Group
 from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
 from contactverif.mechanics.trace import Trace
@@ -29,8 +31,6 @@ from contactverif_paper.paper_columns import WORDS, Column, Formulations, sparse
 from contactverif_paper.paper_formulations import BASIC, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (VTS_ME, BASIC, VTS_PPT)
 YOUNG, PRESSURE = 1e4, 100.0

@@ -14,15 +14,15 @@ from typing import Annotated
 
 from matplotlib.figure import Figure
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.columns import Group
 from contactverif_paper.disk_solutions import difference, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, new_panels, use_round_ticks
 from contactverif_paper.paper_columns import Column, to_group
 from contactverif_paper.paper_formulations import VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
 
 REFINE = (1, 2)
 MESHES = ("our base meshes", "meshes twice as fine")

@@ -16,8 +16,10 @@ from typing import Annotated
 
 import numpy as np
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
+from contactverif.contract.columns import Group
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
 from contactverif_paper.paper_columns import Column, name_columns, variables_of
@@ -34,8 +36,6 @@ from contactverif_paper.paper_formulations import (
     subject_of,
 )
 from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (NTS, NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
 EXACT = PaperFormulation("exact", "")

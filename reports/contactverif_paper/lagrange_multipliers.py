@@ -14,6 +14,7 @@ from typing import Annotated
 
 import numpy as np
 
+from contactverif.contract.columns import Group
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle
@@ -27,7 +28,6 @@ from contactverif_paper.paper_formulations import PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
 from contactverif_paper.patch_solutions import PRINTED_COLUMN
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.groups import Group
 
 VTS_ME = PaperFormulation("VTS-ME", "vts-me-lm")
 FORMULATIONS = (NTS, TWO_PASS, VTS_ME, VTS_PPT, MORTAR, DUAL)

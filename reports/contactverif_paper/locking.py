@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.columns import Group
 from contactverif.mechanics.newton import solve
 from contactverif.problems.wave_blocks import (
     COLUMNS,
@@ -39,7 +40,6 @@ from contactverif_paper.paper_formulations import (
     subject_of,
 )
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
-from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (VTS_PPT, TWO_PASS, STS, NTS_AR, MORTAR)
 WITH_PRESSURES = (STS, MORTAR)  # Their pressures in real contact are drawn.

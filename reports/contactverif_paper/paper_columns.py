@@ -13,9 +13,8 @@ from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
+from contactverif.contract.columns import Group, Variable, codes, numbers, words
 from contactverif_paper.paper_formulations import PaperFormulation
-from contactverif_reports.netcdf.groups import Group, Variable
-from contactverif_reports.netcdf.variables import codes, numbers, words
 
 WORDS = "words"  # Stands in place of a unit where a field holds words.
 

@@ -19,8 +19,8 @@ from typing import Annotated, Any
 
 from matplotlib.figure import Figure
 
+from contactverif.contract.columns import Group
 from contactverif_paper.paper_columns import WORDS, Column, to_group
-from contactverif_reports.netcdf.groups import Group
 
 Progress = Callable[[str], None]  # The callback that reports what comes next, in a few words.
 OURS = "ours"  # The source of a figure that the paper does not have.

@@ -15,14 +15,14 @@ import matplotlib
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from contactverif.contract import schema
+from contactverif.contract.columns import Group
 from contactverif_paper.figure_style import render_figure
 from contactverif_paper.paper_columns import variables_of
 from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, PaperFigure, Progress, Statement, sentence
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
-from contactverif_reports.netcdf.write_tree import write_tree
+from contactverif_reports.netcdf.file_groups import write_tree
 
 TITLE = "contactverif: the reference paper, computed again"
 REFERENCE = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416"

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from contactverif.contract.columns import Group
 from contactverif_paper.force_transmission import (
     ForceTable,
     force_dataset,
@@ -22,7 +23,6 @@ from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
 from contactverif_paper.patch_plots import plot_meshes, plot_penetrations, plot_pressures, shown_formulations
 from contactverif_paper.patch_solutions import PatchSetup, PatchSolution, patch_solution
-from contactverif_reports.netcdf.groups import Group
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from typing import Annotated
 
 import numpy as np
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
@@ -36,7 +37,6 @@ from contactverif_paper.paper_formulations import (
     subject_of,
 )
 from contactverif_reports.draw.solved_scene import Solution, SolvedScene
-from contactverif_reports.netcdf import schema
 
 YOUNG = 1e4  # The modulus of the catalogue's scenes.
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.

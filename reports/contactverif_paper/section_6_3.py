@@ -18,6 +18,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
+from contactverif.contract.columns import Group
 from contactverif.contract.interface import Interface
 from contactverif.studies.evaluation_cost import make_state, measure_costs
 from contactverif_paper.paper_columns import Column, Formulations, to_group
@@ -26,7 +27,6 @@ from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Prog
 from contactverif_paper.section_6_2 import FORMULATIONS as TANGENT_FORMULATIONS
 from contactverif_paper.section_6_2 import ROUNDOFF, Tangents, tangents
 from contactverif_reports.html.pages import number
-from contactverif_reports.netcdf.groups import Group
 
 FORMULATIONS = (
     PaperFormulation("VTS-ME", "vts-me:n=1"),

@@ -90,7 +90,7 @@ MISTAKES = [
     (["verify", "nts", "--seed", "-1"], r"--seed: found -1; needed a whole number ≥ 0 and < 2\^63"),
     (["verify", "nts", "--exampels", "5"], r"No such option: --exampels.*--examples.* \(see .*--help\)"),
     (["verfy"], r"No such command 'verfy'.* \(see contactverif --help\)"),
-    (["verify", "nts", "--out", ""], r"--out: found '.'; needed a name that ends in .nc, .html, .json, .xml or .sarif"),
+    (["verify", "nts", "--out", ""], r"--out: found '.'; needed a name that ends in .nc, .html, .json or .xml"),
     (["verify", "nts", "--out", "no/such/folder/nts.nc"], r"--out: .* is no folder; needed a folder that exists"),
     (["verify", "nts", "--out", "nts.txt"], r"--out: found 'nts.txt'; needed a name that ends in .nc, .*"),
     (["verify", "nts", "--out", "a.nc", "--out", "b.NC"], r"--out: found a.nc and b.NC; needed one file .* .nc"),

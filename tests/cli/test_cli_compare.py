@@ -212,7 +212,7 @@ MISTAKES = [
     (["nts", "--against", "vts-ppt", "--profile", "nigthly"], r"--profile: found 'nigthly'; needed .* nightly"),
     (["nts", "--against", "vts-ppt", "--out", "no/r.nc"], r"--out: .* is no folder; needed a folder that exists"),
     (["nts", "--against", "vts-ppt", "--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),
-    (["nts", "--against", "vts-ppt", "--out", "r.pdf"], r"--out: found 'r.pdf'; needed .* .nc, .html, .* .sarif"),
+    (["nts", "--against", "vts-ppt", "--out", "r.pdf"], r"--out: found 'r.pdf'; needed .* .nc, .html, .* .xml"),
     (["nts", "--against", "vts-ppt", "--pictures", str(PUNCH)], r"--pictures: found .* needed a folder that can be .*"),
     (["nts", "--against", "vts-ppt", "--flip"], r"--mesh: found none, but --flip; needed --mesh FILE, .*"),
     (["a.nc"], r"NAME: found 1 report; needed two, OLD.nc NEW.nc"),

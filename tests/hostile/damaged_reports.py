@@ -223,7 +223,7 @@ TREES: dict[str, Callable[[Tree, random.Random], None]] = {
 
 def lie_about_sizes(path: Path, chance: random.Random) -> None:
     """Write a report with a variable that is said to be huge and was never filled."""
-    from contactverif_reports.netcdf import schema
+    from contactverif.contract import schema
 
     with netCDF4.Dataset(path, "w") as file:
         file.title, file.schema = schema.TITLE, schema.SCHEMA

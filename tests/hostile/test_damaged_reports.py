@@ -14,7 +14,7 @@ from damaged_reports import TREES, Campaign, import_everything, lie_about_sizes,
 from contactverif import MisuseError, load_scene
 from contactverif.contract.counterexample import counterexamples
 from contactverif.isolation.limits import Limits
-from contactverif_reports.netcdf import bench_file, stored_groups
+from contactverif_reports.netcdf import bench_file, file_groups
 from contactverif_reports.netcdf.bench_file import read_bench
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.stored_cases import check_bodies
@@ -65,7 +65,7 @@ def test_a_size_that_lies_takes_no_memory(campaign: Campaign) -> None:
 
 
 def test_the_limits_of_the_child_hold_for_reports(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stored_groups, "limits_for", lambda size: Limits(1e-6, 500))
+    monkeypatch.setattr(file_groups, "limits_for", lambda size: Limits(1e-6, 500))
     with pytest.raises(MisuseError, match="takes longer than"):
         read_run(campaign.good)
 

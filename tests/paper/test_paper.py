@@ -21,7 +21,7 @@ from contactverif_paper.figure_style import render_figure
 from contactverif_paper.items import ITEMS, ORDER
 from contactverif_paper.paper_item import Agreement, Paper
 from contactverif_paper.paper_page import check_folder, page, summary, svg, tree_of, write
-from contactverif_reports.netcdf.write_tree import write_tree
+from contactverif_reports.netcdf.file_groups import write_tree
 
 STORED = Path(__file__).parents[2] / "reports" / "paper"
 SOLVED = 2.0**-53 * 1e2 * 1e6

@@ -1,8 +1,7 @@
-"""Other programs read of a run: JSON with its schema, JUnit's XML, and SARIF."""
+"""Other programs read of a run: JSON with its schema, and JUnit's XML."""
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import msgspec
@@ -14,10 +13,8 @@ from contactverif import Run, load_formulation, load_properties, verify
 from contactverif.contract.result import NotLoaded, Outcome
 from contactverif_reports.exchange.junit import write_junit
 from contactverif_reports.exchange.run_document import SCHEMA, RunDocument, document_of, schema, write_json
-from contactverif_reports.exchange.sarif import write_sarif
 
 IDS = ["patch.flat.single", "patch.flat.transmission", "hard.dead-zone", "complementarity", "balance.force"]
-PLACE = ("plugins/mine.py", 7)
 
 
 @pytest.fixture(scope="module")
@@ -99,32 +96,3 @@ def test_each_row_is_a_test_case_that_ends_as_the_row_does(run: Run, tmp_path: P
     assert "slave" in str(failure.text)  # The drawing
     assert [case.get("name") for case in by_name["vts-ppt"].findall("testcase[failure]")] == ["sign"]
     assert by_name["gone"].get("errors") == "1"
-
-
-def results(run: Run, path: Path, place: tuple[str, int] | None = PLACE) -> list[dict[str, Any]]:
-    write_sarif(run, path, lambda name: place)
-    log = msgspec.json.decode(path.read_bytes())
-    (only,) = log["runs"]
-    assert log["version"] == "2.1.0"
-    rules = {rule["id"] for rule in only["tool"]["driver"]["rules"]}
-    assert {result["ruleId"] for result in only["results"]} <= rules
-    list_of_results: list[dict[str, Any]] = only["results"]
-    return list_of_results
-
-
-def test_what_fails_the_run_is_an_error_and_a_failure_without_promise_a_warning(run: Run, tmp_path: Path) -> None:
-    levels = {(result["ruleId"], result["level"]) for result in results(run, tmp_path / "run.sarif")}
-    assert levels == {
-        ("import", "error"),
-        ("sign", "error"),
-        ("patch.flat.single", "error"),
-        ("hard.dead-zone", "warning"),
-    }
-
-
-def test_a_result_stands_where_the_factory_does(run: Run, tmp_path: Path) -> None:
-    (location,) = results(run, tmp_path / "run.sarif")[0]["locations"]
-    assert location["physicalLocation"]["artifactLocation"]["uri"] == PLACE[0]
-    assert location["physicalLocation"]["region"]["startLine"] == PLACE[1]
-    (location,) = results(run, tmp_path / "run.sarif", None)[0]["locations"]
-    assert "physicalLocation" not in location

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import netCDF4
 import pytest
 import xarray as xr
 from handmade_report import run_with_kinds
@@ -13,7 +12,6 @@ from contactverif.contract.case_counts import CaseCounts, percent
 from contactverif.contract.counterexample import failing_examples
 from contactverif.contract.result import coverage_of
 from contactverif_reports.html.report_page import report_page
-from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
 TABLES = """\
@@ -91,20 +89,6 @@ def test_a_counterexample_says_its_kind() -> None:
     words = "the smallest case found (inside a segment)"
     assert words in str(counterexample_text(example, None))
     assert f"projection.place, {words}</h4>" in report_page(run_with_kinds(), "report.nc")
-
-
-def test_a_report_without_kinds_is_read(tmp_path: Path) -> None:
-    """An older contactverif wrote such reports."""
-    write(run_with_kinds(), tmp_path / "report.nc")
-    with netCDF4.Dataset(tmp_path / "report.nc", "a") as file:
-        for group in ("projection/place", "balance/force"):
-            for name in ("kind", "case_kind", "kind_count", "counted"):
-                file[group].renameVariable(name, f"unknown_{name}")
-        file["summary"].renameVariable("idle", "unknown")
-    run = read_run(tmp_path / "report.nc")
-    assert [row.tally.kinds for row in run.rows] == [{}] * 4
-    assert [row.idle for row in run.rows] == [2, 1, 0, 0]
-    assert run.rows[0].outcomes[0].summary.kind == ""
 
 
 @pytest.mark.parametrize(

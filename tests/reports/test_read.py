@@ -10,8 +10,8 @@ from handmade_report import ERROR, awkward, small_run
 from subjects import same_case
 
 from contactverif import MisuseError, Verdict
+from contactverif.contract import schema
 from contactverif.contract.counterexample import Origin
-from contactverif_reports.netcdf import schema
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, open_report, read_case
 from contactverif_reports.netcdf.write import write
@@ -87,8 +87,8 @@ def test_what_is_no_report(report: Path, tmp_path: Path) -> None:
         "text.nc": "no netCDF file",
         "cut.nc": "which is damaged",
         "other.nc": "of something else",
-        "newer.nc": "schema 99; needed schema 3; install a newer contactverif",
-        "older.nc": "schema 1, which an older contactverif wrote; needed schema 3; run the same command again",
+        "newer.nc": "schema 99; needed schema 4; install a newer contactverif",
+        "older.nc": "schema 1, which an older contactverif wrote; needed schema 4; run the same command again",
         "empty.nc": "without the group 'summary'; needed an undamaged report",
     }.items():
         with pytest.raises(MisuseError, match=words) as error:

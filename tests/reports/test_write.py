@@ -16,11 +16,11 @@ from handmade_report import ERROR, flat, outcome, question, small_run
 
 from contactverif import MisuseError, Row, Run, Verdict, load_formulation, load_properties, verify
 from contactverif.contract.counterexample import case_id
+from contactverif.contract.schema import VERDICTS
 from contactverif_reports.files import check_writable
-from contactverif_reports.netcdf import report_tree
+from contactverif_reports.netcdf import write as writing
 from contactverif_reports.netcdf.differences import same_data
-from contactverif_reports.netcdf.schema import VERDICTS, group_names
-from contactverif_reports.netcdf.write import write
+from contactverif_reports.netcdf.write import group_names, write
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_opens_with_xarray(report: Path) -> None:
         assert patch.reason.sel(formulation="vts-me:n=4")[2] == "force error 0.25, at most 1e-12"
         assert patch.tolerance_formula.values == [ERROR.tolerance]
         assert patch.n_master_segments.sel(formulation="vts-ppt").values.tolist() == [1, 1, 1, 1]
-        assert patch.parameter_penetration.units == "m"
+        assert patch.parameter_units.sel(parameter="penetration") == "m"
         assert patch.witness_case_name.values.tolist() == ["", "C′ №1"]
         assert tree["tangent/directional"].sizes["quantity"] == 2
         assert "quantity" not in tree["objectivity"].sizes
@@ -57,7 +57,7 @@ def test_root_attributes_are_the_provenance(report: Path) -> None:
     with xr.open_datatree(report) as tree:
         assert tree.attrs["seed"] == "7"
         assert tree.attrs["promises_kept"] == "false"
-        assert tree.attrs["schema"] == "3"
+        assert tree.attrs["schema"] == "4"
         assert tree.attrs["Conventions"] == "CF-1.11 UGRID-1.0"
 
 
@@ -128,7 +128,7 @@ def test_a_report_is_the_same_however_many_cases_are_in_memory(tmp_path: Path, m
     questions = load_properties(["patch.flat.transmission", "hard.deep", "newton.order", "swap"])
     result = verify(subjects, questions, examples=12, seed=3)
     for name, size in (("whole.nc", 10_000), ("pieces.nc", 5)):
-        monkeypatch.setattr(report_tree, "CASES_OF_A_BLOCK", size)
+        monkeypatch.setattr(writing, "CASES_OF_A_BLOCK", size)
         write(result, tmp_path / name)
     assert same_data(tmp_path / "whole.nc", tmp_path / "pieces.nc") == []
 
@@ -204,7 +204,7 @@ def test_an_exception_leaves_what_was_there(report: Path, monkeypatch: pytest.Mo
         path.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("contactverif_reports.netcdf.write_tree.write_tree", break_off)
+    monkeypatch.setattr("contactverif_reports.netcdf.file_groups.write_tree", break_off)
     with pytest.raises(KeyboardInterrupt):
         write(small_run(passing=True), report)
     assert report.read_bytes() == before
@@ -221,7 +221,7 @@ def test_a_killed_run_leaves_what_was_there(tmp_path: Path, there: bool) -> None
         import sys, time
         from handmade_report import small_run
         from contactverif_reports.netcdf import write as writing
-        from contactverif_reports.netcdf import write_tree as file_writing
+        from contactverif_reports.netcdf import file_groups as file_writing
         whole = file_writing.write_tree
         def slow(tree, path):
             whole(tree, path)

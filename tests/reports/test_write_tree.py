@@ -10,10 +10,9 @@ import pytest
 import xarray as xr
 from handmade_report import small_run
 
-from contactverif_reports.netcdf.groups import Group
-from contactverif_reports.netcdf.report_tree import tree_of
-from contactverif_reports.netcdf.variables import codes, numbers, words
-from contactverif_reports.netcdf.write_tree import write_tree
+from contactverif.contract.columns import Group, codes, numbers, words
+from contactverif_reports.netcdf.file_groups import write_tree
+from contactverif_reports.netcdf.write import tree_of
 
 
 def small_groups() -> dict[str, Group]:

@@ -1,1 +1,1 @@
-"""A run for other programs: JSON for scripts, JUnit for servers that run tests, SARIF for pages that show code."""
+"""A run for other programs: JSON for scripts, JUnit for servers that run tests."""

@@ -6,15 +6,17 @@ A number that is not finite is null: JSON has no other word for it.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from contactverif.contract.columns import value_of
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
 from contactverif.contract.result import Row, Run
+from contactverif.contract.schema import ROW, Column
 from contactverif_reports.draw import as_text
 from contactverif_reports.files import whole
 
@@ -30,6 +32,9 @@ class Number(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: float | None
     sense: str
     unit: str
+
+
+ROW_WORDS = "A formulation and a property. `breaks` says why the run fails because of it; empty if it does not."
 
 
 class Example(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,26 +53,30 @@ class Example(msgspec.Struct, frozen=True, kw_only=True):
     drawing: str
 
 
-class RowDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """A formulation and a property. `breaks` says why the run fails because of it; empty if it does not."""
+def _type_of(column: Column) -> Any:
+    """Return the type of the key of a column."""
+    types: dict[str, Any] = {
+        "words": str,
+        "count": int,
+        "real": float,
+        "bool or none": bool | None,
+        "number": Number | None,
+    }
+    return types[column.type or column.kind]
 
-    formulation: str
-    property: str
-    family: str
-    result: str
-    promise: bool | None  # True to pass, false to fail, null if nothing is stated.
-    promised_by: str  # The traits from which it follows; empty if it is a promise of everybody.
-    known: str
-    breaks: str
-    reason: str
-    planned: int
-    judged: int
-    failed: int
-    undecided: int
-    idle: int
-    closest: Number | None
-    seconds: float
-    counterexample: Example | None
+
+_KEYS = tuple(column for column in ROW if column.key)
+if TYPE_CHECKING:
+    RowDocument = Any
+else:
+    RowDocument = msgspec.defstruct(
+        "RowDocument",
+        [*((column.key, _type_of(column)) for column in _KEYS), ("counterexample", Example | None)],
+        namespace={"__doc__": ROW_WORDS},
+        module=__name__,
+        frozen=True,
+        kw_only=True,
+    )
 
 
 class Missing(msgspec.Struct, frozen=True, kw_only=True):
@@ -103,7 +112,7 @@ def document_of(run: Run) -> RunDocument:
         version=VERSION,
         promises_kept=run.promises_kept,
         provenance=dict(run.provenance),
-        rows=[_row(row, examples) for row in run.rows],
+        rows=[_row_document(row, examples.get((row.formulation, row.property_id))) for row in run.rows],
         not_loaded=[Missing(name=item.formulation, reason=item.reason) for item in run.not_loaded],
         opposite_signs=list(run.opposite_signs),
         diagnoses=dict(run.diagnoses),
@@ -115,27 +124,15 @@ def schema() -> bytes:
     return msgspec.json.format(msgspec.json.encode(msgspec.json.schema(RunDocument)), indent=1) + b"\n"
 
 
-def _row(row: Row, examples: Mapping[tuple[str, str], Counterexample]) -> RowDocument:
-    example, counts = examples.get((row.formulation, row.property_id)), row.tally.counts
-    return RowDocument(
-        formulation=row.formulation,
-        property=row.property_id,
-        family=row.info.family,
-        result=str(row.result),
-        promise=row.promise,
-        promised_by=row.promised_by,
-        known=row.known,
-        breaks=row.unexpected,
-        reason=row.reason,
-        planned=row.planned,
-        judged=row.judged,
-        failed=counts.failed,
-        undecided=row.undecided,
-        idle=row.idle,
-        closest=None if row.closest is None else _number(row.closest.number),
-        seconds=row.seconds,
-        counterexample=None if example is None else _example(example),
-    )
+def _row_document(row: Row, example: Counterexample | None) -> Any:
+    return RowDocument(**row_values(row), counterexample=None if example is None else _example(example))
+
+
+def row_values(row: Row) -> dict[str, Any]:
+    """Return {key: value} of the columns of a row that are in JSON and in data frames."""
+    values = {column.key: value_of(row, column.path) for column in _KEYS}
+    closest = values["closest"]
+    return values | {"result": str(row.result), "closest": None if closest is None else _number(closest)}
 
 
 def _number(number: CheckedNumber) -> Number:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif_reports.netcdf import schema
+from contactverif.contract import schema
 from contactverif_reports.netcdf.read import Groups, open_report
 
 

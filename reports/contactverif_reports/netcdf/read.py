@@ -2,7 +2,7 @@
 
 Rules for the next editor:
 
-- A child process opens the file, see `stored_groups`; here are arrays, and none is believed before it is checked.
+- A child process opens the file, see `file_groups`; here are arrays, and none is believed before it is checked.
 - Whatever is wrong with a file is a `MisuseError` in one line. What is read only when somebody asks for it, such as an
   outcome, is checked when the file is read.
 """
@@ -12,13 +12,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.columns import Group, StoredColumns
 from contactverif.contract.counterexample import (
     Counterexample,
     Origin,
@@ -29,14 +31,13 @@ from contactverif.contract.counterexample import (
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Row, Run
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
+from contactverif_reports.netcdf.file_groups import read_groups
 from contactverif_reports.netcdf.stored_cases import case_of_group, read_forces, read_named_cases
-from contactverif_reports.netcdf.stored_groups import read_groups
 from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
-from contactverif_reports.netcdf.summary_group import root_attributes
+from contactverif_reports.netcdf.write import root_attributes
 
 Groups = Mapping[str, Group]
+_ROW = tuple(column for column in schema.ROW if column.path in {field.name for field in fields(Row)})
 
 _ARGUMENT = "REPORT"
 _NEEDED = "a report that `contactverif verify --out FILE.nc` wrote"
@@ -95,10 +96,10 @@ def _check_schema(root: Group, path: str) -> None:
     if str(root.attrs.get("title", "")) != schema.TITLE or "schema" not in root.attrs:
         raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", _NEEDED)
     version = str(root.attrs["schema"])
-    if version.isdecimal() and int(version) < int(schema.READABLE[0]):
+    if version.isdecimal() and int(version) < int(schema.SCHEMA):
         needed = f"schema {schema.SCHEMA}; run the same command again to write the report anew"
         raise MisuseError(_ARGUMENT, f"{path} of schema {version}, which an older contactverif wrote", needed)
-    if version not in schema.READABLE:
+    if version != schema.SCHEMA:
         raise MisuseError(
             _ARGUMENT, f"{path} of schema {version}", f"schema {schema.SCHEMA}; install a newer contactverif"
         )
@@ -120,31 +121,27 @@ class _Reader:
         }
         self._examples = _examples(groups)
         self._named = read_named_cases(groups)
+        if "property" in self._summary:
+            self._rows = StoredColumns(_ROW, self._summary, ("formulation", "property"), {})
 
     def run(self) -> Run:
         """Return the run."""
-        formulations = self._summary.labels("formulation")
+        formulations, properties = (self._summary.labels(name) for name in ("formulation", "property"))
         names, reasons = (self._summary.words(name) for name in ("not_loaded", "not_loaded_reason"))
+        by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
+        for j, property_id in enumerate(properties):
+            for i, row in self._rows_of(j, property_id, formulations, len(properties)):
+                by_formulation[i][j] = row
         run = Run(
-            rows=self._rows(formulations),
+            rows=tuple(row for rows in by_formulation for row in rows.values()),
             not_loaded=tuple(NotLoaded(*entry) for entry in zip(names, reasons, strict=True)),
-            provided=self._provided_parts(formulations),
-            opposite_signs=self._opposite_signs(formulations),
-            diagnoses=self._diagnoses(formulations),
+            **self._facts_of(formulations),
         )
         written = root_attributes(run)
         if self._consistent:
             self._check(run, written)
         origin = {str(name): str(value) for name, value in self._root.attrs.items() if name not in written}
         return replace(run, provenance=origin)
-
-    def _rows(self, formulations: list[str]) -> tuple[Row, ...]:
-        """Return all rows, formulation by formulation."""
-        by_formulation: list[dict[int, Row]] = [{} for _ in formulations]
-        for j, property_id in enumerate(self._summary.labels("property")):
-            for i, row in self._rows_of(j, property_id, formulations):
-                by_formulation[i][j] = row
-        return tuple(row for rows in by_formulation for row in rows.values())
 
     def _check(self, run: Run, written: Mapping[str, Any]) -> None:
         """Check what the file says twice: the counterexamples, and the counts of the root."""
@@ -155,39 +152,37 @@ class _Reader:
             if name.startswith("n_") and int(self._root.attrs.get(name, value)) != value:
                 raise ValueError(f"{name} is {self._root.attrs[name]}, and the rows say {value}")
 
-    def _rows_of(self, j: int, property_id: str, formulations: list[str]) -> Iterator[tuple[int, Row]]:
+    def _rows_of(
+        self, j: int, property_id: str, formulations: list[str], n_properties: int
+    ) -> Iterator[tuple[int, Row]]:
         """Yield the rows of a property, with the number of the formulation."""
-        dataset = self._properties[property_id]
-        info = read_info(dataset)
-        outcomes = OutcomeArrays(dataset, info, ("formulation", "case"))
-        witnesses = OutcomeArrays(dataset, info, ("formulation",), "witness_") if "witness_verdict" in dataset else None
-        n_cases = dataset.sizes["case"]
+        group = self._properties[property_id]
+        info = read_info(group)
+        outcomes = OutcomeArrays(group, info, ("formulation", "case"))
+        witnesses = OutcomeArrays(group, info, ("formulation",), "witness_") if "witness_verdict" in group else None
+        n_cases = group.sizes["case"]
         named = {name: case for (id_, name), case in self._named.items() if id_ == property_id}
         codes = outcomes.verdicts.reshape(len(formulations), n_cases)
         for i, formulation in enumerate(formulations):
-            verdict = int(self._summary["row_verdict"].values[i, j])
-            if verdict == schema.NOT_PLANNED:
+            if not self._rows.present[i * n_properties + j]:
                 continue
+            values = self._rows.at(i * n_properties + j)
             shrunk, first, case = self._example(formulation, property_id, info)
             length = self._n_outcomes(i, j, property_id, codes[i])
-            row = Row(
-                formulation=formulation,
-                info=info,
-                verdict=Verdict(verdict),
-                promise=schema.Promise(int(self._summary["promise"].values[i, j])).promise,
-                # Older reports do not say it.
-                promised_by=str(self._summary["promised_by"].values[i, j]) if "promised_by" in self._summary else "",
-                known=str(self._summary["known"].values[i, j]),
-                reason=str(self._summary["reason"].values[i, j]),
-                planned=int(self._summary["planned"].values[i, j]),
-                outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length), named),
-                witness=None if witnesses is None else witnesses.outcome(i, case),
-                shrunk=shrunk,
-                first=first,
-                seconds=float(self._timing["row_seconds"].values[i, j]),
-                forces=self._forces(formulation, property_id),
+            yield (
+                i,
+                Row(
+                    formulation=formulation,
+                    info=info,
+                    outcomes=StoredOutcomes(outcomes, i * n_cases, length, self._case_seconds(i, j, length), named),
+                    witness=None if witnesses is None else witnesses.outcome(i, case),
+                    shrunk=shrunk,
+                    first=first,
+                    seconds=float(self._timing["row_seconds"].values[i, j]),
+                    forces=self._forces(formulation, property_id),
+                    **{**values, "verdict": Verdict(values["verdict"])},
+                ),
             )
-            yield i, row
 
     def _n_outcomes(self, i: int, j: int, property_id: str, codes: np.ndarray[Any, Any]) -> int:
         """Return the number of outcomes of a row, checked against what the summary counts."""
@@ -221,25 +216,21 @@ class _Reader:
             raise ValueError("case_seconds is too short")
         return seconds
 
-    def _provided_parts(self, formulations: list[str]) -> dict[str, dict[str, bool]]:
-        if "provided" not in self._summary:
+    def _facts_of(self, formulations: list[str]) -> dict[str, Any]:
+        """Return what is known of whole formulations: parts that they provide, opposite signs, diagnoses."""
+        if not formulations:
             return {}
-        provided = {}
-        for name, codes in zip(formulations, self._summary["provided"].values.tolist(), strict=True):
-            parts = zip(self._summary.words("part"), codes, strict=True)
-            provided[name] = {part: bool(code) for part, code in parts if code != schema.UNSAID}
-        return provided
-
-    def _opposite_signs(self, formulations: list[str]) -> tuple[str, ...]:
-        if "sign" not in self._summary:  # Older reports say nothing of signs.
-            return ()
-        opposite = self._summary["sign"].values == schema.SIGNS["opposite"]
-        return tuple(name for name, turned in zip(formulations, opposite.tolist(), strict=True) if turned)
-
-    def _diagnoses(self, formulations: list[str]) -> dict[str, str]:
-        if "diagnosis" not in self._summary:  # Older reports have none.
-            return {}
-        return {name: text for name, text in zip(formulations, self._summary.words("diagnosis"), strict=True) if text}
+        parts, codes = self._summary.words("part"), self._summary["provided"].values.tolist()
+        opposite = (self._summary["sign"].values == schema.SIGNS["opposite"]).tolist()
+        diagnoses = zip(formulations, self._summary.words("diagnosis"), strict=True)
+        return {
+            "provided": {
+                name: {part: bool(code) for part, code in zip(parts, line, strict=True) if code != schema.UNSAID}
+                for name, line in zip(formulations, codes, strict=True)
+            },
+            "opposite_signs": tuple(name for name, turned in zip(formulations, opposite, strict=True) if turned),
+            "diagnoses": {name: words for name, words in diagnoses if words},
+        }
 
 
 def _examples(groups: Groups) -> dict[tuple[str, str], tuple[Group, Case]]:

@@ -7,21 +7,19 @@ case belongs to its property, and is stored once however many formulations fail 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contactverif.contract import schema
 from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import BODIES, Case
-from contactverif.contract.counterexample import Counterexample, counterexamples, named_failures, typeable
+from contactverif.contract.columns import Group, Variable, codes, numbers, words
+from contactverif.contract.counterexample import Counterexample, counterexamples, distinct, named_failures, typeable
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.result import NodalForces, Run
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group, Variable
-from contactverif_reports.netcdf.outcome_variables import OutcomeVariables, SharedNames, coordinates, safe_names
-from contactverif_reports.netcdf.variables import codes, numbers, words
+from contactverif_reports.netcdf.stored_outcomes import coordinates, outcome_axes, outcome_variables
 
 _FOLDER = f"/{schema.NAMED_CASES}"
 _OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, 2).
@@ -62,10 +60,9 @@ def _mesh(example: Counterexample) -> Group:
     """Return the case as a UGRID-1.0 topology, of edges in the plane and of faces in space, with the outcome on it."""
     case, info = example.case, example.row.info
     table = _topology(case) | _forces(example.row.forces)
-    names = SharedNames.from_outcomes(info, [example.outcome])
-    names = replace(names, parameters=(), kinds=())  # They are among the arrays.
-    table |= coordinates(info, names)
-    table |= OutcomeVariables(info, [example.outcome], {}, names).table(with_summaries=False)
+    axes = {**outcome_axes(info, [example.outcome]), "parameter": (), "kind": ()}  # These are among the arrays.
+    table |= coordinates(info, axes)
+    table |= outcome_variables(info, [example.outcome], {}, axes, with_cases=False)
     attributes = {
         "title": f"{example.formulation}, {info.id}: {example.verdict}",
         "formulation": example.formulation,
@@ -157,7 +154,7 @@ def case_group(case: Case) -> Group:
     """Return `Case.to_arrays()`; the attribute `case_array` of each variable names the array."""
     arrays = case.to_arrays()
     table: dict[str, Variable] = {}
-    for safe, (name, values) in zip(safe_names(arrays), arrays.items(), strict=True):
+    for safe, (name, values) in zip(distinct(map(typeable, arrays)), arrays.items(), strict=True):
         variable = _array(safe, name, values)
         variable.attrs[ARRAY_NAME] = schema.text(name)
         table[safe] = variable

@@ -1,161 +1,165 @@
-"""Outcomes as they are read from a report: each is made from the arrays of its group when somebody asks for it.
+"""Outcomes in a report, written and read: random cases, witnesses and counterexamples are stored the same way.
 
-A report may hold millions of cases. Made all at once, they would take a hundred times the memory of the arrays.
+A report may hold millions of cases. Made all at once, they would take a hundred times the memory of the arrays, so each
+is made from the arrays of its group when somebody asks for it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, freeze
+from contactverif.contract import schema
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
+from contactverif.contract.columns import Axes, Group, StoredColumns, Variable, to_variables, words
 from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.contract.outcomes import Outcomes
-from contactverif.contract.property import LEAST_CONTACT, NONE_UNDECIDED, Outcome, PropertyInfo, Verdict
-from contactverif_reports.netcdf import schema
-from contactverif_reports.netcdf.groups import Group
-from contactverif_reports.netcdf.outcome_variables import safe_names
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 
-# The kind of numpy's types of each variable; all others hold reals.
-_KINDS = dict.fromkeys(("verdict", "state", *schema.CASE_COUNTS, "case_kind"), "i")
-_TEXTS = ("reason", "undecided", "broken", *(name for name, _ in schema.FINDING.values()))
-_KINDS |= dict.fromkeys((*_TEXTS, "case_name"), "U")
+Table = dict[str, Variable]
+
+
+def common_unit(units: Iterable[str], otherwise: str) -> str:
+    """Return the unit that all numbers have, else where their units stand."""
+    different = set(units)
+    return different.pop() if len(different) == 1 else otherwise
+
+
+def outcome_axes(info: PropertyInfo, outcomes: Iterable[Outcome]) -> Axes:
+    """Return what stands along the dimensions of a group, so that random cases and witnesses have the same ones.
+
+    Details and parameters are in the order in which they first occur; the kinds of the property come before others.
+    """
+    details, parameters = dict[str, None](), dict[str, None]()
+    kinds, n_iterates, n_components = set[str](), 0, 0
+    for outcome in outcomes:
+        case = outcome.case_or_summary
+        kinds.add(case.kind)
+        parameters |= dict.fromkeys(name for name, values in case.parameters.items() if np.size(values) == 1)
+        if (measurement := outcome.measurement) is not None:
+            details |= dict.fromkeys(measurement.details)
+            n_iterates = max([n_iterates, *map(len, measurement.series.values())])
+            n_components = max(n_components, len(measurement.finding.found) if measurement.finding else 0)
+    return {
+        "quantity": [quantity.name for quantity in info.quantities],
+        "detail": list(details),
+        "series": list(info.series),
+        "iterate": range(n_iterates),
+        "component": range(n_components),
+        "parameter": list(parameters),
+        "kind": list(dict.fromkeys([*info.kinds, *sorted(kinds - {""})])),
+    }
+
+
+def _parameter_units(axes: Axes) -> list[str]:
+    return [schema.PARAMETER_UNITS.get(name, schema.UNKNOWN) for name in axes["parameter"]]
+
+
+def coordinates(info: PropertyInfo, axes: Axes) -> Table:
+    """Return what stands along `quantity`, `detail`, `series`, `kind` and `parameter`: names, units, reasons."""
+    table: Table = {}
+    if info.quantities:
+        table |= to_variables(schema.QUANTITY, info.quantities, {"quantity": len(info.quantities)}, {})
+    if axes["detail"]:
+        table["detail"] = words(["detail"], axes["detail"], "name of the further number")
+    if info.series:
+        table["series"] = words(["series"], list(info.series), "name of the numbers by iterate")
+        table["series_units"] = words(["series"], list(info.series.values()), "unit of the numbers by iterate")
+    if axes["kind"]:
+        comment = "n_declared: so many of them, the first ones, the property declares"
+        table["kind"] = words(["kind"], axes["kind"], "kind of situation that cases are of", comment)
+        table["kind"].attrs["n_declared"] = np.int32(len(info.kinds))
+    if axes["parameter"]:
+        table["parameter"] = words(["parameter"], axes["parameter"], "name of the parameter")
+        table["parameter_units"] = words(["parameter"], _parameter_units(axes), "unit of the parameter")
+    return table
+
+
+def outcome_variables(
+    info: PropertyInfo,
+    outcomes: Sequence[Outcome | None],
+    dims: Mapping[str, int],
+    axes: Axes,
+    prefix: str = "",
+    *,
+    with_cases: bool = True,
+) -> Table:
+    """Return the variables of flat outcomes along some dimensions; None is no outcome."""
+    unit = common_unit((quantity.unit for quantity in info.quantities), "see quantity_units")
+    units = {
+        "value": unit,
+        "tolerance": unit,
+        "series_value": common_unit(info.series.values(), "see series_units"),
+        "parameter_value": common_unit(_parameter_units(axes), "see parameter_units"),
+    }
+    table = schema.OUTCOME + (schema.CASE_COLUMNS if with_cases else ())
+    return to_variables(table, outcomes, dims, axes, prefix=prefix, units=units)
 
 
 class OutcomeArrays:
     """The outcomes of a group along some dimensions, by flat number; names of variables begin with `prefix`."""
 
-    def __init__(self, dataset: Group, info: PropertyInfo, dims: Sequence[str], prefix: str = "") -> None:
-        self._dataset, self._dims, self._prefix = dataset, tuple(dims), prefix
-        self.verdicts = self._read("verdict")
-        known = [schema.NOT_PLANNED, *schema.VERDICTS.values()]
-        if not np.isin(self.verdicts, known).all():
-            raise ValueError(f"{prefix}verdict holds a code without a meaning")
-        self._states = self._read("state")
-        self._texts = {name: self._read(name) for name in _TEXTS if self._has(name)}
-        self._found, self._right = (
-            self._read(name, "component") if self._has(name) else np.empty((len(self.verdicts), 0))
-            for name in ("found", "right")
-        )
-        self._quantities = info.quantities
-        self._details = dataset.labels("detail")
-        self._values, self._tolerances, self._detail_values = (
-            self._read(name, axis) if along else np.empty((len(self.verdicts), 0))
-            for name, axis, along in (
-                ("value", "quantity", self._quantities),
-                ("tolerance", "quantity", self._quantities),
-                ("detail_value", "detail", self._details),
-            )
-        )
-        self._series = {
-            name: self._read(f"series_{safe}", "iterate")
-            for name, safe in zip(info.series, safe_names(info.series), strict=True)
-            if self._has(f"series_{safe}")
+    def __init__(self, group: Group, info: PropertyInfo, dims: Sequence[str], prefix: str = "") -> None:
+        self._info = info
+        axes: Axes = {
+            "quantity": [quantity.name for quantity in info.quantities],
+            "detail": group.labels("detail"),
+            "series": list(info.series) if f"{prefix}series_value" in group else [],
+            "parameter": group.labels("parameter"),
+            "kind": group.labels("kind"),
+            **{axis: range(group.sizes.get(axis, 0)) for axis in ("iterate", "component")},
         }
-        self._read_summaries()
-        self._check()
-
-    def _check(self) -> None:
-        """Check what is used only when somebody asks for an outcome."""
-        place = f"of {self._prefix}verdict"
-        planned = self.verdicts != schema.NOT_PLANNED
-        if (self._states[planned] & ~sum(schema.STATES.values())).any():
-            raise ValueError(f"the states {place} hold a code without a meaning")
-        if self._values.shape[1] != len(self._quantities) or self._detail_values.shape[1] != len(self._details):
-            raise ValueError(f"the numbers {place} are not as many as their names")
-        measured = self._states & schema.MEASURED != 0
-        lacks_tolerance = (self._values != schema.NOT_MEASURED) & (self._tolerances == schema.NOT_MEASURED)
-        if lacks_tolerance[planned & measured].any():
-            raise ValueError(f"a value {place} has no tolerance")
-        if ((self._found == schema.NOT_MEASURED) != (self._right == schema.NOT_MEASURED)).any():
-            raise ValueError(f"what was found {place} is not as much as what is right")
-        if self._dims:
-            kinds = self._case_kinds[planned]
-            if ((kinds < -1) | (kinds >= len(self._kinds) - 1)).any():
-                raise ValueError(f"the kinds {place} hold a code without a meaning")
-            if (self._counts[planned] < 0).any():
-                raise ValueError(f"the cases {place} have fewer than no segments")
-
-    def _read_summaries(self) -> None:
-        self._parameters = self._dataset.labels("parameter")
-        if not self._dims:  # The whole case of a single outcome stands elsewhere.
-            return
-        self._counts = np.column_stack([self._read(name) for name in schema.CASE_COUNTS])
-        columns = (*schema.CASE_REALS, *(f"parameter_{safe}" for safe in safe_names(self._parameters)))
-        self._reals = np.column_stack([self._read(name) for name in columns]).astype(np.float64)
-        self._case_names = self._read("case_name") if self._has("case_name") else None
-        self._kinds = [*self._dataset.labels("kind"), ""]  # A case of none has the code −1, which is the last.
-        self._case_kinds = self._read("case_kind") if self._has("case_kind") else np.full(len(self.verdicts), -1)
+        # The whole case of a single outcome stands elsewhere.
+        table = schema.OUTCOME + (schema.CASE_COLUMNS if dims else ())
+        self._columns = StoredColumns(table, group, dims, axes, prefix=prefix)
+        arrays = self._columns.arrays
+        self.verdicts = arrays["verdict"]
+        values, tolerances, found, right = (
+            arrays.get(f"measurement.{name}", np.empty(0)) == schema.NOT_MEASURED
+            for name in ("values", "tolerances", "finding.found", "finding.right")
+        )
+        if (~values & tolerances).any():
+            raise ValueError(f"a value of {prefix}verdict has no tolerance")
+        if (found != right).any():
+            raise ValueError(f"what was found of {prefix}verdict is not as much as what is right")
 
     def outcome(self, number: int, case: Case | None = None, seconds: float = 0.0) -> Outcome | None:
         """Return an outcome, with the whole case if it is given; None where there is none."""
-        verdict = int(self.verdicts[number])
-        if verdict == schema.NOT_PLANNED:
+        if not self._columns.present[number]:
             return None
-        state = int(self._states[number])
+        values = self._columns.at(number)
         return Outcome(
-            self._summary(number) if case is None else case,
-            Verdict(verdict),
-            self._text("reason", number),
-            self._measurement(number, idle=bool(state & schema.IDLE)) if state & schema.MEASURED else None,
+            CaseSummary(**_fields_of("summary", values)) if case is None else case,
+            Verdict(values["verdict"]),
+            values.get("reason", ""),
+            self._measurement(values) if values["measurement"] else None,
             seconds=seconds,
-            breach=bool(state & schema.BREACH),
+            breach=values["breach"],
         )
 
-    def _summary(self, number: int) -> CaseSummary:
-        n_slave, n_master = self._counts[number].tolist()
-        penalty, largest, shortest, *parameters = self._reals[number].tolist()
-        name = "" if self._case_names is None else str(self._case_names[number])
-        present, kind = _present(self._parameters, parameters), self._kinds[self._case_kinds[number]]
-        return CaseSummary(n_slave, n_master, penalty, largest, shortest, present, name, kind)
-
-    def _measurement(self, number: int, *, idle: bool) -> Measurement:
-        pairs = zip(self._quantities, self._values[number].tolist(), self._tolerances[number].tolist(), strict=True)
+    def _measurement(self, values: Mapping[str, Any]) -> Measurement:
+        fields = _fields_of("measurement", values)
+        measured, tolerances = fields.pop("values", {}), fields.pop("tolerances", {})
+        finding = {"unit": "", "found_name": "", "right_name": "", **_fields_of("measurement.finding", values)}
         return Measurement(
-            [quantity.check(value, bound) for quantity, value, bound in pairs if value != schema.NOT_MEASURED],
-            undecided=self._text("undecided", number),
-            broken=self._text("broken", number),
-            details=_present(self._details, self._detail_values[number].tolist()) if self._details else {},
-            series={
-                name: freeze(values[number, :length], np.float64)
-                for name, values in self._series.items()
-                if (length := _length(values[number]))
-            },
-            idle=idle,
-            finding=self._finding(number),
+            [
+                each.check(measured[each.name], tolerances[each.name])
+                for each in self._info.quantities
+                if each.name in measured
+            ],
+            finding=Finding(**finding) if finding.get("place") else None,
+            **fields,
         )
 
-    def _finding(self, number: int) -> Finding | None:
-        words = {attribute: self._text(name, number) for attribute, (name, _) in schema.FINDING.items()}
-        if not words["place"]:
-            return None
-        found, right = (
-            tuple(value for value in values[number].tolist() if value != schema.NOT_MEASURED)
-            for values in (self._found, self._right)
-        )
-        if not found:  # As in reports of schema 2.
-            return Finding(words["place"], remark=words["remark"])
-        return Finding(found=found, right=right, **words)
 
-    def _text(self, name: str, number: int) -> str:
-        return str(self._texts[name][number]) if name in self._texts else ""
-
-    def _has(self, name: str) -> bool:
-        return f"{self._prefix}{name}" in self._dataset.variables
-
-    def _read(self, name: str, *axes: str) -> np.ndarray[Any, Any]:
-        """Return a variable as an array (n_outcomes, *axes)."""
-        variable = self._dataset.variables[f"{self._prefix}{name}"]
-        if variable.dims != (*self._dims, *axes):
-            raise ValueError(f"{self._prefix}{name} has the dimensions {variable.dims}")
-        values: np.ndarray[Any, Any] = variable.values
-        if values.dtype.kind not in _KINDS.get(name, "f"):
-            raise ValueError(f"{self._prefix}{name} is of the type {values.dtype}")
-        return values.reshape(-1, *values.shape[len(self._dims) :])
+def _fields_of(owner: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return {attribute: value} of the attributes of one record in the record."""
+    parts = ((path.rpartition("."), value) for path, value in values.items())
+    return {name: value for (its_owner, _, name), value in parts if its_owner == owner}
 
 
 class StoredOutcomes(Outcomes):
@@ -181,34 +185,22 @@ class StoredOutcomes(Outcomes):
         return outcome if case is None else replace(outcome, case_or_summary=case)
 
 
-def read_info(dataset: Group) -> PropertyInfo:
+def read_info(group: Group) -> PropertyInfo:
     """Return the property of a group."""
-    columns = {attribute: dataset.words(name) for name, (attribute, _, _) in schema.QUANTITY.items()}
-    needs = str(dataset.attrs["needs"])
-    dataset.labels("quantity")
-    strangers = set(dataset.words("sense")) - {"at most", "at least"}
+    columns = {column.path: group.words(column.name) for column in schema.QUANTITY}
+    needs = str(group.attrs["needs"])
+    group.labels("quantity")
+    strangers = set(group.words("sense")) - {"at most", "at least"}
     if strangers:
         raise ValueError(f"the sense of a quantity is {strangers.pop()!r}")
     return PropertyInfo(
-        str(dataset.attrs["property_id"]),
-        str(dataset.attrs["family"]),
-        str(dataset.attrs["summary"]),
+        str(group.attrs["property_id"]),
+        str(group.attrs["family"]),
+        str(group.attrs["summary"]),
         tuple(Quantity(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)),
         needs=frozenset() if needs == schema.NONE else frozenset(needs.split(", ")),
-        series=dict(zip(dataset.labels("series"), dataset.words("series_units"), strict=True)),
-        kinds=tuple(dataset.labels("kind")[: int(dataset["kind"].attrs["n_declared"])]) if "kind" in dataset else (),
-        # Reports that are older than these two have no such attribute.
-        least_contact=float(dataset.attrs.get("least_contact", LEAST_CONTACT)),
-        usual_undecided=float(dataset.attrs.get("usual_undecided", NONE_UNDECIDED)),
+        series=dict(zip(group.labels("series"), group.words("series_units"), strict=True)),
+        kinds=tuple(group.labels("kind")[: int(group["kind"].attrs["n_declared"])]) if "kind" in group else (),
+        least_contact=float(group.attrs["least_contact"]),
+        usual_undecided=float(group.attrs["usual_undecided"]),
     )
-
-
-def _present(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
-    """Return {name: value} without what was not measured."""
-    return {name: value for name, value in zip(names, values, strict=True) if value != schema.NOT_MEASURED}
-
-
-def _length(series: FloatArray) -> int:
-    """Return the number of iterates in front of the padding."""
-    present = np.flatnonzero(series != schema.NOT_MEASURED)
-    return int(present[-1]) + 1 if len(present) else 0

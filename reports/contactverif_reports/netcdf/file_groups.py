@@ -1,11 +1,8 @@
-"""The reading of the groups of a netCDF file.
+"""The groups of a netCDF file, written and read.
 
-A child process opens the file and sends its groups as bytes, so that a damaged file can harm only the child.
-
-Rules for the next editor:
-
-- `pack_groups` runs in the child. It asks for the sizes of everything before it reads anything.
-- The process that shows a report never opens it with the netCDF library.
+All variables are declared first, and filled afterwards: in turns, the netCDF library would write the description of
+all variables again at each turn. A child process opens the file that is read and sends its groups as bytes, so that a
+damaged file can harm only the child; the process that shows a report never opens it with the netCDF library.
 """
 
 from __future__ import annotations
@@ -20,16 +17,60 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from contactverif.contract.columns import Group, Variable
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.file_reader import ReadError, limits_for, read_in_child
 from contactverif.isolation.ordinary import check_ordinary
 from contactverif.isolation.packed import PackedArray
-from contactverif_reports.netcdf.groups import Group, Variable
 
 # zlib makes nothing smaller than a 1032nd. A file that says that it holds more lies; the rest is for small files.
 MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20
 LONGEST_TEXT = 1 << 20  # Characters of an attribute. The longest that we write say what each formulation provides.
+_WORTH_COMPRESSING = 4096  # The bytes from which on a variable is compressed, which costs 2 kB of bookkeeping.
 _MAGIC = b"\x89HDF\r\n\x1a\n"  # The first bytes of each netCDF-4 file.
+
+
+def write_tree(groups: Mapping[str, Group], path: str | os.PathLike[str]) -> None:
+    """Write groups {path: group}, ``"/"`` first, into a file; one that is there is replaced.
+
+    A dimension of a group is that of a group above if it has its length.
+    """
+    with netCDF4.Dataset(os.fspath(path), "w", format="NETCDF4") as file:
+        declared = []
+        for name, group in groups.items():
+            target = file.createGroup(name)  # "/" is the file itself.
+            target.setncatts(group.attrs)
+            declared += [_declare(target, name, variable) for name, variable in group.items()]
+        for variable, values in declared:
+            variable[...] = values
+
+
+def _declare(group: Any, name: str, variable: Variable) -> tuple[Any, np.ndarray[Any, Any]]:
+    """Return a new, empty variable of a group, and the values that belong into it."""
+    values, dims, attributes = variable.values, variable.dims, dict(variable.attrs)
+    compressed = values.ndim > 0 and values.nbytes >= _WORTH_COMPRESSING
+    if values.dtype.kind == "S":
+        width = values.dtype.itemsize
+        values = np.ascontiguousarray(values)[..., np.newaxis].view("S1").reshape(*values.shape, width)
+        dims = (*dims, f"string{width}")
+    for dim, size in zip(dims, values.shape, strict=True):
+        _declare_dimension(group, dim, size)
+    fill = attributes.pop("_FillValue", None)
+    target = group.createVariable(name, values.dtype, dims, zlib=compressed, complevel=4, fill_value=fill)
+    target.set_auto_maskandscale(False)
+    target.set_auto_chartostring(False)
+    target.setncatts(attributes)
+    return target, values
+
+
+def _declare_dimension(group: Any, dim: str, size: int) -> None:
+    """Add a dimension to a group, unless it or a group above has that dimension."""
+    above = group
+    while above is not None:
+        if dim in above.dimensions and len(above.dimensions[dim]) == size:
+            return
+        above = above.parent
+    group.createDimension(dim, size)
 
 
 def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, decode: bool = True) -> dict[str, Group]:
@@ -90,7 +131,7 @@ def _words(characters: NDArray[Any]) -> NDArray[Any]:
 
 
 def pack_groups(path: str) -> bytes:
-    """Return all groups of a netCDF file as bytes; this runs in a child process."""
+    """Return all groups of a netCDF file as bytes; this runs in a child process, and asks for all sizes first."""
     try:
         file = netCDF4.Dataset(path)
     except OSError as error:  # Its words repeat the path.
