@@ -1,6 +1,5 @@
-"""Forged journals of one run: records that are changed by somebody who knows the format, but not the key."""
+"""Forged journals of one run: records that are changed by somebody who knows the format."""
 
-import secrets
 import struct
 import zlib
 from collections.abc import Callable, Iterator
@@ -9,43 +8,40 @@ from typing import Any
 
 import msgspec
 
-from contactverif.contract.property import Verdict
+from contactverif.contract.property import Outcome, Verdict
+from contactverif.contract.records import part_of
 from contactverif.contract.result import Run
-from contactverif.journals.journal import JournalKey, read_messages, record_files
-from contactverif.journals.outcome_records import BlockRecord, FormRecord, OutcomeRecord
-from contactverif.journals.run_journal import Journal
-from contactverif.journals.run_plan import Plan
 from contactverif.plugins.provenance import machine
 from contactverif.plugins.registry import load_formulation, load_properties
+from contactverif.run.journal import read_messages, record_files
 from contactverif.run.run import run
+from contactverif.run.store import FormRecord, OutcomeRecord, Plan, RejectedRecord, Store
 
 IDS = ("balance.force", "patch.flat.transmission")
 EXAMPLES, SEED = 12, 3
-BOX: dict[str, object] = {"isolation": {"isolation": "box"}}  # No plugin can read the key of such a run.
-Record = FormRecord | OutcomeRecord | BlockRecord
+Record = FormRecord | OutcomeRecord | RejectedRecord
 _DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Record)
-_TAG = 16
 
 
 def read(path: Path) -> Iterator[tuple[int, Record]]:
     """Yield (place, record) of a file of records."""
-    for place, message, _ in read_messages(path, JournalKey()):
+    for place, message in read_messages(path):
         yield place, _DECODER.decode(message)
 
 
 def frame(record: Record) -> bytes:
-    """Return a record with a length and a checksum that are right, and a tag that is a guess."""
-    body = secrets.token_bytes(_TAG) + msgspec.msgpack.encode(record)
-    return struct.pack("<II", len(body), zlib.crc32(body)) + body
+    """Return a record with a length and a checksum that are right."""
+    message = msgspec.msgpack.encode(record)
+    return struct.pack("<II", len(message), zlib.crc32(message)) + message
 
 
-def plan_of(seed: int = SEED, options: dict[str, object] = BOX) -> Plan:
-    return Plan(formulations=("nts",), properties=IDS, examples=EXAMPLES, seed=seed, machine=machine(), options=options)
+def plan_of(seed: int = SEED) -> Plan:
+    return Plan(formulations=("nts",), properties=IDS, examples=EXAMPLES, seed=seed, machine=machine())
 
 
-def judge(journal: Journal, seed: int = SEED) -> Run:
-    """Judge what the journal does not have."""
-    return run([load_formulation("nts")], load_properties(IDS), examples=EXAMPLES, seed=seed, journal=journal)
+def judge(store: Store, seed: int = SEED) -> Run:
+    """Judge what the store does not have."""
+    return run([load_formulation("nts")], load_properties(IDS), examples=EXAMPLES, seed=seed, store=store)
 
 
 def forge(journal: Path, change: Callable[[Record], Record]) -> None:
@@ -64,8 +60,9 @@ def forge(journal: Path, change: Callable[[Record], Record]) -> None:
 
 def say_pass(record: Record) -> Record:
     """Return the form of a failure as that of a pass, with the same numbers."""
-    if isinstance(record, FormRecord) and record.form.verdict is Verdict.FAIL:
-        return FormRecord(record.form._replace(verdict=Verdict.PASS, reason=""))
+    if isinstance(record, FormRecord) and part_of(Outcome, record.form, "verdict") == Verdict.FAIL:
+        case, _, _, *others = record.form
+        return FormRecord([case, int(Verdict.PASS), "", *others])
     return record
 
 

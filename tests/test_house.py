@@ -34,7 +34,7 @@ class Room:
 
 QUIET = frozenset(FILES | {"print", "open", "input"})
 BELOW_RUN = ("contract", "oracle", "mechanics", "meshes", "problems", "strategies")
-BESIDE_RUN = ("plugins", "sampling", "journals")
+BESIDE_RUN = ("plugins", "sampling")
 RUN = (*BESIDE_RUN, "run")
 REPORTS = (
     "reports",
@@ -58,10 +58,9 @@ ROOMS = {
     "explanations": Room(("contract",), ("numpy",), QUIET),
     "plugins": Room(("contract", "isolation", "problems"), ("numpy", "scipy", "threadpoolctl", "psutil")),
     "sampling": Room(("contract",), ("numpy", "scipy", "hypothesis", "threadpoolctl")),
-    "journals": Room(("contract", "plugins"), ("numpy", "msgspec", "psutil")),
     "run": Room(
         ("contract", "problems", "strategies", "isolation", "diagnosis", *BESIDE_RUN),
-        ("numpy", "scipy", "msgspec"),
+        ("numpy", "scipy", "msgspec", "psutil"),
     ),
     "studies": Room(
         (*BELOW_RUN, "isolation", *RUN, *REPORTS),

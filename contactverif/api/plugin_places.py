@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,12 +54,8 @@ def limits_of(
     from contactverif.isolation.box import Box
     from contactverif.isolation.limits import Limits
     from contactverif.isolation.process import adopt_orphans
-    from contactverif.journals.keys import state_folder
 
     adopt_orphans()
-    with suppress(OSError, RuntimeError):  # Only what is there can be hidden.
-        state_folder().mkdir(mode=0o700, parents=True, exist_ok=True)
-        hidden = (*hidden, state_folder())
     box = Box(tuple(opened), tuple(map(str, hidden)), by_rules=place is Isolation.LANDLOCK)
     return Limits(seconds, memory, None if place is Isolation.PROCESS else box)
 

@@ -62,8 +62,7 @@ def check_share(share: float) -> None:
 def audit_report(report: Path, share: float, place: PlaceOptions, isolation: IsolationOptions) -> int:
     """Audit a report, and show what differs; return the exit status."""
     from contactverif.cli.run_endings import show_what_plugins_printed
-    from contactverif.plugins.engines import the_subject
-    from contactverif.plugins.registry import the_property
+    from contactverif.plugins.registry import the_property, the_subject
     from contactverif.run.audit import audit as audit_run
     from contactverif_reports.netcdf.differences import same_data
     from contactverif_reports.netcdf.read import read_run
@@ -86,7 +85,7 @@ def audit_report(report: Path, share: float, place: PlaceOptions, isolation: Iso
 
 def _sampling(run: Run, place: PlaceOptions) -> Sampling:
     """Return the size and the seed of a run, and the place where it asked."""
-    from contactverif.journals.run_plan import place_words
+    from contactverif.run.store import place_words
     from contactverif.sampling.draw import Sampling
 
     stored, typed = run.provenance.get("place", ""), place_words(asdict(place))

@@ -159,7 +159,7 @@ def _write(
 ) -> None:
     """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:
-        from contactverif.journals.journal import journal_folder, remove_journal
+        from contactverif.run.journal import journal_folder, remove_journal
         from contactverif_reports.netcdf.bench_file import write_bench
 
         write_bench(results, files.paths[REPORT])

@@ -22,9 +22,8 @@ from contactverif.cli.verify_command import select_names
 from contactverif.cli.verify_job import VerifyJob, VerifyOptions, new_job, say_what_was_doubted
 
 if TYPE_CHECKING:
-    from contactverif.journals.run_journal import Journal
-    from contactverif.journals.run_plan import Plan
     from contactverif.run.campaign import Shard
+    from contactverif.run.store import Plan
 
 CAMPAIGN = "campaign"
 _SEED = 0  # The seed if there is none: all shards must have the same.
@@ -56,7 +55,6 @@ def campaign(
       contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
       contactverif merge runs --out nts-ar.nc
     """
-    from contactverif.journals.journal import hold_journal
     from contactverif.run.campaign import Shard, open_shard
     from contactverif_reports.files import made_folder
 
@@ -72,25 +70,24 @@ def campaign(
     plan = piece.plan(job.plan())
     made_folder(out, "--out")
     folder = out.absolute() / piece.folder
-    if open_shard(folder, plan):
-        typer.echo(f"shard {piece.text} is done already")
-        return
-    with hold_journal(folder, "--out"):
-        journal = _judge(piece, replace(job, hidden=(out.absolute(),)), folder, plan)
-    say_what_was_doubted(journal)
-    typer.echo(f"shard {piece.text} is done: {journal.known.n_outcomes} outcomes")
+    with open_shard(folder, plan) as is_done:
+        if is_done:
+            typer.echo(f"shard {piece.text} is done already")
+            return
+        n_outcomes = _judge(piece, replace(job, hidden=(out.absolute(),)), folder, plan)
+    typer.echo(f"shard {piece.text} is done: {n_outcomes} outcomes")
 
 
-def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> Journal:
-    """Load what the job names, and judge the shard; return its journal."""
+def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> int:
+    """Load what the job names, and judge the shard; return how many outcomes it has."""
     from contactverif.cli.progress import Bar
     from contactverif.contract.foreign_text import name_line, one_line
     from contactverif.contract.property import Property
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
-    from contactverif.journals.run_journal import Journal
     from contactverif.run.campaign import mark_done
-    from contactverif.run.run import judge_share
+    from contactverif.run.run import run_share
+    from contactverif.run.store import Store
 
     plugins = job.load()
     items = [*plugins.subjects, *plugins.questions]
@@ -101,8 +98,8 @@ def _judge(shard: Shard, job: VerifyJob, folder: Path, plan: Plan) -> Journal:
     subjects = [item for item in items if isinstance(item, Subject)]
     questions = [item for item in items if isinstance(item, Property)]
     with Bar() as bar:
-        journal = Journal(plan, folder, [folder])
-        judge_share(subjects, questions, job.sampling, bar.show_progress, journal, share=shard.share)
+        store = Store(plan, folder, [folder])
+        run_share(subjects, questions, job.sampling, bar.show_progress, store, share=shard.share)
     show_what_plugins_printed()
-    say_what_was_doubted(journal)
+    say_what_was_doubted(store)
     return mark_done(folder, plan)

@@ -18,7 +18,7 @@ from contactverif.cli.output_files import PictureFolder
 from contactverif.cli.progress import Bar
 from contactverif.cli.run_endings import (
     end_run,
-    say_how_many_are_unproven,
+    say_how_many_were_stored,
     say_how_to_go_on,
     say_where_plugins_ran,
     show_what_plugins_printed,
@@ -31,11 +31,10 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
-from contactverif.plugins.engines import that_loads
-from contactverif.plugins.registry import formulation_names, load_properties
+from contactverif.plugins.registry import formulation_names, load_properties, that_loads
 from contactverif.run.judge import forces_on
-from contactverif.run.rows import find_gap
-from contactverif.run.subject_loading import begin_loading
+from contactverif.run.rows import find_missing
+from contactverif.run.scheduler import begin_loading
 from contactverif.run.worker_pool import worker_pool
 from contactverif.studies.comparison_study import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
@@ -63,18 +62,18 @@ def compare_formulations(job: VerifyJob, screen: ScreenOptions) -> int:
     """Run all properties, show what was found and write the files; return the exit status."""
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            (reference, plugins), journal = stack.enter_context(job.begin(partial(_load, job, executor)))
-            options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
+            (reference, plugins), store = stack.enter_context(job.begin(partial(_load, job, executor)))
+            options = job.run_options(progress=bar.show_progress, executor=executor, store=store)
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
-        gap = partial(find_gap, study.run, plugins.subjects, plugins.questions, job.sampling)
-        end = end_run(job, journal, gap, _writers(study, plugins), promises_kept=study.comparison.promises_kept)
+        gap = partial(find_missing, study.run, plugins.subjects, plugins.questions, job.sampling)
+        end = end_run(job, store, gap, _writers(study, plugins), promises_kept=study.comparison.promises_kept)
     if job.pictures is not None:
         _draw_meshes(study, plugins, job.pictures)
     show_what_plugins_printed()
     annotate(study.run)
     if not screen.quiet:
         _show_study(study, screen)
-        say_how_many_are_unproven(study.run)
+        say_how_many_were_stored(study.run)
         if job.pictures is not None:
             show(f"pictures: {job.pictures.name}")
         end.files.announce()

@@ -8,8 +8,6 @@ from contactverif.contract.errors import MisuseError
 
 if TYPE_CHECKING:
     from contactverif.cli.verify_job import VerifyJob
-    from contactverif.contract.result import Run
-    from contactverif.run.failure_memory import Failures
 
 
 def ask_what_failed(job: VerifyJob) -> int:
@@ -18,6 +16,7 @@ def ask_what_failed(job: VerifyJob) -> int:
     from contactverif.cli.run_endings import show_what_plugins_printed
     from contactverif.cli.run_screen import RunScreen
     from contactverif.run.failure_memory import FailureMemory
+    from contactverif.run.run import run_failures
 
     options = {
         "--out": job.files.names and not job.resumes,
@@ -31,31 +30,12 @@ def ask_what_failed(job: VerifyJob) -> int:
     if not failures:
         words = f"no failure of {', '.join(map(repr, job.options.names))} in .contactverif"
         raise MisuseError("--last-failed", words, "a run of `verify` here in which something fails")
-    result = _judge(job, failures)
+    plugins = job.load()
+    provenance = {"asked": "what failed in earlier runs"}
+    result = run_failures((*plugins.subjects, *plugins.questions), failures, provenance)
     memory.update(result.rows)
     show_what_plugins_printed()
     show(RunScreen(result))
     left = len(memory.recall(*names))  # What cannot be judged now is left, too.
     show(f"{left} of {len(failures)} failures of earlier runs are left.")
     return 0 if result.promises_kept else 1
-
-
-def _judge(job: VerifyJob, failures: Failures) -> Run:
-    """Return a row for each remembered failure, and the plugins that do not load."""
-    from contactverif.contract.property import Property
-    from contactverif.contract.result import NotLoaded, Run
-    from contactverif.contract.subject import Subject
-    from contactverif.run.judge import judge_if_applicable
-    from contactverif.run.rows import row_of_case
-
-    plugins = job.load()
-    items = (*plugins.subjects, *plugins.questions)
-    subjects = {item.name: item for item in items if isinstance(item, Subject)}
-    questions = {item.id: item for item in items if isinstance(item, Property)}
-    rows = tuple(
-        row_of_case(questions[id_], subjects[name], judge_if_applicable(questions[id_], case, subjects[name]))
-        for (name, id_), case in failures.items()
-        if name in subjects and id_ in questions
-    )
-    not_loaded = tuple(item for item in items if isinstance(item, NotLoaded))
-    return Run(rows, not_loaded, provenance={"asked": "what failed in earlier runs"})

@@ -55,8 +55,7 @@ def list_installed(
     from contactverif.cli.console import plain_table, show
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
-    from contactverif.plugins.engines import describe_engines
-    from contactverif.plugins.registry import load_formulations, load_problems, load_properties
+    from contactverif.plugins.registry import describe_engines, load_formulations, load_problems, load_properties
 
     table = plain_table("formulations", words=("name",))
     table.add_column("in")  # It gives way on a narrow screen, and names do not.

@@ -34,9 +34,9 @@ def merge(
 ) -> None:
     """Make the report of a campaign: that of one verify with the same seed.
 
-    A record that does not fit the key of its shard is named, and its case is
-    judged again; so is a share of the outcomes of a shard without a key. What
-    fails is shrunk here. The shards stay.
+    A share of the outcomes is judged again; a row in which one differs is
+    named, and all of it is judged again. What fails is shrunk here. The
+    shards stay.
 
     \bExit status
       as that of verify; 1 also if the audit differs; 2 also if a shard is

@@ -55,8 +55,7 @@ def replay(
         replay_table,
     )
     from contactverif.contract.property import Verdict
-    from contactverif.plugins.engines import the_subject
-    from contactverif.plugins.registry import the_property
+    from contactverif.plugins.registry import the_property, the_subject
     from contactverif.run.judge import judge_if_applicable
     from contactverif_reports.draw import as_text
     from contactverif_reports.netcdf.read import case_ids, read_case

@@ -17,7 +17,7 @@ from contactverif.contract.errors import MisuseError
 if TYPE_CHECKING:
     from contactverif.cli.verify_job import VerifyJob
     from contactverif.contract.result import Run
-    from contactverif.journals.run_journal import Journal
+    from contactverif.run.store import Store
 
 STOPPED = 130  # The exit status after Ctrl-C.
 NOT_WRITTEN = 2  # The exit status if a file could not be written.
@@ -46,14 +46,14 @@ def _write(write: Callable[[Path], None], path: Path, name: Path) -> bool:
     return False
 
 
-def _end_journal(journal: Journal, *, complete: bool) -> None:
+def _end_journal(store: Store, *, complete: bool) -> None:
     """Remove the journal once the files are complete."""
-    from contactverif.journals.journal import remove_journal
+    from contactverif.run.journal import remove_journal
 
-    if journal.trouble:
-        _warn(f"the journal could not be written to its end: {journal.trouble}")
-    if complete and journal.folder is not None:
-        remove_journal(journal.folder)
+    if store.write_error:
+        _warn(f"the journal could not be written to its end: {store.write_error}")
+    if complete and store.folder is not None:
+        remove_journal(store.folder)
 
 
 class End(NamedTuple):
@@ -67,20 +67,20 @@ class End(NamedTuple):
 
 def end_run(
     job: VerifyJob,
-    journal: Journal,
-    find_gap: Callable[[], str],
+    store: Store,
+    find_missing: Callable[[], str],
     writers: Mapping[str, Callable[[Path], None]],
     *,
     promises_kept: bool,
 ) -> End:
     """Write the files before anything is shown, so that nothing that was judged is lost, and remove the journal."""
-    gap = find_gap() if promises_kept else ""
+    gap = find_missing() if promises_kept else ""
     written = _write_files(job.files, writers)
     complete = written.paths == job.files.paths and not gap
-    _end_journal(journal, complete=complete)
+    _end_journal(store, complete=complete)
     if gap:
         return End(written, gap, complete, 1)
-    whole = complete and not journal.trouble
+    whole = complete and not store.write_error
     return End(written, gap, complete, (0 if promises_kept else 1) if whole else NOT_WRITTEN)
 
 
@@ -130,10 +130,10 @@ def show_what_plugins_printed() -> None:
         show_as_it_is(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
 
 
-def say_how_many_are_unproven(result: Run) -> None:
-    """Print how many outcomes of a run came from a journal without a proof."""
-    if doubt := result.provenance.get("unproven_outcomes"):
-        typer.echo(f"outcomes from a journal that proves nothing: {doubt}")
+def say_how_many_were_stored(result: Run) -> None:
+    """Print how many outcomes of a run earlier processes had judged."""
+    if stored := result.provenance.get("stored_outcomes"):
+        typer.echo(f"outcomes that were judged before: {stored}")
 
 
 def _warn(words: str) -> None:

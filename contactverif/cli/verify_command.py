@@ -20,7 +20,7 @@ from contactverif.cli.output_files import PictureFolder
 from contactverif.cli.run_endings import (
     End,
     end_run,
-    say_how_many_are_unproven,
+    say_how_many_were_stored,
     say_how_to_go_on,
     say_where_plugins_ran,
     show_what_plugins_printed,
@@ -124,24 +124,24 @@ def run_job(job: VerifyJob, screen: ScreenOptions, *, memory: bool = False) -> i
     """
     from contactverif.cli.progress import Bar
     from contactverif.run.failure_memory import FailureMemory
-    from contactverif.run.rows import find_gap
+    from contactverif.run.rows import find_missing
     from contactverif.run.run import run
     from contactverif.run.worker_pool import worker_pool
 
     failures = FailureMemory() if memory and job.place is None else None
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
-            plugins, journal = stack.enter_context(job.begin(partial(job.load, executor)))
+            plugins, store = stack.enter_context(job.begin(partial(job.load, executor)))
             if failures is not None:
-                journal.earlier_failures = failures.recall(job.options.names, job.options.properties)
+                store.failures = failures.recall(job.options.names, job.options.properties)
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
-            options = job.run_options(progress=bar.show_progress, executor=executor, journal=journal)
+            options = job.run_options(progress=bar.show_progress, executor=executor, store=store)
             result = run(plugins.subjects, plugins.questions, **options)
         if failures is not None:
             failures.update(result.rows)
-        gap = partial(find_gap, result, plugins.subjects, plugins.questions, job.sampling)
+        gap = partial(find_missing, result, plugins.subjects, plugins.questions, job.sampling)
         end = end_run(
-            job, journal, gap, run_writers(result, job.files.names.get(REPORT)), promises_kept=result.promises_kept
+            job, store, gap, run_writers(result, job.files.names.get(REPORT)), promises_kept=result.promises_kept
         )
     _show_results(result, plugins, end, job.pictures, screen)
     if not end.complete:
@@ -162,7 +162,7 @@ def _show_results(result: Run, plugins: Plugins, end: End, folder: PictureFolder
         show_run(result, screen, end.files.names.get(REPORT))
         if remark := result.provenance.get("drawing"):
             show(f"{remark}.")
-        say_how_many_are_unproven(result)
+        say_how_many_were_stored(result)
         if folder is not None:
             show(f"pictures: {folder.name}")
         end.files.announce()

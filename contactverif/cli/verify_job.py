@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
     from contactverif.isolation.limits import Limits
-    from contactverif.journals.run_journal import Journal
-    from contactverif.journals.run_plan import Plan
     from contactverif.run.profiles import Profile
+    from contactverif.run.store import Plan, Store
     from contactverif.sampling.draw import Sampling
 
 VERIFY, COMPARE = "verify", "compare"
@@ -58,8 +57,7 @@ class VerifyOptions:
 
     def with_settings(self, settings: Settings) -> VerifyOptions:
         """Return the options with those of the project where nothing is typed; of `isolation` see there."""
-        from contactverif.plugins.engines import has_engine
-        from contactverif.plugins.registry import matching_ids, property_ids, unknown_property_error
+        from contactverif.plugins.registry import has_engine, matching_ids, property_ids, unknown_property_error
 
         properties = self.properties or settings.properties
         ids, engines = property_ids(engines=True), has_engine(self.names)
@@ -115,7 +113,7 @@ class VerifyJob:
     def load(self, executor: Executor | None = None) -> Plugins:
         """Load the formulations, in the workers where there are any, and the properties meanwhile."""
         from contactverif.plugins.registry import load_properties
-        from contactverif.run.subject_loading import begin_loading
+        from contactverif.run.scheduler import begin_loading
 
         loaders = begin_loading(self.options.names, self.limits(), executor)
         questions = load_properties(self.options.properties, engines=True)
@@ -123,7 +121,7 @@ class VerifyJob:
 
     def limits(self) -> Limits | None:
         """Return the limits of the plugins' processes; in a box they do not see what this run writes."""
-        from contactverif.journals.journal import journal_folder
+        from contactverif.run.journal import journal_folder
 
         files = self.files.paths.values()
         return self.options.isolation.limits([*files, *map(journal_folder, files), *self.hidden])
@@ -170,8 +168,8 @@ class VerifyJob:
         """Return the plan for the header of a journal."""
         import msgspec
 
-        from contactverif.journals.run_plan import Plan
         from contactverif.plugins.provenance import machine
+        from contactverif.run.store import Plan
 
         assert self.profile.seed is not None
         return Plan(
@@ -188,60 +186,50 @@ class VerifyJob:
         )
 
     @contextmanager
-    def begin(self, load: Callable[[], _Loaded]) -> Iterator[tuple[_Loaded, Journal]]:
-        """Open a block with what a function loads, and with the journal of the run.
+    def begin(self, load: Callable[[], _Loaded]) -> Iterator[tuple[_Loaded, Store]]:
+        """Open a block with what a function loads, and with the store of the run.
 
-        The journal is there before a box is, which hides it. A plugin that lives in this process is loaded before: it
+        The store is there before a box is, which hides it. A plugin that lives in this process is loaded before: it
         may end us, and then leaves no file.
         """
         first = load() if self.options.isolation.isolation is Isolation.INLINE else None
-        with self.journal() as journal:
-            yield first or load(), journal
+        with self.store() as store:
+            yield first or load(), store
 
     @contextmanager
-    def journal(self) -> Iterator[Journal]:
-        """Open a block with the journal of the run. In it no other process goes on with the same journal."""
-        from contactverif.journals.journal import (
-            begin_journal,
-            hold_journal,
-            journal_folder,
-            keep_earlier,
-            withdraw_journal,
-        )
-        from contactverif.journals.run_journal import Journal
+    def store(self) -> Iterator[Store]:
+        """Open a block with the store of the run. In it no other process uses the same journal."""
+        from contactverif.run.journal import hold_journal, journal_folder, keep_earlier, new_journal
+        from contactverif.run.store import Store
 
         if self.output is None:
-            yield Journal()
+            yield Store()
             return
-        plan = self.plan()
+        plan, outputs = self.plan(), tuple(self.files.paths.values())
         folder = journal_folder(self.files.paths[self.output.suffix.lower()])
-        if not self.resumes and (aside := begin_journal(folder, plan, self.files.paths.values())):
-            folder_aside = self.output.parent / aside
-            typer.echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", err=True)
-        with hold_journal(folder, "--resume" if self.resumes else "--out"):
-            keep_earlier(folder, self.files.paths.values())
-            journal = Journal(plan, folder, self.sources)
+        held = hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs)
+        with held as aside:
+            if aside:
+                folder_aside = self.output.parent / aside
+                typer.echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", err=True)
+            keep_earlier(folder, outputs)
+            store = Store(plan, folder, self.sources)
             try:
-                yield journal
-            except MisuseError:
-                if not self.resumes:
-                    withdraw_journal(folder, self.files.paths.values())
-                raise
+                yield store
             finally:
-                say_what_was_doubted(journal)
+                say_what_was_doubted(store)
 
 
-def say_what_was_doubted(journal: Journal) -> None:
-    """Name the records of a journal that were not believed."""
-    for remark in journal.remarks:
+def say_what_was_doubted(store: Store) -> None:
+    """Name the rows whose stored outcomes do not count."""
+    for remark in store.remarks:
         typer.echo(f"contactverif: {' '.join(remark.split())}", err=True)
-    journal.remarks.clear()
+    store.remarks.clear()
 
 
 def new_job(options: VerifyOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> VerifyJob:
     """Return the job of options as they were typed. Where nothing says the seed it is the fresh one, or a new one."""
-    from contactverif.plugins.engines import has_engine
-    from contactverif.plugins.registry import matching_ids
+    from contactverif.plugins.registry import has_engine, matching_ids
     from contactverif.run.profiles import profile_named
 
     sampling = options.sampling
@@ -265,8 +253,8 @@ def resumed_job(output: Path, typed: VerifyOptions, command: str = VERIFY) -> Ve
 
     Beside `--resume` only `--jobs` and `--keep-going` may be typed: all other options come from the journal.
     """
-    from contactverif.journals.journal import journal_folder
-    from contactverif.journals.run_plan import read_plan
+    from contactverif.run.journal import journal_folder
+    from contactverif.run.store import read_plan
 
     if output.is_dir():
         raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
@@ -300,7 +288,7 @@ def options_of(plan: Plan, command: str, argument: str) -> VerifyOptions:
     """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
     import msgspec
 
-    from contactverif.journals.run_plan import check_versions
+    from contactverif.run.store import check_versions
 
     if plan.command != command:
         raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")

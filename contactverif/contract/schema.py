@@ -27,7 +27,7 @@ SUMMARY, COUNTEREXAMPLES, TIMING, CASE = "summary", "counterexamples", "timing",
 NAMED_CASES = "named_cases"  # The group of the named cases that some formulation fails; only some reports have it.
 # Root attributes in which two equal runs may differ.
 OFF_THE_RECORD = frozenset(
-    {"created", "command", "platform", "blas", "cpu_features", "unproven_outcomes", "isolation", "opened", "libraries"}
+    {"created", "command", "platform", "blas", "cpu_features", "stored_outcomes", "isolation", "opened", "libraries"}
 )
 LENGTH, PENALTY, RATIO, SECONDS, UNKNOWN = "m", "N m-2", "1", "s", "unknown"
 FORCE, STRESS = "N", "N m-1"  # Forces are per unit of thickness.

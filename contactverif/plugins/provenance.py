@@ -21,8 +21,14 @@ from threadpoolctl import threadpool_info
 from contactverif.contract.engine_subject import ENGINE
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name
-from contactverif.plugins.engines import ENGINES
-from contactverif.plugins.registry import ENGINE_PROPERTIES, FORMULATIONS, PROPERTIES, files_within, names_within
+from contactverif.plugins.registry import (
+    ENGINE_PROPERTIES,
+    ENGINES,
+    FORMULATIONS,
+    PROPERTIES,
+    files_within,
+    names_within,
+)
 
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})

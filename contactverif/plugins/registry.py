@@ -1,8 +1,9 @@
-"""The registry: it finds formulations and properties through entry points, and loads each when it is needed.
+"""The registry: it finds formulations, engines, properties and problems through entry points, and loads each on demand.
 
 On the command line a formulation is a name with options, `vts-me:n=4`, or a wrapper around one,
 `two-pass/nts-ar:area=reference`. Behind a name that wraps nothing a "/" belongs to the value of an option, such as
-`uel:file=build/contact.so`.
+`uel:file=build/contact.so`. A name that begins with `engine/` is that of an engine, whose option `python` is the
+interpreter that it lives in.
 
 Rule: a mistake of the user is a `MisuseError`; a mistake of a plugin is a `NotLoaded`, which becomes a row of the
 report, so that the other plugins run.
@@ -25,6 +26,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from contactverif.contract.engine_subject import ENGINE, EngineSubject
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.foreign_text import LONGEST_NAME, describe_error, name_line
 from contactverif.contract.names import parse_name, unknown_name_error
@@ -34,6 +36,7 @@ from contactverif.contract.subject import Subject
 from contactverif.isolation.box import kernel_folder
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.loading import Wrapper, load_remote, python_program, survey
+from contactverif.isolation.remote_engine import engine_program, load_remote_engine
 
 if TYPE_CHECKING:
     from contactverif.problems.problem import Problem
@@ -41,185 +44,31 @@ if TYPE_CHECKING:
 FORMULATIONS = "contactverif.formulations"
 PROPERTIES = "contactverif.properties"
 ENGINE_PROPERTIES = "contactverif.engine_properties"  # Those that are asked of engines alone.
+ENGINES = "contactverif.engines"
 PROBLEMS = "contactverif.problems"
 _RENAMED = {"scale": "total-stiffness", "scaling": "units", "engine.scaling": "engine.units"}  # {former id: id}
 _OURS = "contactverif"  # The distribution whose problems keep their names.
 
 _SHORT_NAME = f"at most {LONGEST_NAME} characters"
 _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
-
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
+_ENGINE_FORM = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 _MARKS = ":/"  # They stand before options, and before the formulation that is wrapped.
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
 # {an option: its form} of loaders: without the option such a name stands for no formulation.
 _FILE = "file"
 _NEEDED = {_FILE: f"{_FILE}=PATH", "kind": "kind=KIND"}
-_NEEDED_VALUES: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a word"}
-_FITTING_TYPES: dict[Any, tuple[type, ...]] = {int: (int,), float: (int, float), bool: (bool,), str: (str,)}
+# {annotation of an option: (the types of its values, what it needs in words)}
+_FITTING: dict[Any, tuple[tuple[type, ...], str]] = {
+    int: ((int,), "a whole number"),
+    float: ((int, float), "a number"),
+    bool: ((bool,), "true or false"),
+    str: ((str,), "a word"),
+}
 
 
-def _worker() -> tuple[str, ...]:
-    """Return the command that starts the process of a plugin."""
-    return python_program(str(Path(__file__).with_name("plugin_worker.py")))
-
-
-def formulation_names() -> tuple[str, ...]:
-    """Return the names of the installed formulations and wrappers, sorted; nothing is loaded."""
-    return tuple(entries_by_name(FORMULATIONS))
-
-
-def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
-    """Return the names of the formulations that need no other one, file or kind, sorted; all are loaded to tell."""
-    if limits is None:
-        installed = entries_by_name(FORMULATIONS)
-        return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
-    names = formulation_names()
-    items = survey(_worker(), names, limits)
-    return tuple(name for name, item in zip(names, items, strict=True) if not isinstance(item, Wrapper))
-
-
-def property_ids(*, engines: bool = False) -> tuple[str, ...]:
-    """Return the ids of the installed properties, sorted; with `engines` also those of engines alone."""
-    return tuple(installed_properties(engines=engines))
-
-
-def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
-    """Load the formulation that the text names, with its options.
-
-    Parameters
-    ----------
-    text : str
-        A name as on the command line, such as `vts-me:n=4`.
-    limits : Limits | None
-        The limits of a process of its own, in which the plugin lives; None to load it in this process.
-
-    Returns
-    -------
-    Subject | NotLoaded
-        The formulation, or the reason why the plugin does not load.
-
-    Raises
-    ------
-    MisuseError
-        If the text is malformed, no such formulation is installed, or it has no such option or value.
-    """
-    if limits is not None:
-        return load_remote(_worker(), text, _with_kernels(limits, text))
-    make = _load_factory(text)
-    return make if isinstance(make, NotLoaded) else subject_of(text, make)
-
-
-def _with_kernels(limits: Limits, text: str) -> Limits:
-    """Return the limits with a box that keeps compiled kernels, those of all formulations of the same modules."""
-    if limits.box is None:
-        return limits
-    installed = entries_by_name(FORMULATIONS)
-    modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
-    store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share the name of a package.
-    return replace(limits, box=replace(limits.box, store=store))
-
-
-def names_within(text: str) -> set[str]:
-    """Return the names of formulations and wrappers in a text, and perhaps parts of a path that are no names."""
-    return {part.partition(":")[0] for part in text.split("/")}
-
-
-def files_within(text: str) -> list[Path]:
-    """Return the files that a text names by an option `file`, as far as they exist."""
-    paths = [Path(file).expanduser() for file in re.findall(rf"[:,]{_FILE}=([^,]+)", text)]
-    return [path.resolve() for path in paths if path.is_file()]
-
-
-def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
-    """Call a factory `make(*, penalty)` once, and return its formulation under a name, with every answer checked.
-
-    It is `NotLoaded` if the factory raises an error or makes no formulation. A `MisuseError` about a name with options
-    or with an inner formulation goes on; in a mere name there is nothing that a user could have done wrong.
-    """
-    try:
-        return Subject(name, make)
-    except ContractError as error:
-        if isinstance(error.__cause__, MisuseError) and any(mark in name for mark in _MARKS):
-            raise error.__cause__ from None
-        return NotLoaded(name, str(error))
-
-
-def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper | NotLoaded, ...]:
-    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
-    if limits is None:
-        return tuple(map(load_with_defaults, formulation_names()))
-    return tuple(survey(_worker(), formulation_names(), limits))
-
-
-def load_properties(globs: Sequence[str] = ("*",), *, engines: bool = False) -> tuple[Property | NotLoaded, ...]:
-    """Load the properties whose id matches one of the patterns, sorted by id.
-
-    Parameters
-    ----------
-    globs : Sequence[str]
-        Patterns such as `patch.*`; none at all means all properties.
-    engines : bool
-        Also those that are asked of engines alone.
-
-    Returns
-    -------
-    tuple[Property | NotLoaded, ...]
-        The properties, or why one does not load.
-
-    Raises
-    ------
-    MisuseError
-        If a pattern matches nothing.
-    """
-    installed = installed_properties(engines=engines)
-    return tuple(load_property(name, installed) for name in _matches(globs, installed))
-
-
-def the_formulation(name: str, limits: Limits | None = None) -> Subject:
-    """Return the formulation of that name, as `load_formulation` does; one that does not load is a mistake here."""
-    subject = load_formulation(name, limits)
-    if isinstance(subject, NotLoaded):
-        raise MisuseError("formulation", f"{name}, which does not load ({subject.reason})", "one that loads")
-    return subject
-
-
-def the_property(property_id: str) -> Property:
-    """Return the property of that id; one that does not load is a mistake here."""
-    ids = property_ids(engines=True)
-    if property_id not in ids:  # A pattern is no id.
-        raise unknown_property_error("property", property_id, ids)
-    (question,) = load_properties([property_id], engines=True)
-    if isinstance(question, NotLoaded):
-        raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
-    return question
-
-
-def matching_ids(globs: Sequence[str], *, engines: bool = False) -> tuple[str, ...]:
-    """Return the ids of the properties that `load_properties` loads; it imports none of them."""
-    return _matches(globs, property_ids(engines=engines))
-
-
-def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
-    for glob in globs:
-        if not any(fnmatchcase(name, glob) for name in names):
-            raise unknown_property_error("property", glob, names)
-    return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
-
-
-def unknown_property_error(argument: str, name: str, ids: Iterable[str]) -> MisuseError:
-    """Return the error for an id that no property has; it names the new id of a property that was renamed."""
-    if name in _RENAMED:
-        return MisuseError(argument, repr(name), f"{_RENAMED[name]!r}, the new id of that property")
-    return unknown_name_error(argument, name, ids)
-
-
-def installed_properties(*, engines: bool = False) -> Mapping[str, Sequence[EntryPoint]]:
-    """Return the entry points of the installed properties by id, sorted; with `engines` also those of engines alone.
-
-    To read them takes longer than to load a property, so whoever loads many reads them once.
-    """
-    of_engines = entries_by_name(ENGINE_PROPERTIES) if engines else {}
-    return dict(sorted((entries_by_name(PROPERTIES) | of_engines).items()))
+# ---------------------------------------------------------------------------------------------------------------------
+# Entry points
 
 
 def entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
@@ -268,40 +117,125 @@ def _origin(entry: EntryPoint) -> str:
     return f"{entry.value} of {entry.dist.name}" if entry.dist is not None else entry.value
 
 
-def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> Property | NotLoaded:
-    """Load the property of that id, one of `installed_properties`."""
-    loaded = load_entry(name, installed[name])
-    if isinstance(loaded, NotLoaded | Property) and getattr(loaded, "id", name) == name:
-        return loaded
-    description = f"the property {loaded.id!r}" if isinstance(loaded, Property) else f"a {type(loaded).__name__}"
-    needed = f"a contactverif.contract.property.Property with the id {name}"
-    return NotLoaded(name, f"the entry point gives {description}; needed {needed}")
+def names_within(text: str) -> set[str]:
+    """Return the names of formulations and wrappers in a text, and perhaps parts of a path that are no names."""
+    return {part.partition(":")[0] for part in text.split("/")}
 
 
-def load_problems() -> dict[str, Problem | NotLoaded]:
-    """Load the installed problems with an exact answer by name, those of lower rank first.
+def files_within(text: str) -> list[Path]:
+    """Return the files that a text names by an option `file`, as far as they exist."""
+    paths = [Path(file).expanduser() for file in re.findall(rf"[:,]{_FILE}=([^,]+)", text)]
+    return [path.resolve() for path in paths if path.is_file()]
 
-    Another distribution that registers the name of one of ours does not replace it, and is listed by its entry point.
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Formulations and engines
+
+
+def formulation_names() -> tuple[str, ...]:
+    """Return the names of the installed formulations and wrappers, sorted; nothing is loaded."""
+    return tuple(entries_by_name(FORMULATIONS))
+
+
+def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
+    """Return the names of the formulations that need no other one, file or kind, sorted; all are loaded to tell."""
+    installed = entries_by_name(FORMULATIONS)
+    if limits is None:
+        return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
+    items = survey(_worker(), tuple(installed), limits)
+    return tuple(name for name, item in zip(installed, items, strict=True) if not isinstance(item, Wrapper))
+
+
+def has_engine(names: Sequence[str]) -> bool:
+    """Return whether one of the names is that of an engine."""
+    return any(name.startswith(ENGINE) for name in names)
+
+
+def describe_engines() -> dict[str, str]:
+    """Return the installed engines, sorted, each with the first line of its docstring, or why it does not load."""
+    words = {}
+    for name, entries in entries_by_name(ENGINES).items():
+        make = load_entry(name, entries)
+        words[name] = f"not loaded: {make.reason}" if isinstance(make, NotLoaded) else _summary(make)
+    return words
+
+
+def load_subject(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
+    """Load the formulation or the engine that a text names, as `load_formulation` does."""
+    return load_engine(text, limits) if text.startswith(ENGINE) else load_formulation(text, limits)
+
+
+def the_subject(text: str, limits: Limits | None = None) -> Subject:
+    """Return the formulation or engine of that name; one that does not load is a mistake here."""
+    return that_loads(text, load_subject(text, limits))
+
+
+def the_formulation(name: str, limits: Limits | None = None) -> Subject:
+    """Return the formulation of that name, as `load_formulation` does; one that does not load is a mistake here."""
+    return that_loads(name, load_formulation(name, limits))
+
+
+def that_loads(text: str, loaded: Subject | NotLoaded) -> Subject:
+    """Return what was loaded by that name; that it does not load is a mistake here."""
+    if isinstance(loaded, NotLoaded):
+        raise MisuseError("formulation", f"{text}, which does not load ({loaded.reason})", "one that loads")
+    return loaded
+
+
+def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
+    """Load the formulation that the text names, with its options.
+
+    Parameters
+    ----------
+    text : str
+        A name as on the command line, such as `vts-me:n=4`.
+    limits : Limits | None
+        The limits of a process of its own, in which the plugin lives; None to load it in this process.
+
+    Returns
+    -------
+    Subject | NotLoaded
+        The formulation, or the reason why the plugin does not load.
+
+    Raises
+    ------
+    MisuseError
+        If the text is malformed, no such formulation is installed, or it has no such option or value.
     """
-    from contactverif.problems.problem import Problem  # It needs mechanics, which most commands do not.
-
-    problems: dict[str, Problem | NotLoaded] = {}
-    for name, entries in entries_by_name(PROBLEMS).items():
-        ours = [entry for entry in entries if entry.dist is not None and entry.dist.name == _OURS]
-        problems |= _refuse_others(name, entries, ours) if ours else {}
-        loaded = load_entry(name, ours or entries)
-        if not isinstance(loaded, NotLoaded | Problem):
-            needed = "a contactverif.problems.problem.Problem"
-            loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}, not {needed}")
-        problems[name] = loaded
-    return dict(sorted(problems.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))
+    if limits is None:
+        make = _load_factory(text)
+        return make if isinstance(make, NotLoaded) else subject_of(text, make)
+    if limits.box is not None:  # It keeps compiled kernels, those of all formulations of the same modules.
+        installed = entries_by_name(FORMULATIONS)
+        modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
+        store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share a package's name.
+        limits = replace(limits, box=replace(limits.box, store=store))
+    return load_remote(_worker(), text, limits)
 
 
-def _refuse_others(name: str, entries: Iterable[EntryPoint], ours: Collection[EntryPoint]) -> dict[str, NotLoaded]:
-    """Return the refusals of other distributions' entry points that have the name of one of our problems."""
-    words = f"is registered as {name}, the name of a problem of {_OURS}; needed another name"
-    others = [entry for entry in entries if entry not in ours]
-    return {entry.value: NotLoaded(entry.value, f"{_origin(entry)} {words}") for entry in others}
+def _worker() -> tuple[str, ...]:
+    """Return the command that starts the process of a plugin."""
+    return python_program(str(Path(__file__).with_name("plugin_worker.py")))
+
+
+def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
+    """Call a factory `make(*, penalty)` once, and return its formulation under a name, with every answer checked.
+
+    It is `NotLoaded` if the factory raises an error or makes no formulation. A `MisuseError` about a name with options
+    or with an inner formulation goes on; in a mere name there is nothing that a user could have done wrong.
+    """
+    try:
+        return Subject(name, make)
+    except ContractError as error:
+        if isinstance(error.__cause__, MisuseError) and any(mark in name for mark in _MARKS):
+            raise error.__cause__ from None
+        return NotLoaded(name, str(error))
+
+
+def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper | NotLoaded, ...]:
+    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
+    names = formulation_names()
+    return tuple(map(load_with_defaults, names) if limits is None else survey(_worker(), names, limits))
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
@@ -320,41 +254,75 @@ def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
     make = load_entry(name, entries)
     if not callable(make):
         return None
-    parameters = parameters_of(make)
-    needed = next((f"{name}:{form}" for option, form in _NEEDED.items() if _is_needed(parameters, option)), "")
-    if not needed and not _wraps(parameters):
-        return None
-    summary = (inspect.getdoc(make) or "").partition("\n")[0].rstrip(".")
-    return Wrapper(name, summary, needed or f"{name}/NAME")
+    parameters = _parameters_of(make)
+    needs = (form for option, form in _NEEDED.items() if option in parameters and _is_required(parameters[option]))
+    needed = next((f"{name}:{form}" for form in needs), f"{name}/NAME" if "inner" in parameters else "")
+    return Wrapper(name, _summary(make), needed) if needed else None
 
 
-def _is_needed(parameters: Mapping[str, inspect.Parameter], option: str) -> bool:
-    return option in parameters and parameters[option].default is inspect.Parameter.empty
+def _summary(make: Any) -> str:
+    return (inspect.getdoc(make) or "").partition("\n")[0].rstrip(".")
 
 
-def _wraps(parameters: Mapping[str, inspect.Parameter]) -> bool:
-    return "inner" in parameters
+def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotLoaded:
+    """Load the engine that a text names, `engine/NAME:OPTION=VALUE`, in this process or, within limits, in its own."""
+    name, options = parse_name("engine", text.removeprefix(ENGINE), _ENGINE_FORM)
+    installed = entries_by_name(ENGINES)
+    if name not in installed:
+        raise unknown_name_error("engine", name, installed)
+    python = options.pop("python", None)
+    if limits is not None and python is not None:  # Its modules need not import here, so its options are not checked.
+        (entry, *_) = entry_points(group=ENGINES, name=name)
+        return load_remote_engine(engine_program(entry.value, options, str(python)), text, limits)
+    make = load_entry(name, installed[name])
+    if isinstance(make, NotLoaded):
+        return NotLoaded(text, make.reason)
+    if not callable(make):
+        return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(**options)")
+    _check_options(text, make, _parameters_of(make), options)
+    if limits is not None:
+        return load_remote_engine(engine_program(installed[name][0].value, options), text, limits)
+    try:
+        return EngineSubject(text, make(**options))
+    except ContractError as error:
+        return NotLoaded(text, str(error))
+    except Exception as error:  # An engine may raise anything while it is made.
+        return NotLoaded(text, f"make: {describe_error(error)}")
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# The factory that a text names
 
 
 def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     """Return `make(*, penalty)` for the text behind `depth` wrappers, with options and inner formulation filled in."""
-    _check_name(text)
+    if len(text) > LONGEST_NAME:
+        raise MisuseError("formulation", repr(name_line(text)), _SHORT_NAME)
+    if text.partition(":")[0].endswith(".py"):
+        needed = "an installed name (`contactverif new NAME` begins one); in Python, contactverif.verify takes a class"
+        raise MisuseError("formulation", f"a file, {text!r}", needed)
     make = _find_factory(text)
-    parameters = {} if isinstance(make, NotLoaded) else parameters_of(make)
-    outer, inner_text = _divide(text, _wraps(parameters))
+    parameters = {} if isinstance(make, NotLoaded) else _parameters_of(make)
+    wraps = "inner" in parameters
+    outer, slash, inner_text = text.partition("/")
+    if ":" in outer and not wraps:  # A "/" behind the options of a name that wraps nothing belongs to a value.
+        outer, slash = text, ""
     name, options = parse_name("formulation", outer, _FORM)
     if isinstance(make, NotLoaded):
         return make
-    check_options(text, make, parameters, options)
-    if inner_text is None:
-        if _wraps(parameters):
+    _check_options(text, make, parameters, options)
+    if not slash:
+        if wraps:
             raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
         return partial(make, **options)
-    if not _wraps(parameters):
+    if not wraps:
         raise MisuseError("formulation", repr(text), f"a wrapper before the '/'; {name} wraps nothing")
-    inner = _load_inner(inner_text, depth + 1)
-    if isinstance(inner, NotLoaded):
-        return NotLoaded(text, f"{inner_text}: {inner.reason}")
+    if depth >= _MOST_WRAPPERS:
+        raise MisuseError("formulation", f"{depth + 1} wrappers before {inner_text!r}", f"at most {_MOST_WRAPPERS}")
+    inner = _load_factory(inner_text, depth + 1)
+    trial = inner if isinstance(inner, NotLoaded) else subject_of(inner_text, inner)
+    if isinstance(trial, NotLoaded):
+        return NotLoaded(text, f"{inner_text}: {trial.reason}")
     return partial(make, **options, inner=inner)
 
 
@@ -374,38 +342,7 @@ def _find_factory(text: str) -> Callable[..., Any] | NotLoaded:
     return cast(Callable[..., Any], make)
 
 
-def _divide(text: str, wraps: bool) -> tuple[str, str | None]:
-    """Divide a text into a name with options, and the text of the formulation that is wrapped; None if there is none.
-
-    A "/" behind the options of a name that wraps nothing belongs to a value.
-    """
-    outer, slash, inner = text.partition("/")
-    if not slash or (":" in outer and not wraps):
-        return text, None
-    return outer, inner
-
-
-def _check_name(text: str) -> None:
-    """Refuse a name that is too long, or that is a file."""
-    if len(text) > LONGEST_NAME:
-        raise MisuseError("formulation", repr(name_line(text)), _SHORT_NAME)
-    if text.partition(":")[0].endswith(".py"):
-        needed = "an installed name (`contactverif new NAME` begins one); in Python, contactverif.verify takes a class"
-        raise MisuseError("formulation", f"a file, {text!r}", needed)
-
-
-def _load_inner(text: str, depth: int) -> Callable[..., Any] | NotLoaded:
-    """Return the factory of the formulation behind the '/', after one trial."""
-    if depth > _MOST_WRAPPERS:
-        raise MisuseError("formulation", f"{depth} wrappers before {text!r}", f"at most {_MOST_WRAPPERS}")
-    make = _load_factory(text, depth)
-    if isinstance(make, NotLoaded):
-        return make
-    trial = subject_of(text, make)
-    return trial if isinstance(trial, NotLoaded) else make
-
-
-def parameters_of(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
+def _parameters_of(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
     """Return the parameters of a factory by name; none if it does not say them."""
     try:
         return inspect.signature(make).parameters
@@ -413,46 +350,31 @@ def parameters_of(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
         return {}
 
 
-def check_options(
+def _is_required(parameter: inspect.Parameter) -> bool:
+    return parameter.default is inspect.Parameter.empty
+
+
+def _check_options(
     text: str, make: Callable[..., Any], parameters: Mapping[str, inspect.Parameter], options: Mapping[str, Any]
 ) -> None:
     """Refuse unknown and missing options, and values that do not fit their annotation, without calling the factory."""
-    known = _options_among(parameters)
+    by_name = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    known = {name: entry for name, entry in parameters.items() if name not in _RESERVED and entry.kind in by_name}
     names = f"it has {', '.join(known)}" if known else "it has none"
-    takes_any = not parameters or any(map(_takes_any_name, parameters.values()))
+    takes_any = not parameters or any(entry.kind is entry.VAR_KEYWORD for entry in parameters.values())
     for option, value in options.items():
         if option in _RESERVED:
             raise MisuseError(f"option {option} of {text!r}", repr(value), f"nothing: the harness sets it; {names}")
         if option in known:
-            _check_value(text, make, option, value, names)
+            if needed := _needed_value(make, option, value):
+                raise MisuseError(f"option {option} of {text!r}", repr(value), f"{needed}; {names}")
         elif not takes_any:
-            raise _unknown_option_error(text, option, known, names)
+            near = difflib.get_close_matches(option, known, n=1)
+            nearest = f" (nearest: {near[0]})" if near else ""
+            raise MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
     for name, entry in known.items():
-        if entry.default is entry.empty and name not in options:
+        if _is_required(entry) and name not in options:
             raise MisuseError(f"options of {text!r}", f"no {name}", f"{name}=VALUE; {names}")
-
-
-def _takes_any_name(parameter: inspect.Parameter) -> bool:
-    return parameter.kind is parameter.VAR_KEYWORD
-
-
-def _unknown_option_error(text: str, option: str, known: Iterable[str], names: str) -> MisuseError:
-    near = difflib.get_close_matches(option, known, n=1)
-    nearest = f" (nearest: {near[0]})" if near else ""
-    return MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
-
-
-def _options_among(parameters: Mapping[str, inspect.Parameter]) -> dict[str, inspect.Parameter]:
-    """Return the parameters that a user may set by name."""
-    kinds = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
-    return {name: entry for name, entry in parameters.items() if name not in _RESERVED and entry.kind in kinds}
-
-
-def _check_value(text: str, make: Callable[..., Any], option: str, value: Any, names: str) -> None:
-    """Refuse a value that does not fit the annotation of its option."""
-    needed = _needed_value(make, option, value)
-    if needed:
-        raise MisuseError(f"option {option} of {text!r}", repr(value), f"{needed}; {names}")
 
 
 def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:
@@ -464,7 +386,114 @@ def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:
     if typing.get_origin(annotation) is Literal:
         choices = typing.get_args(annotation)
         return "" if value in choices else "one of " + ", ".join(map(str, choices))
-    if annotation not in _FITTING_TYPES:
+    if annotation not in _FITTING:
         return ""
-    fits = isinstance(value, _FITTING_TYPES[annotation]) and (annotation is bool or not isinstance(value, bool))
-    return "" if fits else _NEEDED_VALUES[annotation]
+    types, needed = _FITTING[annotation]
+    return "" if isinstance(value, types) and (annotation is bool or not isinstance(value, bool)) else needed
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Properties
+
+
+def installed_properties(*, engines: bool = False) -> Mapping[str, Sequence[EntryPoint]]:
+    """Return the entry points of the installed properties by id, sorted; with `engines` also those of engines alone.
+
+    To read them takes longer than to load a property, so read them once to load many.
+    """
+    of_engines = entries_by_name(ENGINE_PROPERTIES) if engines else {}
+    return dict(sorted((entries_by_name(PROPERTIES) | of_engines).items()))
+
+
+def property_ids(*, engines: bool = False) -> tuple[str, ...]:
+    """Return the ids of the installed properties, sorted; with `engines` also those of engines alone."""
+    return tuple(installed_properties(engines=engines))
+
+
+def matching_ids(globs: Sequence[str], *, engines: bool = False) -> tuple[str, ...]:
+    """Return the ids of the properties that `load_properties` loads; it imports none of them."""
+    return _matches(globs, property_ids(engines=engines))
+
+
+def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
+    for glob in globs:
+        if not any(fnmatchcase(name, glob) for name in names):
+            raise unknown_property_error("property", glob, names)
+    return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
+
+
+def unknown_property_error(argument: str, name: str, ids: Iterable[str]) -> MisuseError:
+    """Return the error for an id that no property has; it names the new id of a property that was renamed."""
+    if name in _RENAMED:
+        return MisuseError(argument, repr(name), f"{_RENAMED[name]!r}, the new id of that property")
+    return unknown_name_error(argument, name, ids)
+
+
+def load_properties(globs: Sequence[str] = ("*",), *, engines: bool = False) -> tuple[Property | NotLoaded, ...]:
+    """Load the properties whose id matches one of the patterns, sorted by id.
+
+    Parameters
+    ----------
+    globs : Sequence[str]
+        Patterns such as `patch.*`; none at all means all properties.
+    engines : bool
+        Also those that are asked of engines alone.
+
+    Returns
+    -------
+    tuple[Property | NotLoaded, ...]
+        The properties, or why one does not load.
+
+    Raises
+    ------
+    MisuseError
+        If a pattern matches nothing.
+    """
+    installed = installed_properties(engines=engines)
+    return tuple(load_property(name, installed) for name in _matches(globs, installed))
+
+
+def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> Property | NotLoaded:
+    """Load the property of that id, one of `installed_properties`."""
+    loaded = load_entry(name, installed[name])
+    if isinstance(loaded, NotLoaded | Property) and getattr(loaded, "id", name) == name:
+        return loaded
+    description = f"the property {loaded.id!r}" if isinstance(loaded, Property) else f"a {type(loaded).__name__}"
+    needed = f"a contactverif.contract.property.Property with the id {name}"
+    return NotLoaded(name, f"the entry point gives {description}; needed {needed}")
+
+
+def the_property(property_id: str) -> Property:
+    """Return the property of that id; one that does not load is a mistake here."""
+    installed = installed_properties(engines=True)
+    if property_id not in installed:  # A pattern is no id.
+        raise unknown_property_error("property", property_id, installed)
+    question = load_property(property_id, installed)
+    if isinstance(question, NotLoaded):
+        raise MisuseError("property", f"{property_id}, which does not load ({question.reason})", "one that loads")
+    return question
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Problems
+
+
+def load_problems() -> dict[str, Problem | NotLoaded]:
+    """Load the installed problems with an exact answer by name, those of lower rank first.
+
+    Another distribution that registers the name of one of ours does not replace it, and is listed by its entry point.
+    """
+    from contactverif.problems.problem import Problem  # It needs mechanics, which most commands do not.
+
+    problems: dict[str, Problem | NotLoaded] = {}
+    for name, entries in entries_by_name(PROBLEMS).items():
+        ours = [entry for entry in entries if entry.dist is not None and entry.dist.name == _OURS]
+        for entry in (entry for entry in entries if ours and entry not in ours):
+            words = f"is registered as {name}, the name of a problem of {_OURS}; needed another name"
+            problems[entry.value] = NotLoaded(entry.value, f"{_origin(entry)} {words}")
+        loaded = load_entry(name, ours or entries)
+        if not isinstance(loaded, NotLoaded | Problem):
+            needed = "a contactverif.problems.problem.Problem"
+            loaded = NotLoaded(name, f"the entry point gives a {type(loaded).__name__}, not {needed}")
+        problems[name] = loaded
+    return dict(sorted(problems.items(), key=lambda item: item[1].rank if isinstance(item[1], Problem) else inf))

@@ -13,13 +13,12 @@ from contactverif.contract.outcomes import Outcomes
 from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.journals.outcome_records import WITNESS
-from contactverif.journals.run_journal import Journal
 from contactverif.plugins.provenance import code_digests, collect_versions, machine
-from contactverif.run.rows import OpenRow, gap_of_rows, open_row, verdict_of_row
-from contactverif.run.run_jobs import RunJobs
-from contactverif.run.scheduler import Progress, Scheduler
-from contactverif.run.second_look import Sample, SecondLook, choose_share, draw_again, judge_again
+from contactverif.run.recheck import Recheck, Sample, choose_share, draw_again, judge_again
+from contactverif.run.rows import OpenRow, find_missing_row, open_row, verdict_of_row
+from contactverif.run.run import Driver
+from contactverif.run.scheduler import Scheduler
+from contactverif.run.store import WITNESS, Store
 from contactverif.sampling import draw
 from contactverif.sampling.draw import Sampling
 
@@ -86,27 +85,27 @@ def audit(
     derived = list(map(_derive, run.rows, rows, repeat(sampling)))
     stored = [(row, opened) for row, opened in zip(derived, rows, strict=True) if isinstance(opened, OpenRow)]
     samples = [_sample(row, opened, share) for row, opened in stored]
-    scheduler, journal = Scheduler(), Journal()
-    jobs = RunJobs(subjects, questions, sampling, journal, _report_nothing, {})
-    scheduler.work(jobs.first_calls())
-    look = SecondLook(samples, sampling, journal, exact=not changes)
-    scheduler.work(look)
+    scheduler = Scheduler()
+    driver = Driver(subjects, questions, sampling, scheduler, Store())
+    driver.call_first()
+    recheck = Recheck(samples, sampling, exact=not changes)
+    scheduler.work(recheck)
     examples = counterexamples(run)
     differences = [
-        gap_of_rows(run, [subject.name for subject in subjects], [question.id for question in questions]),
+        find_missing_row(run, [subject.name for subject in subjects], [question.id for question in questions]),
         *map(_other_property, run.rows, rows, repeat(bool(changes))),
-        *(_gap(row, opened, sampling) for row, opened in stored),
-        *map(str, look.differences),
+        *(_missing(row, opened, sampling) for row, opened in stored),
+        *map(str, recheck.differences),
         *map(_judge_example, examples.values(), repeat(subjects), repeat(questions), repeat(not changes)),
         *([] if changes else map(_other_case, examples.values(), repeat(dict(zip(run.rows, rows, strict=True))))),
     ]
     n_witnesses = sum(WITNESS in sample.outcomes for sample in samples)
     return Audit(
-        derived=replace(run, rows=tuple(derived), provided=jobs.provided, opposite_signs=jobs.opposite_names),
+        derived=replace(run, rows=tuple(derived), provided=driver.provided, opposite_signs=driver.opposite_signs),
         changes=changes,
         differences=tuple(filter(None, differences)),
         n_outcomes=sum(len(row.outcomes) for row in run.rows),
-        n_judged=look.n_judged - n_witnesses,
+        n_judged=recheck.n_judged - n_witnesses,
         n_examples=len(examples) + n_witnesses,
         seconds=perf_counter() - start,
     )
@@ -195,7 +194,7 @@ def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str
     return ""
 
 
-def _gap(row: Row, opened: OpenRow, sampling: Sampling) -> str:
+def _missing(row: Row, opened: OpenRow, sampling: Sampling) -> str:
     """Return what a row lacks; no more than one block of cases is drawn for it."""
     count, name = len(row.outcomes), f"{row.formulation} {row.property_id}"
     if opened.listed is not None:
@@ -236,7 +235,3 @@ def _other_case(example: Counterexample, rows: Mapping[Row, OpenRow | Row]) -> s
 
 def _bytes_of(case: Case) -> dict[str, tuple[str, bytes]]:
     return {name: (str(array.shape), array.tobytes()) for name, array in case.to_arrays().items()}
-
-
-def _report_nothing(progress: Progress) -> None:
-    """Take the progress of an audit, which shows none."""

@@ -1,25 +1,27 @@
-"""The shards of a campaign: each judges a share of a run in a process of its own, and has a journal and nothing else.
+"""The shards of a campaign: each judges a share of a run in a process of its own, and has a store and nothing else.
 
-The union of the journals of all shards is the journal of a run, with which `merge` goes on.
+The union of the stores of all shards is the store of a run, with which `merge` goes on.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from contactverif.contract.errors import MisuseError
-from contactverif.journals.journal import begin_journal, read_record, write_record
-from contactverif.journals.run_journal import Journal
-from contactverif.journals.run_plan import Plan, check_versions, read_plan, without_place
+from contactverif.run.journal import hold_journal, new_journal, read_record, write_record
+from contactverif.run.store import Plan, Store, check_versions, read_plan
 
 _MARK = "done"
 _SHARD = "shard"  # The option in a plan that differs from shard to shard.
 _MOST_NAMES = 3  # The most missing shards that a message names.
-_OF_ONE_JOURNAL = ("options", "folder", "machine", "nonce")
+_OF_ONE_STORE = ("options", "folder", "machine")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -40,7 +42,7 @@ class Shard:
 
     @property
     def folder(self) -> str:
-        """The name of its journal's folder."""
+        """The name of its folder."""
         return f"shard-{self.number}-of-{self.count}"
 
     @property
@@ -59,39 +61,45 @@ class Shard:
 
 
 class EndMark(msgspec.Struct, frozen=True):
-    """The record of a shard that is done: how many outcomes its journal has."""
+    """The record of a shard that is done: how many outcomes its store has."""
 
     n_outcomes: int
 
 
-def open_shard(folder: Path, plan: Plan) -> bool:
-    """Make the journal of a shard, or check that the one that is there has the same plan.
+@contextmanager
+def open_shard(folder: Path, plan: Plan) -> Iterator[bool]:
+    """Open a block with the store of a shard, a new one or that which is there if it has the same plan.
 
-    Return whether the shard is done already.
+    Yield whether the shard is done already; if not, no other process uses its store in the block.
     """
     if not folder.exists():
-        begin_journal(folder, plan, ())
-        return False
+        with new_journal(folder, plan):
+            yield False
+        return
     earlier = read_plan(folder, "--out")
     check_versions(earlier.versions, plan.versions, "--out")
     if difference := _difference(earlier, plan, shard_too=True):
         raise MisuseError("--out", f"{folder.name} of another plan ({difference})", "the same plan, or another folder")
     mark = _read_mark(folder)
-    return mark is not None and mark.n_outcomes == _read(folder, plan).known.n_outcomes
+    if mark is not None and mark.n_outcomes == Store(plan, None, [folder]).n_outcomes:
+        yield True
+        return
+    with hold_journal(folder, "--out"):
+        yield False
 
 
-def mark_done(folder: Path, plan: Plan) -> Journal:
-    """Mark a shard as done, and return its journal."""
-    journal = _read(folder, plan)
-    write_record(folder / _MARK, EndMark(journal.known.n_outcomes))
-    return journal
+def mark_done(folder: Path, plan: Plan) -> int:
+    """Mark a shard as done, and return how many outcomes its store has."""
+    n_outcomes = Store(plan, None, [folder]).n_outcomes
+    write_record(folder / _MARK, EndMark(n_outcomes))
+    return n_outcomes
 
 
 def read_shards(folder: Path, argument: str) -> tuple[Plan, tuple[Path, ...]]:
-    """Return the plan of a campaign and the journals of all its shards, once each is found to be whole."""
+    """Return the plan of a campaign and the stores of all its shards, once each is found to be whole."""
     shards = _list_shards(folder, argument)
-    journals = tuple(folder / shard.folder for shard in shards)
-    plans = [read_plan(journal, argument) for journal in journals]
+    stores = tuple(folder / shard.folder for shard in shards)
+    plans = [read_plan(store, argument) for store in stores]
     for shard, plan in zip(shards, plans, strict=True):
         if plan.options.get(_SHARD) != shard.text:
             was = plan.options.get(_SHARD, f"a journal of {plan.command}")
@@ -99,9 +107,15 @@ def read_shards(folder: Path, argument: str) -> tuple[Plan, tuple[Path, ...]]:
         if difference := _difference(plan, plans[0]):
             others = f"that of {shards[0].folder} ({difference})"
             raise MisuseError(argument, f"{shard.folder} with another plan than {others}", "shards of one campaign")
-    for shard, journal, plan in zip(shards, journals, plans, strict=True):
-        _check_whole(shard, journal, plan, argument)
-    return plans[0], journals
+    for shard, store, plan in zip(shards, stores, plans, strict=True):
+        needed = f"its end: the same campaign with --shard {shard.text} goes on"
+        mark = _read_mark(store)
+        if mark is None:
+            raise MisuseError(argument, f"{shard.folder}, which is not finished", needed)
+        if (n_readable := Store(plan, None, [store]).n_outcomes) < mark.n_outcomes:
+            flaw = f"{shard.folder}, damaged: {n_readable} of {mark.n_outcomes} outcomes can be read"
+            raise MisuseError(argument, flaw, needed)
+    return plans[0], stores
 
 
 def _list_shards(folder: Path, argument: str) -> list[Shard]:
@@ -121,18 +135,6 @@ def _list_shards(folder: Path, argument: str) -> list[Shard]:
     return shards
 
 
-def _check_whole(shard: Shard, journal: Path, plan: Plan, argument: str) -> None:
-    needed = f"its end: the same campaign with --shard {shard.text} goes on"
-    mark = _read_mark(journal)
-    if mark is None:
-        raise MisuseError(argument, f"{shard.folder}, which is not finished", needed)
-    known = _read(journal, plan).known
-    n_readable = known.n_outcomes
-    if n_readable + known.n_misfits < mark.n_outcomes:  # What does not fit is judged again.
-        flaw = f"{shard.folder}, damaged: {n_readable} of {mark.n_outcomes} outcomes can be read"
-        raise MisuseError(argument, flaw, needed)
-
-
 def _read_mark(folder: Path) -> EndMark | None:
     """Return the mark of a shard that is done; None if there is none that can be read."""
     try:
@@ -141,24 +143,25 @@ def _read_mark(folder: Path) -> EndMark | None:
         return None
 
 
-def _read(folder: Path, plan: Plan) -> Journal:
-    """Return a journal with what can be read of it."""
-    journal = Journal(plan, None, [folder])
-    journal.close()
-    return journal
-
-
 def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:
     """Return the name of the first thing in which two plans differ.
 
-    The working folder and the machine are none, and neither is the box that a machine may not have.
+    The working folder and the machine are none, and neither is the place where plugins lived: it changes no number, and
+    a machine may have no box.
     """
-    for name in (field for field in Plan.__struct_fields__ if field not in _OF_ONE_JOURNAL):
+    for name in (field for field in Plan.__struct_fields__ if field not in _OF_ONE_STORE):
         if getattr(a, name) != getattr(b, name):
             return name
-    both = [without_place(plan.options) for plan in (a, b)]
+    both = [_without_place(plan.options) for plan in (a, b)]
     for name in sorted({*both[0], *both[1]} - (set() if shard_too else {_SHARD})):
         values = (msgspec.msgpack.encode(options.get(name)) for options in both)  # A file has lists for tuples.
         if len({*values}) > 1:
             return name
     return ""
+
+
+def _without_place(options: Mapping[str, Any]) -> dict[str, Any]:
+    isolation = options.get("isolation")
+    if not isinstance(isolation, Mapping):
+        return dict(options)
+    return {**options, "isolation": {name: value for name, value in isolation.items() if name != "isolation"}}

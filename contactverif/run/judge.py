@@ -113,12 +113,19 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
         return Verdict.NOT_JUDGED, raised
     worst = max(everything, key=lambda outcome: badness(row.info, outcome), default=None)
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
-        return worst.verdict, _reason_with_name(row, worst)
+        name = worst.case_or_summary.name  # A finite list has named its cases.
+        return worst.verdict, f"{name}: {worst.reason}" if name and worst is not row.witness else worst.reason
     if row.judged < _fewest_judged(row):
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
-    if reason := _too_idle(row):
-        return Verdict.NOT_JUDGED, reason
+    counts, least = row.tally.counts, row.info.least_contact
+    if counts.idle and counts.idle == counts.judged and least:
+        return Verdict.NOT_JUDGED, "nothing was in contact in any case: nothing was judged"
+    # Chance may leave some more without contact than are allowed: of a share of 80 % in contact up to 36 of 100 cases,
+    # and 8 of 12.
+    if exceeds(counts.idle, counts.judged, 1.0 - least):
+        words = f"{counts.judged - counts.idle} of {counts.judged} judged cases in contact, needed {least:.0%}"
+        return Verdict.NOT_JUDGED, words
     return Verdict.PASS, ""
 
 
@@ -128,25 +135,6 @@ def _fewest_judged(row: Row) -> float:
     fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * planned
     is_list = any(outcome.case_or_summary.name for outcome in row.outcomes[:1])
     return fewest if is_list else min(fewest, max(planned - 1, 1))
-
-
-def _too_idle(row: Row) -> str:
-    """Return why too few cases were in contact, or an empty string.
-
-    The seed may idle some more than are allowed: of a share of 80 % in contact up to 36 of 100 cases, and 8 of 12.
-    """
-    counts, least = row.tally.counts, row.info.least_contact
-    if counts.idle and counts.idle == counts.judged and least:
-        return "nothing was in contact in any case: nothing was judged"
-    if not exceeds(counts.idle, counts.judged, 1.0 - least):
-        return ""
-    return f"{counts.judged - counts.idle} of {counts.judged} judged cases in contact, needed {least:.0%}"
-
-
-def _reason_with_name(row: Row, outcome: Outcome) -> str:
-    """Return the reason of an outcome, with the name of its case before it where a finite list has named it."""
-    name = outcome.case_or_summary.name
-    return f"{name}: {outcome.reason}" if name and outcome is not row.witness else outcome.reason
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:
@@ -192,54 +180,42 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     try:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, first_case, parts)
-            names = STATES if subject.traits.abilities.in_plane else (IN_SPACE,)
-            opposite, seconds = _pulls_in_time(subject, names[0])
+            name, *others = STATES if subject.traits.abilities.in_plane else (IN_SPACE,)
+            start = perf_counter()
+            opposite = _pulls(subject, name)
+            seconds = perf_counter() - start
             if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
-                seconds = min(seconds, _pulls_in_time(subject, names[0])[1])
-            opposite = opposite and all(_pulls(subject, name) for name in names[1:])
-            if "contact_points" in parts:
-                _call_contact_points(subject, first.case)
+                start = perf_counter()
+                _pulls(subject, name)
+                seconds = min(seconds, perf_counter() - start)
+            opposite = opposite and all(_pulls(subject, name) for name in others)
+            if "contact_points" in parts:  # Their kernels are compiled, too.
+                with suppress(ContractError):
+                    formulation, case = subject.for_case(first.case), first.case
+                    formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
     except ContractError:
         return FirstCall()
     return FirstCall(opposite, first, seconds)
 
 
-def _call_contact_points(subject: Subject, case: Case) -> None:
-    """Let a formulation compile its contact points."""
-    with suppress(ContractError):
-        formulation = subject.for_case(case)
-        formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
-
-
-def _pulls_in_time(subject: Subject, state: str) -> tuple[bool, float]:
-    """Return whether the forces pull on a state with a name, and the seconds that it took."""
-    start = perf_counter()
-    pulls = _pulls(subject, state)
-    return pulls, perf_counter() - start
-
-
 def _pulls(subject: Subject, state: str) -> bool:
-    """Return whether the forces of a formulation pull the slave towards the master.
+    """Return whether the forces of a formulation pull the slave towards the master in a state with a name.
 
     A residual with all signs turned round is the most frequent mistake of a first plugin. Then nearly every property
     fails, and none of the numbers says why. Where anything else can explain the answer, this returns False.
     """
     try:
-        return _push(subject, fit_to_traits(named_case(state), subject.traits)[0]) < 0
+        case = fit_to_traits(named_case(state), subject.traits)[0]
+        formulation, interface = subject.for_case(case), case.interface
+        pressure = case.penalty * case.parameter("penetration")  # Multipliers, if any, press.
+        state_z = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure)).z
+        residual = formulation.residual(interface, formulation.pair(interface, state_z), state_z)
     except ContractError:
         return False
-
-
-def _push(subject: Subject, case: Case) -> float:
-    """Return the total force on the slave along the master's outward normal; multipliers, if any, press."""
-    formulation, interface = subject.for_case(case), case.interface
-    pressure = case.penalty * case.parameter("penetration")
-    state = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure))
-    residual = formulation.residual(interface, formulation.pair(interface, state.z), state.z)
     if interface.dim == PLANE:
         x, y = case.parameters["direction"]
         normal = np.array([-y, x])
     else:
         normal = case.parameters["normal"]
     slave = -residual[: interface.n_unknowns].reshape(interface.nodes.shape)[: interface.n_slave_nodes]
-    return float((slave @ normal).sum())
+    return float((slave @ normal).sum()) < 0  # The force on the slave along the master's outward normal.

@@ -1,25 +1,60 @@
-"""A run checks every property of some formulations."""
+"""The driver of a run: it checks every property of some formulations.
+
+Each formulation is called once before anything else, and properties that state a turn are asked first. The cases of a
+strategy are drawn once for all formulations and all properties that have it, they are judged, and what failed is
+shrunk. Properties that solve bodies come last. All planned cases of a row are judged before one is shrunk, so that a
+failure ends nothing early. What the store has is not judged again, and a block of which it has all is not drawn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, islice, product
+from operator import attrgetter
+from time import perf_counter
 from typing import TypeVar, get_args
 
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import counterexample_of
+from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
-from contactverif.contract.property import Property
-from contactverif.contract.result import NotLoaded, Run
-from contactverif.contract.subject import Subject
-from contactverif.journals.run_journal import Journal
+from contactverif.contract.interface import PLANE, SEGMENT, Interface
+from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
+from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.diagnosis.diagnose import diagnose
+from contactverif.isolation.remote_formulation import places
+from contactverif.plugins.provenance import collect_provenance
 from contactverif.plugins.registry import unknown_property_error
+from contactverif.run import judge
+from contactverif.run.failure_memory import Failures
 from contactverif.run.profiles import Profile, Shrink, profile_named
-from contactverif.run.run_jobs import RunJobs
-from contactverif.run.scheduler import Progress, Scheduler
-from contactverif.sampling.draw import Sampling
+from contactverif.run.ranking import first_failure, wrong_rows
+from contactverif.run.recheck import recheck_store
+from contactverif.run.rows import (
+    WHOLE,
+    JudgedCases,
+    OpenRow,
+    Shrinking,
+    judge_cases,
+    lacks_witness,
+    open_row,
+    row_of_case,
+    shrink_case,
+)
+from contactverif.run.scheduler import CaseChunk, Job, Progress, RunProgress, Scheduler
+from contactverif.run.store import WITNESS, Store
+from contactverif.sampling import draw
+from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, Sampling
 
+CHUNK = 25  # The number of drawn cases that are judged in one job.
+LIST_CHUNK = 5  # The same for named cases, which are often slower.
+_FACE_NAMES = {2: "segments in the plane", 3: "triangles in space", 4: "quadrilaterals in space"}
 _Kind = TypeVar("_Kind")
 
 
@@ -43,7 +78,7 @@ def run(
     shrink: Shrink = "new",
     progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
-    journal: Journal | None = None,
+    store: Store | None = None,
     keep_going: bool = True,
 ) -> Run:
     """Check every property of every formulation.
@@ -75,8 +110,8 @@ def run(
         Worker processes that do the jobs of the run, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky
         or ``dask.distributed.Client().get_executor()``. The results are the same but for the seconds. By default this
         process does all.
-    journal : Journal | None
-        The journal, in which every outcome is noted, and whose outcomes are not judged again.
+    store : Store | None
+        The store into which every outcome is written, and whose outcomes are not judged again.
     keep_going : bool
         Ask all properties of a formulation, whatever the first of them show. Else a formulation is asked nothing more
         once its forces have the opposite sign, or it crashes, breaks the contract or is impure in the cases of
@@ -102,34 +137,22 @@ def run(
         raise MisuseError("shrink", repr(shrink), "one, new, all or none")
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
-    scheduler, journal = Scheduler(executor, progress), journal or Journal()
-    loaded, questions = _of_kind(Subject, subjects), _of_kind(Property, properties)
-    sampling = Sampling.at(place, resolved.examples, resolved.seed)
-    jobs = RunJobs(loaded, questions, sampling, journal, scheduler.report, known, shrink=shrink, keep_going=keep_going)
+    driver = Driver(
+        _of_kind(Subject, subjects),
+        _of_kind(Property, properties),
+        Sampling.at(place, resolved.examples, resolved.seed),
+        Scheduler(executor, progress),
+        store or Store(),
+        known=known,
+        shrink=shrink,
+        keep_going=keep_going,
+    )
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
-    with closing(journal):
-        try:
-            jobs.work(scheduler)
-        except KeyboardInterrupt:
-            raise RunStopped(jobs.result(not_loaded, resolved.name)) from None
-    return jobs.result(not_loaded, resolved.name)
-
-
-def judge_share(
-    subjects: Sequence[Subject],
-    questions: Sequence[Property],
-    sampling: Sampling,
-    progress: Callable[[Progress], None],
-    journal: Journal,
-    *,
-    share: tuple[int, int],
-) -> None:
-    """Judge what the journal of a share (its number from 0, the number of all shares) does not have yet."""
-    scheduler = Scheduler(None, progress)
-    jobs = RunJobs(subjects, questions, sampling, journal, scheduler.report, {}, share)
-    with closing(journal):
-        jobs.work(scheduler)
-    jobs.check_written()
+    try:
+        driver.work()
+    except KeyboardInterrupt:
+        raise RunStopped(driver.result(not_loaded, resolved.name)) from None
+    return driver.result(not_loaded, resolved.name)
 
 
 def _of_kind(kind: type[_Kind], items: Iterable[object]) -> list[_Kind]:
@@ -142,3 +165,515 @@ def check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoa
     for property_id in known:
         if property_id not in ids:
             raise unknown_property_error("known failure", property_id, ids)
+
+
+def run_share(
+    subjects: Sequence[Subject],
+    questions: Sequence[Property],
+    sampling: Sampling,
+    progress: Callable[[Progress], None],
+    store: Store,
+    *,
+    share: tuple[int, int],
+) -> None:
+    """Judge what the store of a share of a run (its number from 0, the number of all shares) does not have yet."""
+    driver = Driver(subjects, questions, sampling, Scheduler(None, progress), store, share=share)
+    driver.work()
+    driver.check_written()
+
+
+def run_failures(
+    items: Sequence[Subject | Property | NotLoaded], failures: Failures, provenance: Mapping[str, str]
+) -> Run:
+    """Judge the cases that failed in earlier runs, and nothing else: return a row for each."""
+    subjects = {subject.name: subject for subject in _of_kind(Subject, items)}
+    questions = {question.id: question for question in _of_kind(Property, items)}
+    triples = (
+        (questions[property_id], case, subjects[name])
+        for (name, property_id), case in failures.items()
+        if name in subjects and property_id in questions
+    )
+    rows = (row_of_case(triple[0], triple[2], judge.judge_if_applicable(*triple)) for triple in triples)
+    return Run(tuple(rows), tuple(_of_kind(NotLoaded, items)), provenance=provenance)
+
+
+class Driver:
+    """The jobs of a run, in the order that all shares of it have in common.
+
+    The parts of a run are numbered: each witness, each chunk of a finite list, each block of drawn cases. Of `share`
+    (I, N) are every N-th of them. A share fills no rows and shrinks nothing: its outcomes are in the store.
+    """
+
+    def __init__(
+        self,
+        subjects: Sequence[Subject],
+        questions: Sequence[Property],
+        sampling: Sampling,
+        scheduler: Scheduler,
+        store: Store,
+        *,
+        known: Mapping[str, str] | None = None,
+        share: tuple[int, int] | None = None,
+        shrink: Shrink = "new",
+        keep_going: bool = True,
+    ) -> None:
+        _check_once("formulation", map(attrgetter("name"), subjects))
+        _check_once("property", map(attrgetter("id"), questions))
+        for subject in subjects:
+            _check_place(subject, sampling.interface)
+        self._subjects, self._questions, self._sampling, self._store = subjects, questions, sampling, store
+        self._scheduler, self._report = scheduler, scheduler.report
+        self._known = known or {}
+        self._share, self._shrink, self._keep_going = share, shrink, keep_going
+        self._rows: dict[tuple[str, str], OpenRow | Row] = {}
+        # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
+        self._groups: dict[tuple[str, bool], list[Property]] = {}
+        # The property that each formulation is asked: with cases in the plane, or in space.
+        self._variants: dict[tuple[str, str], Property] = {}
+        for question in sorted(questions, key=_turn):
+            variants = {(subject.name, question.id): question.for_traits(subject.traits) for subject in subjects}
+            self._variants |= variants
+            for variant in dict.fromkeys(variants.values()):
+                self._groups.setdefault(sampling.group(variant), []).append(variant)
+        self._meter = RunMeter(self._variants, subjects, sampling)
+        self._fail_again: dict[tuple[str, str], Outcome] = {}
+        self._opposite_signs: set[str] = set()
+        self._diagnoses: dict[str, str] = {}
+        self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
+
+    # -----------------------------------------------------------------------------------------------------------------
+    # The run from its first call to its result
+
+    def work(self) -> None:
+        """Do all jobs. Before any outcome of the store counts, a share of them is judged again."""
+        sampling, work = self._sampling, self._scheduler.work
+        with closing(self._store):
+            self.call_first()
+            recheck_store(self._store, self._subjects, self._questions, sampling, self._scheduler)
+            if not self._keep_going:
+                self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
+                pairs = product(self._subjects, self._questions)
+                lacking = [
+                    subject.name for subject, question in pairs if lacks_witness(subject, question, self._sampling)
+                ]
+                self._stopped |= dict.fromkeys(lacking, "the traits state a failure without a witness")
+            work(self._earlier_failures())
+            if not self._keep_going:
+                # All jobs of these properties end before it is known who is asked more, so that it depends on no clock.
+                if any(question.role == "foundation" for question in self._questions):
+                    work(chain.from_iterable(self._parts_of_next()))
+                self._stop_wrong()
+            number, count = self._share or (0, 1)
+            work(chain.from_iterable(islice(self._parts(), number, None, count)))
+            if self._share is None:
+                work(self._explain_first_failure())
+                work(self._measure_forces())
+
+    def call_first(self) -> None:
+        """Call each formulation for the first time. Jobs that follow carry the answers to other processes."""
+        self._scheduler.work(self._first_calls())
+
+    def _first_calls(self) -> Iterator[Job]:
+        needs: frozenset[str] = frozenset().union(*(question.needs for question in self._questions))
+        for subject in self._subjects:
+            before = Progress(subject.name, "", "first call (compiles)", 0, 1)
+            self._report(before)
+            yield Job(judge.call_first, (subject, needs & subject.provides), partial(self._note_first, before, subject))
+
+    def _note_first(self, before: Progress, subject: Subject, first: judge.FirstCall) -> Iterable[Job]:
+        subject.first_answers = subject.first_answers or first.answers  # In a second run the process is warm.
+        self._opposite_signs |= {subject.name} if first.opposite_sign else set()
+        self._report(replace(before, count=1, first_seconds=first.seconds))
+        return ()
+
+    def _earlier_failures(self) -> Iterator[Job]:
+        """Yield the jobs to judge what failed in earlier runs; none of them counts among the planned cases."""
+        for question, subject in product(chain.from_iterable(self._groups.values()), self._subjects):
+            case = self._store.failures.get((subject.name, question.id))
+            if (
+                case is None
+                or question is not self._variants[subject.name, question.id]
+                or subject.name in self._stopped
+                or question.promise(subject.traits) is False
+            ):
+                continue
+            before = Progress(subject.name, question.id, "asking again", 0, 1)
+            self._report(before)
+            note = partial(self._note_earlier_failure, before, subject, question)
+            yield Job(judge.judge_if_applicable, (question, case, subject), note)
+
+    def _note_earlier_failure(
+        self, before: Progress, subject: Subject, question: Property, outcome: Outcome
+    ) -> Iterable[Job]:
+        if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED):
+            self._fail_again[subject.name, question.id] = outcome
+            self._report(replace(before, count=1, row=row_of_case(question, subject, outcome)))
+        return ()
+
+    def _stop_wrong(self) -> None:
+        """Note the formulations of which the first properties have shown what may explain every failure to come."""
+        for (name, property_id), row in self._rows.items():
+            if not isinstance(row, OpenRow) or not row.row.unexpected or name in self._stopped:
+                continue
+            if row.row.verdict is Verdict.CRASHED:
+                self._stopped[name] = f"the plugin crashes in {property_id}"
+            elif row.row.breach:
+                self._stopped[name] = f"the contract is broken in {property_id}"
+            elif row.question.role == "foundation" and row.row.verdict is Verdict.FAIL:
+                self._stopped[name] = f"{property_id} fails"
+
+    def result(self, not_loaded: tuple[NotLoaded, ...], profile: str) -> Run:
+        """Return the run with all rows as far as they are judged; one that is not complete says so."""
+        sampling = self._sampling
+        provenance = collect_provenance(profile=profile, examples=sampling.examples, seed=sampling.seed)
+        provenance |= places(self._subjects)
+        if reason := draw.why_the_engine_draws():
+            provenance["drawing"] = reason
+        provenance |= self._store.provenance()
+        while self._groups:
+            self._open_next()
+        for row in self._rows.values():
+            if isinstance(row, OpenRow) and not row.complete:
+                row.stop(sampling.examples)
+        rows = [self._rows[subject.name, question.id] for subject, question in product(self._subjects, self._questions)]
+        return Run(
+            rows=tuple(row.row if isinstance(row, OpenRow) else row for row in rows),
+            not_loaded=not_loaded,
+            provided=self.provided,
+            opposite_signs=self.opposite_signs,
+            diagnoses=self._diagnoses,
+            provenance=provenance,
+        )
+
+    @property
+    def provided(self) -> dict[str, dict[str, bool]]:
+        """The optional parts that each formulation has, or has not."""
+        return {subject.name: {part: part in subject.provides for part in OPTIONAL_PARTS} for subject in self._subjects}
+
+    @property
+    def opposite_signs(self) -> tuple[str, ...]:
+        """The formulations with forces of the opposite sign, once all are called."""
+        return tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs)
+
+    def check_written(self) -> None:
+        """Check that all outcomes are kept."""
+        if self._store.write_error and self._store.folder is not None:
+            error = f"{self._store.folder.name}: {self._store.write_error}"
+            raise MisuseError("--out", error, "a disk with room")
+
+    # -----------------------------------------------------------------------------------------------------------------
+    # The parts
+
+    def _parts(self) -> Iterator[Iterable[Job]]:
+        """Yield the jobs of each part; those of a part are made when they are wanted."""
+        while self._groups:
+            yield from self._parts_of_next()
+
+    def _parts_of_next(self) -> Iterator[Iterable[Job]]:
+        """Yield the parts of the next properties with the same cases."""
+        rows = self._open_next()
+        for row in rows:
+            if row.witness is not None and not row.witnessed:
+                yield self._judge(row, CaseChunk([row.witness], WITNESS))
+        if not rows:
+            return
+        if (listed := rows[0].listed) is not None:
+            for row in rows:
+                chunks = in_chunks(listed, LIST_CHUNK)
+                if self._share is None:
+                    yield self._expect(row, chunks, len(listed), last=True)
+                yield from (self._judge(row, chunk) for chunk in chunks)
+        else:
+            n_blocks = 1 if self._share is None else draw.number_of_blocks(self._sampling.examples)
+            yield from (self._blocks(rows, number) for number in range(n_blocks))
+
+    def _open_next(self) -> list[OpenRow]:
+        """Open the rows of the next properties with the same cases, and return those whose cases are to be judged."""
+        group, questions = next(iter(self._groups.items()))
+        source = self._sampling.source(questions[0])
+        if isinstance(source, tuple):
+            draw.check_names(source)
+        del self._groups[group]
+        opened = []
+        for subject, question in product(self._subjects, questions):
+            key = subject.name, question.id
+            if question is not self._variants[key]:
+                continue
+            known, stopped = self._known.get(question.id, ""), self._stopped.get(subject.name, "")
+            self._rows[key] = row = open_row(subject, question, source, known, self._sampling, stopped)
+            if isinstance(row, OpenRow):
+                opened.append(row)
+                if key in self._fail_again:
+                    row.add_earlier_failure(self._fail_again[key])
+        return opened
+
+    def _blocks(self, rows: Sequence[OpenRow], number: int) -> Iterator[Job]:
+        """Yield the jobs of a block and, but for a share, of all blocks behind it: the rows have the same cases."""
+        question, examples = rows[0].question, self._sampling.examples
+        while (known := self._known_block(rows, number)) is not None:
+            yield from known
+            number += 1
+            if self._share is not None or number * BLOCK >= examples:
+                return
+        if number > 0 and self._share is not None and not self._draws_blocks(question):
+            return  # Where a strategy runs out of cases, the first block has all of them.
+        before = Progress(rows[0].subject.name, question.id, "drawing", 0, examples)
+        yield Job(draw_chunks, (self._sampling, question, number), partial(self._add_drawn, rows, number), before)
+
+    def _draws_blocks(self, question: Property) -> bool:
+        source, sampling = self._sampling.source(question), self._sampling
+        assert source is not None
+        return draw.draws_blocks(source, seed=sampling.key(question), examples=sampling.examples)
+
+    def _known_block(self, rows: Sequence[OpenRow], number: int) -> Iterable[Job] | None:
+        """Return the jobs that follow from the outcomes of a block; None if it is to be drawn.
+
+        The first is: rows keep its cases whole, and only what draws it tells whether it has all cases. Another one is
+        if the store lacks an outcome, or a row keeps one of its cases whole.
+        """
+        if number == 0:
+            return None
+        first = number * BLOCK
+        count, parts = min(BLOCK, self._sampling.examples - first), []
+        for row in rows:
+            stored = self._store.outcomes(row.subject.name, row.question.info, first, count)
+            if len(stored) < count or (self._share is None and row.may_keep_whole(first, stored.values())):
+                return None
+            parts.append(tuple(stored[place] for place in range(count)))
+        if self._share is not None:
+            return ()
+        jobs: list[Job] = []
+        for row, outcomes in zip(rows, parts, strict=True):
+            examples = self._sampling.examples
+            row.expect({first: count}, planned=examples, last=first + count == examples)
+            jobs += self._add(row, first, JudgedCases(outcomes))
+        return jobs
+
+    def _add_drawn(self, rows: Sequence[OpenRow], number: int, cases: DrawnCases) -> Iterable[Job]:
+        """Return the jobs to judge a block, then those of the next block."""
+        if number == 0:
+            for chunk in cases.chunks[: -(-WHOLE // CHUNK)]:
+                chunk.keep()
+        judging = chain.from_iterable(self._judge(row, chunk) for row in rows for chunk in cases.chunks)
+        if self._share is not None:
+            return judging
+        count = number * BLOCK + sum(chunk.count for chunk in cases.chunks)
+        planned = count if cases.exhausted else self._sampling.examples
+        finished = [self._expect(row, cases.chunks, planned, last=cases.last) for row in rows]
+        return chain(*finished, judging, () if cases.last else self._blocks(rows, number + 1))
+
+    def _expect(self, row: OpenRow, chunks: Sequence[CaseChunk], planned: int, *, last: bool) -> Iterable[Job]:
+        """Let a row expect the outcomes of chunks; one without any case is complete."""
+        row.expect({chunk.first: chunk for chunk in chunks}, planned=planned, last=last)
+        return self._finish(row)
+
+    # -----------------------------------------------------------------------------------------------------------------
+    # A chunk, and the end of a row
+
+    def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
+        """Yield the job to judge the cases of a chunk that are not judged yet."""
+        name, question = row.subject.name, row.question
+        stored = self._store.outcomes(name, question.info, chunk.first, chunk.count)
+        if len(stored) == chunk.count:
+            yield from self._add(row, chunk.first, JudgedCases(tuple(stored[place] for place in range(chunk.count))))
+            return
+        arguments = question, row.subject, chunk, self._store.writer(name, question.id, chunk.first), stored
+        yield Job(judge_cases, arguments, partial(self._add_judged, row, chunk.first), self._judging(row))
+
+    def _judging(self, row: OpenRow) -> Progress:
+        of_run = self._meter.read(self._rows)
+        return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned, of_run=of_run)
+
+    def _add_judged(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
+        self._meter.measure(row.question.id, judged.outcomes)
+        return self._add(row, first, judged)
+
+    def _add(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
+        """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""
+        self._store.write_error = self._store.write_error or judged.write_error
+        if self._share is not None:
+            self.check_written()
+            return ()
+        if first == WITNESS:
+            row.add_witness(*judged.outcomes)
+        else:
+            row.add(first, judged.outcomes)
+            self._report(self._judging(row))
+        return self._finish(row)
+
+    def _finish(self, row: OpenRow) -> Iterable[Job]:
+        """Make the row if it is complete, and return the job to shrink what failed, if that is wanted."""
+        if not row.complete:
+            return ()
+        row.judge(on_scene=self._sampling.scene is not None)
+        self._report(replace(self._judging(row), row=row.row))
+        goal = row.goal()
+        if goal is None:
+            return ()
+        shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
+        return self._shrink_row(row, goal) if shrinks else self._add_shrunk(row, goal.first, None)
+
+    def _shrink_row(self, row: OpenRow, goal: Shrinking) -> Iterable[Job]:
+        """Return the job to shrink what failed in a row; of a list of cases nothing is smaller."""
+        if row.listed is not None:
+            return self._add_shrunk(row, goal.first, None)
+        before = Progress(row.subject.name, row.question.id, "shrinking", 0, SHRINK_CALLS)
+        arguments = self._sampling, row.question, row.subject, goal
+        return (Job(shrink_case, arguments, partial(self._add_shrunk, row, goal.first), before),)
+
+    def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> Iterable[Job]:
+        """Add the smallest case. Without one the witness shows the failure, or the first case that clearly fails."""
+        row.row = replace(row.row, shrunk=smallest, first=None)
+        if counterexample_of(row.row) is None:
+            case = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
+            row.row = replace(row.row, first=case)
+        return ()
+
+    # -----------------------------------------------------------------------------------------------------------------
+    # What explains the failures
+
+    def _explain_first_failure(self) -> Iterator[Job]:
+        """Yield the jobs to diagnose, and to shrink, the failure of each formulation with the lowest rank."""
+        for subject in self._subjects:
+            rows = {id(row.row): row for row in self._open_rows() if row.subject is subject}
+            failure = first_failure(row.row for row in rows.values())
+            if failure is None or failure.verdict is not Verdict.FAIL:
+                continue  # Crashes explain themselves.
+            row = rows[id(failure)]
+            if failure.breach and row.question.role != "foundation":
+                continue
+            others = [wrong.property_id for wrong in wrong_rows(each.row for each in rows.values())]
+            self._report(Progress(subject.name, failure.property_id, "diagnosis", 0, 1))
+            if subject.traits.abilities.in_plane:  # The rules look at plane states.
+                note = partial(self._add_diagnosis, subject.name)
+                yield Job(diagnose, (subject, failure.property_id, others), note)
+            if self._shrink == "one" and (goal := row.goal()) is not None:
+                yield from self._shrink_row(row, goal)
+
+    def _add_diagnosis(self, name: str, text: str) -> Iterable[Job]:
+        if text:
+            self._diagnoses[name] = text
+        return ()
+
+    def _measure_forces(self) -> Iterator[Job]:
+        """Yield the jobs to ask for the forces on each counterexample in space, which no text can show."""
+        for row in self._open_rows():
+            outcome = counterexample_of(row.row)
+            if outcome is not None and outcome.case.interface.dim != PLANE and outcome.verdict is Verdict.FAIL:
+                arguments = row.question, outcome.case, row.subject
+                yield Job(judge.forces_to_draw, arguments, partial(self._add_forces, row))
+
+    def _add_forces(self, row: OpenRow, forces: NodalForces | None) -> Iterable[Job]:
+        row.row = replace(row.row, forces=forces)
+        return ()
+
+    def _open_rows(self) -> list[OpenRow]:
+        return [row for row in self._rows.values() if isinstance(row, OpenRow)]
+
+
+def _turn(question: Property) -> tuple[bool, int]:
+    """Return the key by which properties are asked: those that solve bodies last, since they take long."""
+    return question.bodies, question.turn
+
+
+def _check_place(subject: Subject, interface: Interface | None) -> None:
+    """Refuse the interface of a user if a formulation does not take such faces."""
+    if interface is None or isinstance(subject, EngineSubject):
+        return
+    abilities = subject.traits.abilities
+    corners = {side.faces.shape[1] for side in (interface.slave, interface.master)}
+    takes = {SEGMENT} if abilities.in_plane else set(abilities.faces)  # A formulation of both is asked in the plane.
+    if not corners <= takes:
+        place, faces = (" and ".join(_FACE_NAMES[count] for count in sorted(each)) for each in (corners, takes))
+        raise MisuseError("place", f"an interface of {place}", f"one of {faces}, on which {subject.name} is asked")
+
+
+def _check_once(argument: str, names: Iterable[str]) -> None:
+    """Check that no name stands there twice."""
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise MisuseError(argument, f"{name} {times} times", "each of them once")
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnCases:
+    """A block of the cases of a strategy, in order."""
+
+    chunks: tuple[CaseChunk, ...]
+    exhausted: bool  # The strategy has no other cases.
+    last: bool  # No further block follows.
+
+
+def draw_chunks(
+    sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
+) -> DrawnCases:
+    """Draw a block of the cases of a property, and of all properties with the same strategy."""
+    source, seed = sampling.source(question), sampling.key(question)
+    assert source is not None
+    block = draw.draw_block(source, seed=seed, examples=sampling.examples, number=number, progress=count)
+    return DrawnCases(in_chunks(block.cases, CHUNK, number * BLOCK), block.exhausted, block.last)
+
+
+def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
+    """Return cases, of which the first has a number in its row, in chunks of a size."""
+    return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# How far the run is
+
+_SHARE = 0.05  # The share of the cases that must be judged before anything is guessed: the first property is dear.
+_LIST = 8  # Cases of a list that is not made yet: making all of them takes a second.
+# Seconds of a case over those of a drawn one that solves no bodies, of VTS-PPT: {(solves bodies, is in a list): ratio}.
+# They count only until the first cases of that kind are measured.
+_COSTS = {(False, False): 1.0, (False, True): 0.7, (True, False): 2.7, (True, True): 8.6}
+
+
+class RunMeter:
+    """A meter of a run. A kind of cases is whether they solve bodies, and whether they stand in a list."""
+
+    def __init__(
+        self, variants: Mapping[tuple[str, str], Property], subjects: Sequence[Subject], sampling: Sampling
+    ) -> None:
+        self._kinds: dict[str, tuple[bool, bool]] = {}
+        self._planned: dict[tuple[str, str], int] = {}
+        self._cases, self._seconds = Counter[tuple[bool, bool]](), defaultdict[tuple[bool, bool], float](float)
+        self._started: float | None = None
+        subject_of = {subject.name: subject for subject in subjects}
+        for (name, id_), question in variants.items():
+            if sampling.interface is not None and sampling.source(question) is None:
+                continue  # It has no cases on this mesh.
+            is_list = sampling.interface is None and getattr(question.cases, "is_list", False)
+            self._kinds[id_] = question.bodies, is_list
+            if not (question.refusal_of(subject_of[name]) or question.needs - subject_of[name].provides):
+                self._planned[name, id_] = _LIST if is_list else sampling.examples
+
+    def measure(self, property_id: str, outcomes: Iterable[Outcome]) -> None:
+        """Note what cases have cost that were judged just now."""
+        for outcome in outcomes:
+            self._cases[self._kinds[property_id]] += 1
+            self._seconds[self._kinds[property_id]] += outcome.seconds
+
+    def read(self, rows: Mapping[tuple[str, str], OpenRow | Row]) -> RunProgress:
+        """Return how far a run with these rows is, in which others may still be missing."""
+        if self._started is None:  # First calls, which may compile, say nothing about the cases.
+            self._started = perf_counter()
+        finished, planned, left = 0, 0, Counter[tuple[bool, bool]]()
+        for key, count in self._planned.items():
+            row = rows.get(key)
+            if isinstance(row, Row):
+                continue
+            n_finished, n_cases = (0, count) if row is None else (row.n_finished, row.planned or count)
+            finished, planned = finished + n_finished, planned + n_cases
+            left[self._kinds[key[1]]] += n_cases - n_finished
+        return RunProgress(finished, planned, self._guess(left) if finished > _SHARE * planned else None)
+
+    def _guess(self, left: Mapping[tuple[bool, bool], int]) -> float | None:
+        """Return the seconds that cases take, if they go on as fast as those before."""
+        measured = sum(self._seconds.values())
+        if not measured or self._started is None:
+            return None
+        unit = measured / sum(_COSTS[kind] * count for kind, count in self._cases.items())
+        costs = {kind: self._seconds[kind] / count for kind, count in self._cases.items()}
+        ahead = sum(count * costs.get(kind, _COSTS[kind] * unit) for kind, count in left.items())
+        return ahead * (perf_counter() - self._started) / measured

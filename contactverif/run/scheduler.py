@@ -4,6 +4,9 @@ A job is a plain function of data that can be pickled. Jobs may end in any order
 
 - A job that cannot be encoded, because a notebook or a function defines its formulation, runs in the parent.
 - A worker that dies ends the run with one clear line. The run never waits for a dead worker.
+
+The workers also load formulations, while the run's own process does other things: one that has loaded a formulation has
+its process ready when the first cases come.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import cycle, islice
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -23,9 +28,12 @@ from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.property import Property
-from contactverif.contract.result import Row
+from contactverif.contract.result import NotLoaded, Row
+from contactverif.contract.subject import Subject
 from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
-from contactverif.plugins.registry import installed_properties, load_property
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.remote_formulation import code_files, note_code_files
+from contactverif.plugins.registry import installed_properties, load_property, load_subject
 
 Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
 _SILENCE = 5.0  # Seconds after which the last step is reported once more, to show that the run goes on.
@@ -91,13 +99,13 @@ class Scheduler:
                 job = next(waiting[0], None)
                 if job is None:
                     waiting.popleft()
-                elif (future := self._submit(job)) is not None:
+                elif (future := _submit(self._executor, job.function, *job.arguments)) is not None:
                     running[future] = job
                 else:
-                    waiting.appendleft(iter(job.then(job.function(*job.arguments, **self._counter(job)))))
+                    waiting.appendleft(iter(job.then(self._do_here(job))))
             for future in self._wait(running):
                 job = running.pop(future)
-                waiting.appendleft(iter(job.then(self._result(future, job))))
+                waiting.appendleft(iter(job.then(_fetch(future, partial(self._do_here, job)))))
 
     def _wait(self, running: Iterable[Future[bytes]]) -> Iterable[Future[bytes]]:
         """Wait until some of the jobs that run are done, and return them."""
@@ -114,24 +122,22 @@ class Scheduler:
             self._last = step
             self._report(step)
 
-    def _counter(self, job: Job) -> dict[str, Callable[[int], None]]:
-        """Return the further argument of a job that the parent does."""
+    def _do_here(self, job: Job) -> Any:
+        """Return the result of a job that the parent does."""
         start = job.progress
         if start is None:
-            return {}
-        return {"count": lambda count: self.report(replace(start, count=start.count + count))}
+            return job.function(*job.arguments)
 
-    def _submit(self, job: Job) -> Future[bytes] | None:
-        """Hand a job to the executor; return None if the parent has to do it."""
-        return None if self._executor is None else submit(self._executor, job.function, *job.arguments)
+        def count(finished: int) -> None:
+            self.report(replace(start, count=start.count + finished))
 
-    def _result(self, future: Future[bytes], job: Job) -> Any:
-        """Return the result of a job that a worker has done; one that it could not import is done now."""
-        return fetch(future, partial(job.function, *job.arguments, **self._counter(job)))
+        return job.function(*job.arguments, count=count)
 
 
-def submit(executor: Executor, function: Callable[..., Any], *arguments: Any) -> Future[bytes] | None:
-    """Hand a call to an executor; return None if it cannot be encoded."""
+def _submit(executor: Executor | None, function: Callable[..., Any], *arguments: Any) -> Future[bytes] | None:
+    """Hand a call to an executor; return None if there is none, or if the call cannot be encoded."""
+    if executor is None:
+        return None
     try:
         encoded = encode((function, arguments, hangs()))
     except Exception:  # Pickle raises errors of many kinds.
@@ -142,7 +148,7 @@ def submit(executor: Executor, function: Callable[..., Any], *arguments: Any) ->
         raise _worker_error() from error
 
 
-def fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
+def _fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
     """Return the result of a call that a worker has done, or that of a call here if the worker could not import it."""
     try:
         answer = future.result()
@@ -154,6 +160,47 @@ def fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
     note_last_words(words)
     note_hangs(known_hangs)
     return result
+
+
+Loader = Callable[[], Subject | NotLoaded]
+
+
+def begin_loading(names: Sequence[str], limits: Limits | None, executor: Executor | None = None) -> list[Loader]:
+    """Begin to load formulations and engines, named as on the command line, in the workers of an executor.
+
+    Return a function for each name that waits for what is loaded and returns it, or raises a MisuseError as
+    `load_subject` does. Without an executor or limits this process loads all.
+    """
+    here: list[Loader] = [partial(load_subject, name, limits) for name in names]
+    if executor is None or limits is None:
+        return here
+    futures = [_submit(executor, _load, name, limits) for name in names]
+    n_workers = int(getattr(executor, "_max_workers", 0))
+    for name in islice(cycle(names), len(names), n_workers):  # Each worker has something to load.
+        _submit(executor, _load, name, limits)
+    return [
+        load if future is None else partial(_fetch_subject, future, name, limits)
+        for future, name, load in zip(futures, names, here, strict=True)
+    ]
+
+
+def _load(name: str, limits: Limits) -> tuple[Subject | NotLoaded | tuple[str, str, str], list[Path]]:
+    """Return what a worker has loaded, or the words of its MisuseError, and the files of compiled code there."""
+    try:
+        subject = load_subject(name, limits)
+    except MisuseError as error:
+        return (error.argument, error.found, error.needed), []
+    return subject, [] if isinstance(subject, NotLoaded) else code_files(subject)
+
+
+def _fetch_subject(future: Future[bytes], name: str, limits: Limits) -> Subject | NotLoaded:
+    loaded: Subject | NotLoaded | tuple[str, str, str]
+    loaded, files = _fetch(future, partial(_load, name, limits))
+    if isinstance(loaded, tuple):
+        raise MisuseError(*loaded)
+    if isinstance(loaded, Subject):
+        note_code_files(loaded, files)
+    return loaded
 
 
 def _do(encoded: bytes) -> bytes:

@@ -131,8 +131,8 @@ def test_merge_can_audit_what_it_makes(ask: Ask, tmp_path: Path) -> None:
     answer = ask("merge", tmp_path / "shards", "--audit", "--share", "0.5", "--out", tmp_path / "r.nc")
     assert answer.status == 0
     assert "judged again: 4 of 8 outcomes and all " in answer.out
-    assert "outcomes from a journal that proves nothing: 9, of which 1 were judged again" in answer.out
-    assert read_run(tmp_path / "r.nc").provenance["unproven_outcomes"] == "9, of which 1 were judged again"
+    assert "outcomes that were judged before: 9, of which 1 were judged again" in answer.out
+    assert read_run(tmp_path / "r.nc").provenance["stored_outcomes"] == "9, of which 1 were judged again"
 
 
 def test_the_chance_is_that_of_a_draw_without_return() -> None:

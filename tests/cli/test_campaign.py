@@ -8,7 +8,7 @@ import pytest
 from asking import Ask, asking
 
 from contactverif import Property, load_properties
-from contactverif.journals.known_outcomes import KnownOutcomes
+from contactverif.run.store import Plan, Store
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
 
@@ -21,7 +21,7 @@ N = 3
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Return a function that runs `contactverif` with blocks of ten cases."""
-    for module in ("sampling.draw", "run.run_jobs"):
+    for module in ("sampling.draw", "run.run"):
         monkeypatch.setattr(f"contactverif.{module}.BLOCK", 10)
     return asking(monkeypatch, capsys)
 
@@ -44,9 +44,8 @@ def cut_in_half(journal: Path) -> None:
 
 def count(folder: Path) -> tuple[int, int]:
     """Return the numbers of judged cases and of further outcomes of the same cases."""
-    known = KnownOutcomes(sorted(folder.glob("shard-*")), len(NAMES) * len(IDS), 100)
-    known.close()
-    return known.n_outcomes, known.n_twice
+    store = Store(Plan(formulations=NAMES, properties=IDS), None, sorted(folder.glob("shard-*")))
+    return store.n_outcomes, store.n_records - store.n_outcomes
 
 
 @pytest.mark.parametrize("in_blocks", [True, False])

@@ -11,15 +11,13 @@ import pytest
 from asking import Ask, run_inline, without_rows
 from fresh_process import MAIN, PYTHON
 
-from contactverif.journals.journal import begin_journal, journal_folder
-from contactverif.journals.known_outcomes import KnownOutcomes
-from contactverif.journals.run_plan import Plan
-from contactverif.run.rows import OutcomeStore
+from contactverif.run.journal import journal_folder, new_journal
+from contactverif.run.rows import RowOutcomes
+from contactverif.run.store import Plan, Store
 from contactverif_reports.netcdf.differences import same_data
 
 IDS = ("patch.flat.resultant", "patch.flat.transmission", "hard.deep")
 RUN = ("verify", "nts", "vts-ppt", *(word for id_ in IDS for word in ("-p", id_)), "--examples", "60", "--seed", "1")
-N_ROWS = 6
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +55,8 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_report_of_an_unbroke
     for more in (8_000,):
         kill_at(size_of(journal) + more, ["verify", "--resume", str(report)], journal)
         assert not report.exists()
-    known = KnownOutcomes([journal], N_ROWS, 1000)
-    known.close()
-    assert known.n_outcomes > 0
-    assert known.n_twice == 0
+    store = Store(Plan(formulations=("nts", "vts-ppt"), properties=IDS), None, [journal])
+    assert store.n_outcomes == store.n_records > 0
     answer = ask("verify", "--resume", report, "--jobs", "1")
     assert (answer.status, answer.err) == (0, "")
     assert f"report: {report}" in answer.out
@@ -107,7 +103,8 @@ def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_pa
     answer = ask("verify", "--resume", unbroken)
     assert answer.status == 2
     assert "which is complete" in answer.err
-    begin_journal(journal_folder(tmp_path / "r.nc"), Plan(), [])
+    with new_journal(journal_folder(tmp_path / "r.nc"), Plan()):
+        pass
     answer = ask("verify", "nts", "--resume", tmp_path / "r.nc")
     assert answer.status == 2
     assert "names beside it; needed --jobs and --keep-going at most" in answer.err
@@ -163,15 +160,15 @@ def test_a_file_that_may_not_grow_is_a_line_and_the_run_goes_on(ask: Ask, unbrok
 
 
 def test_a_run_that_lost_an_outcome_is_not_green(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    append, losses = OutcomeStore.append, []
+    append, losses = RowOutcomes.append, []
 
-    def lose_one(store: OutcomeStore, *outcome: Any) -> None:
-        if len(store) == 3 and not losses:
+    def lose_one(outcomes: RowOutcomes, *outcome: Any) -> None:
+        if len(outcomes) == 3 and not losses:
             losses.append(outcome)
         else:
-            append(store, *outcome)
+            append(outcomes, *outcome)
 
-    monkeypatch.setattr(OutcomeStore, "append", lose_one)
+    monkeypatch.setattr(RowOutcomes, "append", lose_one)
     answer = ask("verify", "vts-ppt", "-p", "patch.flat.resultant", "--examples", "20", "--out", tmp_path / "r.nc")
     assert answer.status == 1
     assert "Not complete: vts-ppt patch.flat.resultant: outcomes of 19 of 20 cases." in answer.out

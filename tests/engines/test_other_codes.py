@@ -10,7 +10,7 @@ from subjects import load_property
 from contactverif import Verdict, judge_case, load_scene
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.isolation.limits import Limits
-from contactverif.plugins.engines import load_engine
+from contactverif.plugins.registry import load_engine
 from contactverif.problems.catalogue import load_scene_case
 from contactverif_engines.control import Control
 from contactverif_engines.opensees import find_chains

@@ -7,7 +7,6 @@ it says; the last line compares the two.
 
 from __future__ import annotations
 
-import os
 import random
 import re
 import sys
@@ -219,7 +218,6 @@ class Campaign:
 def main(count: int, seed: int) -> int:
     """Run the campaign; return 1 if an audit missed what it must see, or saw numbers not as often as it says."""
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_STATE_HOME"] = f"{folder}/state"
         campaign = Campaign(Path(folder))
         for number in range(count):
             campaign.attack(KINDS[number % len(KINDS)], random.Random(f"{seed}/{number}"))

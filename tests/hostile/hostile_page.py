@@ -15,7 +15,7 @@ CAMPAIGNS = {
     "command_lines.txt": "Command lines",
     "damaged_reports.txt": "Damaged reports",
     "damaged_meshes.txt": "Damaged meshes",
-    "forged_journals.txt": "Journals that were forged without the key",
+    "forged_journals.txt": "Forged journals, of which all outcomes are judged again",
     "forged_reports.txt": "Forged reports, as `contactverif audit` sees them",
     "ways.txt": "One seed in all ways",
 }

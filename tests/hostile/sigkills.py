@@ -4,7 +4,7 @@
 seed. Half of the kills hit the whole process group, half the first process alone.
 
 Cases that are asked again after a kill were lost. A plugin notes the states that it is asked about, so that they are
-counted without a look into the journal: each job may lose the case that it was judging.
+counted without a look into the journal: each job may lose the chunk that it was judging.
 """
 
 import csv
@@ -48,7 +48,7 @@ class Command:
     words: tuple[str, ...]
     resume: tuple[str, ...] = ()  # The command line that goes on, if there is one
     after: tuple[str, ...] = ()  # A command line that makes the report from what is there, if one is needed
-    jobs: int = 1  # Processes that judge; each may lose one case.
+    jobs: int = 1  # Processes that judge; each may lose one chunk.
     share: float = 0.2  # The share of the kills that hit this command
     read: Callable[[Path], object] = read_run  # It raises if a file of the results is broken.
     # The differences of two folders, one of them from a run that was never killed.
@@ -240,8 +240,9 @@ def _resume(name: str, folder: Path, count: Count) -> None:
     status = _make_report(folder, command, start(folder, words, "second").wait())
     count.resumed += 1
     twice = (set(states(folder / "noted" / "first")) & set(states(folder / "noted" / "second"))) - common_states()
-    # A case of `purity` asks about four states and one of the patch test about one: the case in flight of each job.
-    n_lost = max(0, len(twice) - 5 * command.jobs) if words == command.resume else 0
+    # A case of `purity` asks about four states and one of the patch test about one. Each job may lose the chunk of 25
+    # cases that it was judging, and of each row three of 250 cases are judged again.
+    n_lost = max(0, len(twice) - 5 * (25 * command.jobs + 3)) if words == command.resume else 0
     count.n_lost += n_lost
     differs = ["no report"] if status != whole.status else command.compare(folder / "here", whole.folder / "here")
     count.broken += bool(differs)

@@ -11,11 +11,11 @@ from test_run import ZERO, a_case, from_size, subject
 from contactverif import Verdict
 from contactverif.contract.counterexample import Origin, counterexamples
 from contactverif.contract.result import Result, Run
-from contactverif.journals.run_journal import Journal
 from contactverif.run import failure_memory
 from contactverif.run.failure_memory import FailureMemory, Failures
 from contactverif.run.run import run
 from contactverif.run.scheduler import Progress
+from contactverif.run.store import Store
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
@@ -26,13 +26,13 @@ LARGE = 100  # No planned case has so many segments.
 def ask(least: int, remembered: Failures, progress: Callable[[Progress], None] | None = None, seed: int = 1) -> Run:
     """Return the run of a formulation that promises to pass, and fails with so many segments."""
     wrong = subject(from_size(least), flat=True)
-    return run([wrong], [ZERO], examples=20, seed=seed, journal=journal_with(remembered), progress=progress)
+    return run([wrong], [ZERO], examples=20, seed=seed, store=store_with(remembered), progress=progress)
 
 
-def journal_with(failures: Failures) -> Journal:
-    journal = Journal()
-    journal.earlier_failures = failures
-    return journal
+def store_with(failures: Failures) -> Store:
+    store = Store()
+    store.failures = failures
+    return store
 
 
 def test_what_failed_once_is_asked_first_and_fails_the_row_beside_the_planned_cases(tmp_path: Path) -> None:

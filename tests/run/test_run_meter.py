@@ -8,9 +8,8 @@ from test_run import ZERO, a_case, sizes, subject
 
 from contactverif import Outcome, Property, Verdict
 from contactverif.contract.cases import Cases
-from contactverif.run import run_meter
-from contactverif.run.run import run
-from contactverif.run.run_meter import RunMeter
+from contactverif.run import run as driver
+from contactverif.run.run import RunMeter, run
 from contactverif.run.scheduler import Progress
 from contactverif.sampling.draw import Sampling
 
@@ -30,12 +29,12 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(run_meter, "perf_counter", clock)
+    monkeypatch.setattr(driver, "perf_counter", clock)
     return clock
 
 
 def meter_of(*questions: Property) -> RunMeter:
-    meter = RunMeter([subject()], questions, Sampling(100, 1))
+    meter = RunMeter({("mine", question.id): question for question in questions}, [subject()], Sampling(100, 1))
     meter.read({})  # The run begins.
     return meter
 
@@ -66,7 +65,7 @@ def test_cases_that_solve_bodies_count_for_more_until_they_are_measured(clock: C
     meter.measure(ZERO.id, outcomes(100, 1.0))
     clock.now = 100.0
     guess = meter.read(rows_judged(100)).seconds_left
-    assert guess == pytest.approx(100 * run_meter._COSTS[True, False])
+    assert guess == pytest.approx(100 * driver._COSTS[True, False])
     meter.measure(SOLVED.id, outcomes(1, 7.0))
     clock.now = 107.0
     assert meter.read(rows_judged(100)).seconds_left == pytest.approx(700.0)

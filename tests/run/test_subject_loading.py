@@ -13,8 +13,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote_formulation import code_files, note_code_files, places
-from contactverif.plugins.engines import load_subject
-from contactverif.run.subject_loading import begin_loading
+from contactverif.plugins.registry import load_subject
+from contactverif.run.scheduler import begin_loading
 from contactverif.run.worker_pool import worker_pool
 
 LIMITS = Limits()

@@ -33,8 +33,6 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
 from contactverif.isolation.remote_formulation import RemoteSubject
-from contactverif.journals.journal import JournalKey, RecordFile, journal_folder, read_messages, record_files
-from contactverif.journals.keys import remove_key
 from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.solving import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.system import System
@@ -42,8 +40,9 @@ from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.plugins import registry
 from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
+from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
 from contactverif.studies.bench import bench_plan
-from contactverif.studies.bench.bench_journal import FinishedCell, Header, Journal
+from contactverif.studies.bench.bench_journal import Header, open_journal
 from contactverif.studies.bench.bench_plan import BenchPlan, largest_errors, make_plan, pose, vary
 from contactverif.studies.bench.bench_study import run_bench
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, SolutionRecord, run_cell
@@ -270,14 +269,14 @@ RECORD = CellRecord(4, 10, {"a": RunRecord([SOLUTION], (5, 6), 7, 0.5, 0.25)})
 
 def note(output: Path, *cells: tuple[int, CellRecord]) -> None:
     """Append finished cells to the journal of an output file."""
-    with closing(Journal(output, HEADER)) as journal:
+    with open_journal(output, HEADER) as finished:
         for number, record in cells:
-            journal.add(number, record)
+            finished.add(number, record)
 
 
 def finished_cells(output: Path, header: Header = HEADER) -> dict[int, CellRecord]:
-    with closing(Journal(output, header)) as journal:
-        return journal.finished
+    with open_journal(output, header) as finished:
+        return finished.records
 
 
 def test_a_torn_record_is_left_out_and_another_plan_is_refused(tmp_path: Path) -> None:
@@ -290,28 +289,21 @@ def test_a_torn_record_is_left_out_and_another_plan_is_refused(tmp_path: Path) -
     assert finished_cells(output) == {0: RECORD, 1: RECORD}
     for other in ({"formulations": ("b",)}, {"versions": {}}):
         with pytest.raises(MisuseError, match="the journal of another bench"):
-            Journal(output, msgspec.structs.replace(HEADER, **other))
+            finished_cells(output, msgspec.structs.replace(HEADER, **other))
+
+
+def test_two_benches_do_not_share_a_journal(tmp_path: Path) -> None:
+    with open_journal(tmp_path / "a.nc", HEADER), pytest.raises(MisuseError, match="of a run that is going on"):
+        finished_cells(tmp_path / "a.nc")
 
 
 @pytest.mark.parametrize("message", [b"\xff", b"\x90", msgspec.msgpack.encode({"number": "x", "record": {}})])
 def test_a_record_that_is_none_is_not_believed(tmp_path: Path, message: bytes) -> None:
     output = tmp_path / "a.nc"
     note(output, (0, RECORD), (1, replace(RECORD, runs={"b": RunRecord()})))
-    folder = tmp_path / "a.nc.journal"
-    with closing(RecordFile(folder, JournalKey.read(folder))) as file:
+    with closing(RecordFile(tmp_path / "a.nc.journal")) as file:
         file.append(message)
     assert finished_cells(output) == {0: RECORD}
-
-
-def test_a_cell_without_the_key_is_run_again_and_a_journal_without_its_key_is_refused(tmp_path: Path) -> None:
-    output, folder = tmp_path / "a.nc", tmp_path / "a.nc.journal"
-    note(output, (0, RECORD))
-    with closing(RecordFile(folder, JournalKey())) as file:
-        file.append(msgspec.msgpack.encode(FinishedCell(1, RECORD), enc_hook=float))
-    assert finished_cells(output) == {0: RECORD}
-    remove_key(JournalKey.read(folder).identity)
-    with pytest.raises(MisuseError, match=r"a journal that proves nothing; needed its key, which .* has"):
-        Journal(output, HEADER)
 
 
 @pytest.mark.parametrize("header", [b"", b"{", b"\xff" * 100])
@@ -319,7 +311,7 @@ def test_a_damaged_journal_is_one_line(tmp_path: Path, header: bytes) -> None:
     finished_cells(tmp_path / "a.nc")
     (tmp_path / "a.nc.journal" / "header").write_bytes(header)
     with pytest.raises(MisuseError, match=r"--out: found a.nc.journal with a damaged header; needed an undamaged"):
-        Journal(tmp_path / "a.nc", HEADER)
+        finished_cells(tmp_path / "a.nc")
 
 
 def install_problems(monkeypatch: pytest.MonkeyPatch, **strangers: Any) -> None:
@@ -448,7 +440,7 @@ def test_a_bench_that_is_killed_goes_on_and_equals_an_unbroken_one_but_for_secon
     process.send_signal(signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     assert not killed.exists()
-    first, *_ = (record.message for record in read_messages(record_files(journal)[0], JournalKey()))
+    first, *_ = (message for _, message in read_messages(record_files(journal)[0]))
     for target in (killed, unbroken):
         subprocess.run([*arguments, str(target)], env=environment, check=True, stdout=subprocess.DEVNULL)
     assert not journal.exists()

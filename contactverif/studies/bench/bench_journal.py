@@ -1,19 +1,18 @@
 """The journal of a bench: every finished cell, on the disk before the next one begins, so that a killed bench goes on.
 
-A journal of another plan is refused, and never overwritten. A cell whose record is damaged, or does not fit the key of
-the journal, is run again. Without the key the journal is refused: no second run tells whether seconds are right.
+A journal of another plan is refused, and never overwritten. A cell whose record is damaged is run again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import msgspec
 
 from contactverif.contract.errors import MisuseError
-from contactverif.journals import journal
-from contactverif.journals.keys import state_folder
+from contactverif.run import journal
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord
 
@@ -24,7 +23,6 @@ class Header(msgspec.Struct, frozen=True):
     bench: BenchPlan
     formulations: tuple[str, ...]
     versions: dict[str, str]
-    nonce: str = ""  # It tells two benches with the same header apart.
 
     @classmethod
     def from_plan(cls, plan: BenchPlan, names: Sequence[str], provenance: Mapping[str, str]) -> Header:
@@ -44,38 +42,38 @@ _ENCODER = msgspec.msgpack.Encoder(enc_hook=float)  # Numbers of numpy are numbe
 _DECODER = msgspec.msgpack.Decoder(FinishedCell)
 
 
-class Journal:
-    """The journal of one output file. `finished` has the records of the cells that are finished, by number."""
+class FinishedCells:
+    """The records of the cells that are finished, by number, and the file for the others."""
 
-    def __init__(self, output: Path, header: Header) -> None:
-        folder = journal.journal_folder(output)
-        self.finished: dict[int, CellRecord] = {}
-        if not folder.exists():
-            journal.begin_journal(folder, header, ())
-        elif msgspec.structs.replace(journal.read_header(folder, Header, "--out"), nonce="") != header:
-            needed = "the same command and version, or another name, or no such folder"
-            raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
-        key = journal.JournalKey.read(folder)
-        for path in journal.record_files(folder):
-            self._read(path, key, {*header.formulations})
-        self._file = journal.RecordFile(folder, key)
-
-    def _read(self, path: Path, key: journal.JournalKey, names: set[str]) -> None:
-        """Read the records of a file."""
-        for _, message, fits in journal.read_messages(path, key):
-            if not key.key:
-                needed = f"its key, which {state_folder()} of its user and machine has, or no such folder"
-                raise MisuseError("--out", f"{path.parent}, a journal that proves nothing", needed)
-            cell = journal.decode(message, _DECODER) if fits else None
-            if cell is not None and cell.record.runs.keys() == names:
-                self.finished[cell.number] = cell.record
+    def __init__(self, folder: Path, names: Sequence[str]) -> None:
+        messages = (message for path in journal.record_files(folder) for _, message in journal.read_messages(path))
+        cells = (journal.decode(message, _DECODER) for message in messages)
+        self.records = {
+            cell.number: cell.record for cell in cells if cell is not None and cell.record.runs.keys() == {*names}
+        }
+        self._file = journal.RecordFile(folder)
 
     def add(self, number: int, record: CellRecord) -> None:
         """Append the record of a cell that is finished."""
         self._file.append(_ENCODER.encode(FinishedCell(number, record)))
         self._file.sync()
-        self.finished[number] = record
+        self.records[number] = record
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+@contextmanager
+def open_journal(output: Path, header: Header) -> Iterator[FinishedCells]:
+    """Open a block with the finished cells of an output file, in which no other bench uses its journal."""
+    folder = journal.journal_folder(output)
+    if not folder.exists():
+        held = journal.new_journal(folder, header)
+    elif journal.read_header(folder, Header, "--out") == header:
+        held = journal.hold_journal(folder, "--out")
+    else:
+        needed = "the same command and version, or another name, or no such folder"
+        raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
+    with held, closing(FinishedCells(folder, header.formulations)) as cells:
+        yield cells

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from math import nan
@@ -17,7 +17,7 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.remote_formulation import RemoteSubject, places
 from contactverif.plugins.provenance import collect_provenance
-from contactverif.studies.bench.bench_journal import Header, Journal
+from contactverif.studies.bench.bench_journal import FinishedCells, Header, open_journal
 from contactverif.studies.bench.bench_plan import BenchPlan
 from contactverif.studies.bench.cell_runs import CellRecord, RunRecord, SolutionRecord, run_cell
 from contactverif_reports.bench.results import COUNTS, ERRORS, BenchResults, Cell, Outcome
@@ -46,11 +46,11 @@ def run_bench(
     names = [subject.name for subject in loaded]
     with ExitStack() as stack:
         header = Header.from_plan(plan, names, provenance)
-        journal = stack.enter_context(closing(Journal(output, header))) if output else None
-        records, failures = _run_cells(loaded, plan, journal, progress or _show_nothing)
-    cells = _measured_cells(plan, failures)
+        cells = stack.enter_context(open_journal(output, header)) if output else None
+        records, failures = _run_cells(loaded, plan, cells, progress or _show_nothing)
+    measured = _measured_cells(plan, failures)
     not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)} | plan.not_loaded
-    return collect_results(names, replace(plan, cells=cells), records, not_loaded | failures, provenance)
+    return collect_results(names, replace(plan, cells=measured), records, not_loaded | failures, provenance)
 
 
 def _show_nothing(description: str, n_finished: int, n_planned: int) -> None:
@@ -66,7 +66,7 @@ def _measured_cells(plan: BenchPlan, failures: dict[str, str]) -> tuple[Cell, ..
 
 
 def _run_cells(
-    loaded: Sequence[Subject], plan: BenchPlan, journal: Journal | None, progress: Progress
+    loaded: Sequence[Subject], plan: BenchPlan, finished: FinishedCells | None, progress: Progress
 ) -> tuple[list[dict[Cell, CellRecord]], dict[str, str]]:
     """Return the records of each process by cell, and {problem: its mistake} of those that are not solved further."""
     n_cells = len(plan.cells)
@@ -86,7 +86,7 @@ def _run_cells(
                 run_cell, cell, loaded, plan.seed, solve=process == 0, dead=_find_dead(records[0], cell.scene)
             )
             try:
-                records[-1][cell] = _run_unless_finished(journal, number, run)
+                records[-1][cell] = _run_unless_finished(finished, number, run)
             except MisuseError as error:  # The mistake of a problem.
                 failures[cell.scene] = str(error)
     progress("writing", n_cells * plan.processes, n_cells * plan.processes)
@@ -99,14 +99,13 @@ def _find_dead(records: Mapping[Cell, CellRecord], scene: str) -> set[str]:
     return {name for record in of_scene for name, run in record.runs.items() if run.is_lost}
 
 
-def _run_unless_finished(journal: Journal | None, number: int, run: Callable[[], CellRecord]) -> CellRecord:
+def _run_unless_finished(finished: FinishedCells | None, number: int, run: Callable[[], CellRecord]) -> CellRecord:
     """Return the record that the journal has under a number; run the cell and note it if there is none."""
-    record = journal.finished.get(number) if journal is not None else None
-    if record is None:
-        record = run()
-        if journal is not None:
-            journal.add(number, record)
-    return record
+    if finished is None:
+        return run()
+    if number not in finished.records:
+        finished.add(number, run())
+    return finished.records[number]
 
 
 def _end_processes(subjects: Sequence[Subject]) -> None:

@@ -1,7 +1,7 @@
-"""The second look at stored outcomes: a random share of each row is judged again and compared with what is stored.
+"""The recheck of stored outcomes: a random share of each row is judged again and compared with what is stored.
 
-It tells how far a journal without a proof, or the report of a stranger, can be believed. The share is drawn anew each
-time, not from the seed of the run: nobody can know it beforehand.
+It tells how far a store, or the report of a stranger, can be believed. The share is drawn anew each time, not from the
+seed of the run, so that it cannot be known beforehand.
 """
 
 from __future__ import annotations
@@ -12,16 +12,15 @@ from functools import partial
 from itertools import groupby, product
 from math import ceil, isfinite
 from random import SystemRandom
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.subject import Subject
-from contactverif.journals.outcome_records import WITNESS, BlockRecord
-from contactverif.journals.run_journal import Journal
 from contactverif.run import judge
 from contactverif.run.rows import OpenRow, open_row
 from contactverif.run.scheduler import Job, Scheduler
+from contactverif.run.store import WITNESS, Store
 from contactverif.sampling import draw
 from contactverif.sampling.draw import PlannedCases, Sampling
 
@@ -30,7 +29,6 @@ SHARE = 0.01  # The share of the cases of a row that is judged again, at least o
 ROUNDOFF = 1e-6
 _CHUNK = 25  # The number of cases that are judged in one job.
 _NO_CASE = "the run has no such case"
-_Fact = TypeVar("_Fact", float, str)
 
 
 def choose_share(numbers: Sequence[int], share: float = SHARE) -> list[int]:
@@ -83,15 +81,15 @@ class Sample:
         return self.outcomes.keys() - self.cases.keys()
 
 
-class SecondLook:
+class Recheck:
     """The jobs that judge samples again. `differences` and `n_judged` are complete when all are done.
 
     Numbers are compared bit for bit on the same machine (`exact`), else up to roundoff.
     """
 
-    def __init__(self, samples: Sequence[Sample], sampling: Sampling, journal: Journal, *, exact: bool) -> None:
+    def __init__(self, samples: Sequence[Sample], sampling: Sampling, *, exact: bool) -> None:
         self.n_judged = 0
-        self._samples, self._sampling, self._journal, self._exact = samples, sampling, journal, exact
+        self._samples, self._sampling, self._exact = samples, sampling, exact
         self._words: dict[tuple[str, str, int], str] = {}  # By formulation, property and case.
 
     @property
@@ -115,8 +113,6 @@ class SecondLook:
     def _add_drawn(self, group: Sequence[Sample], number: int, block: PlannedCases) -> Iterator[Job]:
         """Yield the jobs to judge cases of a block, and to draw all other blocks behind the first."""
         first, count = number * draw.BLOCK, len(block.cases)
-        name = self._sampling.block_name(group[0].question)
-        self._journal.add_block(BlockRecord(name, number, count, block.exhausted, block.last))
         for sample in group:
             yield from self._judge(
                 sample, {n: block.cases[n - first] for n in sample.missing if 0 <= n - first < count}
@@ -139,45 +135,35 @@ class SecondLook:
         return ()
 
 
-def look_at_journal(
-    journal: Journal,
-    subjects: Sequence[Subject],
-    questions: Sequence[Property],
-    sampling: Sampling,
-    scheduler: Scheduler,
+def recheck_store(
+    store: Store, subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling, scheduler: Scheduler
 ) -> None:
-    """Judge a share of the outcomes without proof of a journal again; where one differs, none of its row counts."""
-    samples, counts = [], {}
+    """Judge a share of the outcomes of a store again; where one differs, no stored outcome of its row counts."""
+    if not store.n_outcomes:
+        return
+    samples, counts = [], dict[tuple[str, str], tuple[int, int]]()
     for subject, plain in product(subjects, questions):
-        question = plain.for_traits(subject.traits)
-        if numbers := journal.unproven(subject.name, question.id):
-            row = open_row(subject, question, sampling.source(question), "", sampling)
-            if isinstance(row, OpenRow):
-                sample = Sample.of_row(row, _choose_stored(journal, row, numbers))
-                samples.append(sample)
-                counts[subject.name, question.id] = len(numbers), len(sample.outcomes)
-    look = SecondLook(samples, sampling, journal, exact=journal.known.same_machine)
-    scheduler.work(look)
-    journal.n_unproven = sum(count for count, _ in counts.values())
-    journal.n_judged_again = sum(count for _, count in counts.values())
-    for (formulation, property_id), differences in groupby(sorted(look.differences), key=lambda entry: entry[:2]):
+        question, numbers = plain.for_traits(subject.traits), store.numbers(subject.name, plain.id)
+        row = open_row(subject, question, sampling.source(question), "", sampling) if numbers else None
+        if isinstance(row, OpenRow):
+            chosen = choose_share(numbers)
+            stored = (store.outcomes(subject.name, question.info, number, 1) for number in chosen)
+            outcomes = {number: each[0] for number, each in zip(chosen, stored, strict=True) if each}
+            samples.append(Sample.of_row(row, outcomes))
+            counts[subject.name, question.id] = len(numbers), len(outcomes)
+    recheck = Recheck(samples, sampling, exact=store.same_machine)
+    scheduler.work(recheck)
+    store.n_stored = sum(count for count, _ in counts.values())
+    store.n_rechecked = sum(count for _, count in counts.values())
+    for (formulation, property_id), differences in groupby(sorted(recheck.differences), key=lambda entry: entry[:2]):
         first, *others = differences
         count, n_again = counts[formulation, property_id]
-        journal.n_judged_again += count - n_again
+        store.n_rechecked += count - n_again
         remark = (
             f"{formulation} {property_id}: {1 + len(others)} of {n_again} stored outcomes that were judged again differ"
         )
         words = f"{first.case}: {first.words}; all {count} are judged again"
-        journal.distrust(formulation, property_id, f"{remark}, {words}")
-
-
-def _choose_stored(journal: Journal, row: OpenRow, numbers: Sequence[int]) -> dict[int, Outcome]:
-    """Return a random share of the outcomes of a row."""
-    info, outcomes = row.question.info, dict[int, Outcome]()
-    for number in choose_share(numbers):
-        for outcome in journal.outcomes(row.subject.name, info, number, 1).values():
-            outcomes[number] = outcome
-    return outcomes
+        store.reject(formulation, property_id, f"{remark}, {words}")
 
 
 def draw_again(sampling: Sampling, question: Property, number: int) -> PlannedCases:
@@ -201,24 +187,18 @@ def find_difference(stored: Outcome, today: Outcome, exact: bool) -> str:
     """
     if stored.verdict is not today.verdict:
         return f"the verdict is {stored.verdict}, and again {today.verdict}"
+    before, again = (_numbers_of(each) | (_words_of(each) if exact else {}) for each in (stored, today))
     bounds = {} if exact else _bounds_of(today)
-    for name, a, b in _pair(_numbers_of(stored), _numbers_of(today)):
+    for name in {**before, **again}:
+        a, b = before.get(name), again.get(name)
         if repr(a) != repr(b) and (exact or not _agree(a, b, bounds.get(name, 0.0))):
             return f"{name} is {a!r}, and again {b!r}"
-    for name, text, again in _pair(_words_of(stored), _words_of(today)) if exact else ():
-        if text != again:
-            return f"{name} is {text!r}, and again {again!r}"
     return ""
 
 
-def _pair(stored: Mapping[str, _Fact], today: Mapping[str, _Fact]) -> Iterator[tuple[str, _Fact | None, _Fact | None]]:
-    """Yield (name, stored, today); None where there is none."""
-    return ((name, stored.get(name), today.get(name)) for name in {**stored, **today})
-
-
-def _agree(a: float | None, b: float | None, bound: float) -> bool:
+def _agree(a: object, b: object, bound: float) -> bool:
     """Return whether two numbers agree up to roundoff."""
-    if a is None or b is None or not (isfinite(a) and isfinite(b)):
+    if not (isinstance(a, float) and isinstance(b, float) and isfinite(a) and isfinite(b)):
         return False
     return abs(a - b) <= max(bound, ROUNDOFF * max(abs(a), abs(b)))
 
@@ -230,10 +210,10 @@ def _bounds_of(outcome: Outcome) -> dict[str, float]:
     return {number.quantity.name: number.tolerance for number in bounded}
 
 
-def _numbers_of(outcome: Outcome) -> dict[str, float]:
+def _numbers_of(outcome: Outcome) -> dict[str, object]:
     """Return the judged numbers of an outcome, and the sizes of its case."""
     summary = outcome.summary
-    entries = {
+    entries: dict[str, object] = {
         "number of slave segments": float(summary.n_slave_segments),
         "number of master segments": float(summary.n_master_segments),
         "penalty": summary.penalty,
@@ -247,9 +227,12 @@ def _numbers_of(outcome: Outcome) -> dict[str, float]:
     return entries
 
 
-def _words_of(outcome: Outcome) -> dict[str, str]:
+def _words_of(outcome: Outcome) -> dict[str, object]:
     """Return the words of an outcome, and the numbers that are not judged. Those of a crash may have an address."""
-    entries = {"the case": f"{outcome.summary.name} {outcome.summary.kind}", "breach": str(outcome.breach)}
+    entries: dict[str, object] = {
+        "the case": f"{outcome.summary.name} {outcome.summary.kind}",
+        "breach": str(outcome.breach),
+    }
     measured = outcome.measurement
     if measured is None:
         return entries | ({} if outcome.verdict is Verdict.CRASHED else {"the reason": outcome.reason})

@@ -1,0 +1,307 @@
+"""The store of a run: its plan, and each outcome as it comes, in a journal, so that no case is judged twice.
+
+Verdicts are never read: they follow from the stored numbers. A random share of each row is judged again before its
+stored outcomes count (`recheck_store`).
+"""
+
+from __future__ import annotations
+
+import os
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, product
+from pathlib import Path
+from secrets import token_hex
+from typing import IO, Any
+
+import msgspec
+import numpy as np
+
+from contactverif.contract import records
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict, judge_stored
+from contactverif.plugins.provenance import CODE, machine
+from contactverif.run.journal import RecordFile, decode, read_header, read_message, read_messages, record_files
+
+FORMAT = 4  # A change of a record is a new one.
+WITNESS = -1  # The number of the outcome of a row's witness.
+STORED = "stored_outcomes"  # The attribute of a report that says how many outcomes came from earlier processes.
+_MOST_FORMS = 10_000  # The most forms that a process remembers.
+_MOST_FILES = 4  # The most stores that a process has open for writing.
+_FILE_BITS = 40  # A place is the number of its file, then this many bits for the byte.
+_LEAST_ROOM = 10_000  # A finite list may have this many cases.
+
+
+class Plan(msgspec.Struct, frozen=True, kw_only=True):
+    """The plan of a run, the header of its store. A row is a formulation and a property, as on the command line."""
+
+    command: str = ""
+    options: dict[str, Any] = {}
+    folder: str = ""  # The working folder of the command, to which names of files are relative.
+    versions: dict[str, str] = {}  # {library or package: version or digest}.
+    formulations: tuple[str, ...] = ()
+    properties: tuple[str, ...] = ()
+    profile: str = ""
+    examples: int = 0
+    seed: int = 0
+    machine: dict[str, str] = {}  # What the last bits of a number depend on, beside the versions.
+    format: int = FORMAT
+
+
+def place_words(options: Mapping[str, Any]) -> str:
+    """Return options {name: value} as they are typed, without those that are not there."""
+    words = []
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        values = value if isinstance(value, list | tuple) else [value] if value else []
+        words += [option if entry is True else f"{option} {entry}" for entry in values]
+    return " ".join(words)
+
+
+def read_plan(folder: Path, argument: str) -> Plan:
+    """Return the plan of the store of a run, one of this format."""
+    plan = read_header(folder, Plan, argument)
+    if plan.format != FORMAT:
+        raise MisuseError(argument, f"{folder.name} with format {plan.format}", f"a journal of format {FORMAT}")
+    return plan
+
+
+def check_versions(stored: Mapping[str, str], here: Mapping[str, str], argument: str) -> None:
+    """Check that a run goes on with what it began with; the message names the first version or digest that differs."""
+    for name in sorted({*stored, *here}):
+        if stored.get(name) != here.get(name):
+            versions = f"{stored.get(name, 'nothing')} in the journal and {here.get(name, 'nothing')} here"
+            raise MisuseError(argument, f"{name.replace('_', ' ')}: {versions}", "the same, or a new run")
+
+
+class FormRecord(msgspec.Struct, frozen=True, array_like=True, tag="form"):
+    """The form of outcomes that stand behind it in the same file: their words and names."""
+
+    form: list[Any]
+
+
+class OutcomeRecord(msgspec.Struct, frozen=True, array_like=True, tag="outcome"):
+    """The outcome of one case."""
+
+    row: int  # Its number in the plan.
+    number: int  # The number of the case in the row; `WITNESS` for its witness.
+    form: int  # The place of the form in the file, in bytes.
+    numbers: bytes  # As little-endian float64.
+
+
+class RejectedRecord(msgspec.Struct, frozen=True, array_like=True, tag="rejected"):
+    """A row of which a stored outcome was wrong: none of its outcomes in these files counts."""
+
+    row: int
+    files: tuple[str, ...]
+
+
+_ENCODER = msgspec.msgpack.Encoder()
+_DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(FormRecord | OutcomeRecord | RejectedRecord)
+
+
+class _OutcomeFile(RecordFile):
+    """The file in which this process notes outcomes."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self._forms: dict[records.Form, int] = {}
+
+    def add(self, row: int, number: int, outcome: Outcome) -> None:
+        form, numbers = records.encode(outcome)
+        if form not in self._forms:
+            if len(self._forms) >= _MOST_FORMS:
+                self._forms.clear()
+            place = self.append(_encode_form(form))
+            if place is None:
+                return
+            self._forms[form] = place
+        self.append(_ENCODER.encode(OutcomeRecord(row, number, self._forms[form], array("d", numbers).tobytes())))
+
+
+def _encode_form(form: records.Form) -> bytes:
+    try:
+        return _ENCODER.encode(("form", form))
+    except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
+        return _ENCODER.encode(("form", _spell_out(form)))
+
+
+def _spell_out(item: Any) -> Any:
+    if isinstance(item, str):
+        return item.encode("utf-8", "backslashreplace").decode()
+    return tuple(map(_spell_out, item)) if isinstance(item, tuple) else item
+
+
+_files: dict[tuple[str, str, int], _OutcomeFile] = {}  # The files into which this process writes.
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """The place in a store for the outcomes of some cases of a row. It travels to the process that judges them."""
+
+    folder: str
+    session: str  # A word for the process that began or resumed the run.
+    row: int
+    first: int  # The number of the first of the cases.
+
+    @property
+    def file(self) -> _OutcomeFile:
+        """The file of this process. A process that was forked has another one than its parent."""
+        key = self.folder, self.session, os.getpid()
+        if key not in _files:
+            while len(_files) >= _MOST_FILES:
+                _files.pop(next(iter(_files))).close()
+            _files[key] = _OutcomeFile(Path(self.folder))
+        return _files[key]
+
+    def add(self, place: int, outcome: Outcome) -> None:
+        """Append the outcome of the case at a place behind the first."""
+        self.file.add(self.row, self.first + place, outcome)
+
+
+class Store:
+    """The outcomes of a run that earlier processes judged (`sources`), and the folder for new ones; None to keep none.
+
+    Of a stored outcome only its place is in memory. `write_error` is the first reason why a process could not write,
+    and `remarks` are what the user should know of outcomes that do not count.
+    """
+
+    def __init__(self, plan: Plan | None = None, folder: Path | None = None, sources: Sequence[Path] = ()) -> None:
+        self.plan = plan = plan or Plan()
+        self.folder = folder
+        self.write_error = ""
+        self.remarks: list[str] = []
+        # {(formulation, property id): case} of what failed in other runs. It is asked first, and is not stored.
+        self.failures: Mapping[tuple[str, str], Case] = {}
+        self.n_stored = self.n_rechecked = 0  # The numbers of stored outcomes of a run, and of those judged again.
+        self._session = token_hex(4)
+        self._rows = {key: number for number, key in enumerate(product(plan.formulations, plan.properties))}
+        self._room = max(_LEAST_ROOM, 2 * plan.examples) + 1  # A case with a larger number is not believed.
+        self._paths = [path for source in sources for path in record_files(source)]
+        self.same_machine = all(_machine_of(source) == machine() for source in sources)
+        self._decoders: dict[tuple[int, int], Callable[[Any], Outcome] | None] = {}  # {(file, place of a form): …}
+        self._keys, self._places = self._read_places()
+
+    def _read_places(self) -> tuple[Any, Any]:
+        """Return the sorted keys of all outcomes, and the place of each: of several of one case, that of the last."""
+        keys, places, rejected = array("q"), array("q"), set[tuple[int, str]]()
+        for file, path in enumerate(self._paths):
+            for place, message in read_messages(path):
+                match decode(message, _DECODER):
+                    case None:
+                        break
+                    case OutcomeRecord(row, number) if 0 <= row < len(self._rows) and -1 <= number < self._room - 1:
+                        keys.append(row * self._room + number + 1)
+                        places.append(file << _FILE_BITS | place)
+                    case RejectedRecord(row, names):
+                        rejected |= {(row, name) for name in names}
+        all_keys, all_places = (np.frombuffer(part, dtype=np.int64) for part in (keys, places))
+        counts = np.ones(len(keys), dtype=bool)
+        for row, name in rejected:
+            files = [file for file, path in enumerate(self._paths) if path.name == name]
+            counts &= ~((all_keys // self._room == row) & np.isin(all_places >> _FILE_BITS, files))
+        all_keys, all_places = all_keys[counts][::-1], all_places[counts][::-1]
+        self.n_records = len(all_keys)
+        unique, first = np.unique(all_keys, return_index=True)
+        return unique, all_places[first]
+
+    @property
+    def n_outcomes(self) -> int:
+        """The number of different cases whose outcomes are stored, witnesses included."""
+        return len(self._keys)
+
+    def writer(self, formulation: str, property_id: str, first: int) -> Writer | None:
+        """Return the place for the outcomes of some cases of a row; None if nothing is kept."""
+        if self.folder is None:
+            return None
+        return Writer(str(self.folder), self._session, self._rows[formulation, property_id], first)
+
+    def _range(self, formulation: str, property_id: str, first: int, count: int) -> slice:
+        """Return where the outcomes of some cases of a row stand among all."""
+        row = self._rows.get((formulation, property_id))
+        if row is None:
+            return slice(0)
+        start = row * self._room + first + 1
+        return slice(*np.searchsorted(self._keys, (start, start + count)).tolist())
+
+    def numbers(self, formulation: str, property_id: str) -> list[int]:
+        """Return the numbers of the cases of a row whose outcomes are stored."""
+        keys = self._keys[self._range(formulation, property_id, WITNESS, self._room)]
+        return (keys % self._room - 1).tolist()  # type: ignore[no-any-return]
+
+    def outcomes(self, formulation: str, info: PropertyInfo, first: int, count: int) -> dict[int, Outcome]:
+        """Return {place behind the first: outcome} of those of some cases of a row that are judged already."""
+        part, found = self._range(formulation, info.id, first, count), dict[int, Outcome]()
+        pairs = zip((self._keys[part] % self._room).tolist(), self._places[part].tolist(), strict=True)
+        for file, group in groupby(pairs, lambda pair: pair[1] >> _FILE_BITS):
+            with self._paths[file].open("rb") as stream:
+                for key, place in group:
+                    outcome = self._read_outcome(stream, file, place & (1 << _FILE_BITS) - 1, info)
+                    if outcome is not None:
+                        found[key - 1 - first] = outcome
+        return found
+
+    def _read_outcome(self, stream: IO[bytes], file: int, place: int, info: PropertyInfo) -> Outcome | None:
+        """Return an outcome with the verdict that follows from its numbers; None if it is to be judged again."""
+        record = _read_record(stream, place)
+        if not isinstance(record, OutcomeRecord) or not 0 <= record.form < place:
+            return None
+        key = file, record.form
+        if key not in self._decoders:
+            if len(self._decoders) >= _MOST_FORMS:
+                self._decoders.clear()
+            self._decoders[key] = _decoder_at(stream, record.form)
+        decoder = self._decoders[key]
+        if decoder is None or len(record.numbers) % 8:
+            return None
+        try:
+            outcome = judge_stored(info, decoder(array("d", record.numbers)))
+        except ValueError:  # They do not belong together, or are of another property.
+            return None
+        return None if outcome.measurement is None and outcome.verdict is Verdict.PASS else outcome
+
+    def reject(self, formulation: str, property_id: str, remark: str) -> None:
+        """Let no stored outcome of a row count, so that they are judged again, also after this run is killed."""
+        part = self._range(formulation, property_id, WITNESS, self._room)
+        self._keys, self._places = np.delete(self._keys, part), np.delete(self._places, part)
+        self.remarks.append(remark)
+        if writer := self.writer(formulation, property_id, 0):
+            writer.file.append(_ENCODER.encode(RejectedRecord(writer.row, tuple(path.name for path in self._paths))))
+
+    def provenance(self) -> dict[str, str]:
+        """Return what a report should say of where its outcomes come from: code, place, and how many were stored."""
+        digests = {name: digest for name, digest in self.plan.versions.items() if name.startswith(CODE)}
+        facts = {name.replace(" ", "_"): digest for name, digest in digests.items()}
+        place = place_words(self.plan.options.get("place") or {})
+        stored = f"{self.n_stored}, of which {self.n_rechecked} were judged again" if self.n_stored else ""
+        return facts | {name: words for name, words in (("place", place), (STORED, stored)) if words}
+
+    def close(self) -> None:
+        """Close the file of this process, once it is on the disk."""
+        key = str(self.folder), self._session, os.getpid()
+        if file := _files.pop(key, None):
+            file.close(sync=True)
+            self.write_error = self.write_error or file.write_error
+
+
+def _read_record(stream: IO[bytes], place: int) -> Any:
+    message = read_message(stream, place)
+    return None if message is None else decode(message, _DECODER)
+
+
+def _decoder_at(stream: IO[bytes], place: int) -> Callable[[Any], Outcome] | None:
+    """Return what makes outcomes of the form at a place; None if it is damaged, or none."""
+    stored = _read_record(stream, place)
+    try:
+        return records.decoder(Outcome, stored.form) if isinstance(stored, FormRecord) else None
+    except ValueError:
+        return None
+
+
+def _machine_of(source: Path) -> dict[str, str]:
+    try:
+        return read_header(source, Plan, "").machine
+    except MisuseError:
+        return {}
