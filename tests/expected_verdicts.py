@@ -1,18 +1,17 @@
-"""The verdict that theory expects for each formulation and property; the table in `properties/README.md` shows it.
+"""The verdict that theory expects for each formulation and property; `properties/README.md` shows it in a table.
 
-`python tests/expected_verdicts.py` writes the table anew. `test_verdicts.py` compares it with what the harness finds,
-and with the file. Rule for the next editor: change an entry only with a reason from theory, never because a run
-differs.
+`python tests/expected_verdicts.py` writes that table anew, and those of all properties. `test_verdicts.py` compares the
+table of verdicts with what the harness finds, and both with the file. Rule for the next editor: change an entry only
+with a reason from theory, never because a run differs.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
 
-from contactverif.contract.property import Verdict
-from contactverif.plugins.registry import property_ids
+from contactverif.contract.property import Property, Verdict
+from contactverif.plugins.registry import load_properties, property_ids
 
 README = Path(__file__).parents[1] / "properties" / "README.md"
-BEGIN, END = "<!-- verdicts: begin -->", "<!-- verdicts: end -->"
 
 FLAT = "patch.flat.transmission"
 RESULTANT, RANK, DEAD_ZONE = "patch.flat.resultant", "multipliers.rank", "patch.dead-zone"
@@ -208,16 +207,34 @@ def _table(ids: list[str]) -> str:
     return "\n".join(lines)
 
 
-def table_in_readme() -> str:
-    """Return the table that the file holds."""
-    return README.read_text().partition(BEGIN)[2].partition(END)[0].strip()
+def properties() -> str:
+    """Return a table in Markdown for each family: the summary of each property, and the first of its tolerances."""
+    families: dict[str, list[str]] = {}
+    for prop in load_properties():
+        assert isinstance(prop, Property)
+        cells = (f"`{prop.id}`", prop.summary, prop.quantities[0].tolerance)
+        families.setdefault(prop.family, []).append(
+            f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+        )
+    head = "| property | what holds | tolerance |\n|---|---|---|"
+    return "\n\n".join("\n".join([f"### {name.capitalize()}\n\n{head}", *rows]) for name, rows in families.items())
 
 
-def write_table() -> None:
-    """Write the table into the file."""
-    before, _, rest = README.read_text().partition(BEGIN)
-    README.write_text(f"{before}{BEGIN}\n{matrix()}\n{END}{rest.partition(END)[2]}")
+TABLES = {"properties": properties, "verdicts": matrix}
+
+
+def in_readme(name: str) -> str:
+    """Return the tables of a name that the file holds."""
+    return README.read_text().partition(f"<!-- {name}: begin -->")[2].partition(f"<!-- {name}: end -->")[0].strip()
+
+
+def write_tables() -> None:
+    """Write all tables into the file."""
+    for name, make in TABLES.items():
+        before, begin, rest = README.read_text().partition(f"<!-- {name}: begin -->")
+        _, end, after = rest.partition(f"<!-- {name}: end -->")
+        README.write_text(f"{before}{begin}\n{make()}\n{end}{after}")
 
 
 if __name__ == "__main__":
-    write_table()
+    write_tables()

@@ -29,12 +29,12 @@ from expected_verdicts import (
     SINGLE,
     SWAP,
     SYMMETRIC,
+    TABLES,
     TANGENT,
     UNSTATED,
     WAVY,
     expected_verdict,
-    matrix,
-    table_in_readme,
+    in_readme,
 )
 from expected_verdicts import FLAT as PATCH
 from subjects import judge_as, load_property, load_subject, plane_names, with_promises
@@ -115,9 +115,10 @@ def _complaint(row: Row, name: str, property_id: str) -> str:
     return ""
 
 
-def test_the_table_in_the_readme_is_what_is_expected() -> None:
-    """`python tests/expected_verdicts.py` writes it."""
-    assert table_in_readme() == matrix()
+@pytest.mark.parametrize("name", TABLES)
+def test_the_tables_in_the_readme_are_what_is_expected(name: str) -> None:
+    """`python tests/expected_verdicts.py` writes them."""
+    assert in_readme(name) == TABLES[name]()
 
 
 def test_every_formulation_has_a_patch_test_at_roundoff_that_it_must_pass() -> None:

@@ -158,7 +158,7 @@ class Property(PropertyInfo):
         The cases are scenes, which are solved; else they are states of an interface alone.
     engines : bool
         Displacements alone answer the question, so that engines are asked it too. A property of which `needs` holds
-        "solve" is asked of engines alone.
+        "solve" is asked of engines alone, and need not say this.
     exact : Callable[[Case], FloatArray] | None
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
@@ -233,7 +233,7 @@ class Property(PropertyInfo):
 
     def refusal_of(self, subject: Subject) -> str:
         """Return why the property is not asked of a formulation or an engine, or an empty string."""
-        if isinstance(subject, EngineSubject) and not self.engines:
+        if isinstance(subject, EngineSubject) and not (self.engines or SOLVE in self.needs):
             return "displacements alone do not answer it"
         if SOLVE in self.needs - subject.provides:
             return "it is asked of whole codes"

@@ -123,7 +123,6 @@ def _choose_multipliers(random: np.random.Generator, constraints: Constraints, g
 
 
 def _rows(formulation: CheckedFormulation, case: Case, multipliers: FloatArray) -> FloatArray:
-    """Return the constraint rows (n_multipliers,) of a case with multipliers, on its own pairing."""
     rows: FloatArray = FrozenState.at(formulation, case.with_multipliers(multipliers)).residual[
         case.interface.n_unknowns :
     ]
@@ -506,7 +505,6 @@ def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, Dir
 
 
 def _turn_round(directions: Iterable[Direction]) -> set[Direction]:
-    """Return directions turned round."""
     return {tuple(-component for component in direction) for direction in directions}
 
 

@@ -25,18 +25,10 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.oracle import exact_points
 from contactverif.oracle.exact_choices import DEEP, closest_excess, seen_excess
 from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
 from contactverif.oracle.exact_faces import ExactFacePoints, FaceLattice, FaceView, covered_shares
-from contactverif.oracle.exact_points import (
-    ExactPoints,
-    Lattice,
-    View,
-    closest_view,
-    positions,
-    run_against,
-    slave_normal_view,
-)
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
@@ -94,10 +86,10 @@ class Places:
     """
 
     interface: Interface  # In the roles of the pass.
-    lattice: Lattice
+    lattice: exact_points.Lattice
     reported: ContactPoints
-    exact: ExactPoints
-    view: View  # Of the reported master segment, by the rule of the formulation.
+    exact: exact_points.ExactPoints
+    view: exact_points.View  # Of the reported master segment, by the rule of the formulation.
     scale: FloatArray  # (n_points,), as are the others.
     gap_scale: FloatArray  # Past an end of the master segment by ξ', its ends are extrapolated: D ξ' is added.
     # Rounding its ends at D turns the segment of length ℓ whose normal is taken by uD/ℓ, which moves the foot by
@@ -109,9 +101,9 @@ class Places:
     def from_pass(cls, each: Pass, rule: str | None, distant: float) -> Places:
         """Return the places of a pass; `rule` is the trait `gap`, `distant` where points may be rounded, a length."""
         points = each.points.select(name_places(each.points) & (each.points.master_segment >= 0))
-        lattice = Lattice.from_state(each.interface, each.z)
-        exact = ExactPoints.at(lattice, points.slave_segment, points.c)
-        look = closest_view if rule == CLOSEST else slave_normal_view
+        lattice = exact_points.Lattice.from_state(each.interface, each.z)
+        exact = exact_points.ExactPoints.at(lattice, points.slave_segment, points.c)
+        look = exact_points.closest_view if rule == CLOSEST else exact_points.slave_normal_view
         view = look(lattice, exact, points.master_segment)
         with np.errstate(divide="ignore"):
             over, xi = np.where(view.cosine > 0, 1 / np.abs(view.cosine), np.inf), view.xi.floats()
@@ -120,7 +112,7 @@ class Places:
         gap_size = size + distant * np.maximum(0, np.maximum(-xi, xi - 1))
         foot_size = gap_size + distant * np.abs(view.gap.floats()) / carrier
         scales = (size * over, gap_size * over, foot_size * over)
-        facing = run_against(lattice, exact, points.master_segment)
+        facing = exact_points.run_against(lattice, exact, points.master_segment)
         return cls(each.interface, lattice, points, exact, view, *scales, facing)
 
 
@@ -251,7 +243,7 @@ def place_errors(case: Case, subject: Subject) -> tuple[list[float], bool]:
         foot = np.abs(view.shape.errors(points.master_shape)).max(axis=1, initial=0.0) * edges
         normal = np.linalg.norm(view.normal.errors(points.normal), axis=1)
         errors = np.abs(view.gap.errors(points.gap)) / places.scale, foot / places.scale, normal / turned
-        on_faces = [largest(_of_active(error, points)[facing]) for error in errors]
+        on_faces = [largest(_size(error, points.active)[facing]) for error in errors]
         values = np.maximum(
             values, [*on_faces, largest(_face_position_errors(each) / reported.state.largest_coordinate)]
         )
@@ -264,12 +256,7 @@ def _face_position_errors(each: Pass) -> FloatArray:
     lattice = FaceLattice.from_state(each.interface, each.z)
     exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
     place = replace(exact.positions, below=exact.positions.below * lattice.scale)
-    return _of_active(np.abs(place.errors(points.position)).max(axis=1, initial=0.0), points)
-
-
-def _of_active(errors: FloatArray, points: ContactPoints) -> FloatArray:
-    """Return errors, with 0 in place of NaN where a point is idle."""
-    return np.where(np.isnan(errors) & ~points.active, 0.0, errors)
+    return _size(np.abs(place.errors(points.position)).max(axis=1, initial=0.0), points.active)
 
 
 def face_errors(case: Case, subject: Subject) -> tuple[float, str, bool]:
@@ -480,9 +467,9 @@ def _errors(places: Places, distant: float) -> Iterator[tuple[Quantity, FloatArr
 def _position_errors(each: Pass, far: float) -> FloatArray:
     """Return the errors of positions over X, of all points that name a place, whether they see a master or not."""
     points = each.points.select(name_places(each.points))
-    lattice = Lattice.from_state(each.interface, each.z)
-    exact = ExactPoints.at(lattice, points.slave_segment, points.c)
-    shifts = positions(lattice, exact).errors(points.position) / far
+    lattice = exact_points.Lattice.from_state(each.interface, each.z)
+    exact = exact_points.ExactPoints.at(lattice, points.slave_segment, points.c)
+    shifts = exact_points.positions(lattice, exact).errors(points.position) / far
     return _size(np.abs(shifts).max(axis=1, initial=0.0), points.active)
 
 
@@ -526,7 +513,9 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     λ − c g ≥ 0, and pressures that are interpolated between nodes have the nodes' decision, which is not reported; both
     are not asked.
     """
-    both = [Reported.from_case(state, subject) for state in (case, _in_large_unit(case))]
+    # All lengths are divided by 2^32, which rounds nothing; the penalty stays.
+    large = replace(case, interface=case.interface.at(case.interface.nodes * LARGE_UNIT), z=case.z * LARGE_UNIT)
+    both = [Reported.from_case(state, subject) for state in (case, large)]
     wrong, decided = zip(*map(_count if case.interface.dim == PLANE else count_decisions, both), strict=True)
     samples = [each.points for each in both]
     homeless = any(
@@ -542,14 +531,7 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     )
 
 
-def _in_large_unit(case: Case) -> Case:
-    """Return the state with all lengths divided by 2^32, which rounds nothing; the penalty stays."""
-    interface = case.interface.at(case.interface.nodes * LARGE_UNIT)
-    return replace(case, interface=interface, z=case.z * LARGE_UNIT)
-
-
 def _count(reported: Reported) -> tuple[int, int]:
-    """Return how many decisions are wrong in one state, and how many points are decided."""
     rule, wrong, decided = reported.traits.rules.gap, 0, 0
     for each in reported.passes:
         weighted = each.points.select(each.points.weighted)
@@ -697,14 +679,14 @@ class _Areas:
         """Yield the errors of sums of weights over the lengths that they are formed from, the scale."""
         points, rule = self.each.points, self.traits.rules.gap
         total, whole = float(points.weight.sum()), float(self.length.sum())
-        lattice = Lattice.from_state(self.each.interface, self.each.z)
+        lattice = exact_points.Lattice.from_state(self.each.interface, self.each.z)
         if rule in CELLS:
             yield from self._cell_errors(Coverage.along_slave_normals(lattice), scale)
         elif rule is not None or lies_in_shadow(lattice, self.each.interface):
             missing = abs(total - whole) if self._covers_all(lattice) else 0.0
             yield max(total - whole, missing) / scale
 
-    def _covers_all(self, lattice: Lattice) -> bool:
+    def _covers_all(self, lattice: exact_points.Lattice) -> bool:
         """Return whether the weights of the points must add up to the slave's length."""
         rule, covers = self.traits.rules.gap, self.traits.promises.patch.overhang
         if rule == CLOSEST:
@@ -787,7 +769,8 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
     reported = Reported.from_case(case, subject)
     points, state = reported.points, reported.state
     distance = reported.distant
-    values = {UNIT: _normal_error(points)}
+    reporting = (points.pressure > 0) | np.isfinite(points.normal).all(axis=1)
+    values = {UNIT: largest(np.abs(_norms(points.normal[reporting]) - 1))}
     tolerances = {UNIT: 8 * UNIT_ROUNDOFF}
     if (difference := _force_difference(reported)) is not None:
         values[FORCES], tolerance = _compare_forces(reported, difference)
@@ -795,7 +778,9 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
     if subject.traits.rules.gap is not None:
         values[FOOT] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
         tolerances[FOOT] = 16 * UNIT_ROUNDOFF
-    if _has_linear_law(subject.traits):
+    rules = subject.traits.rules
+    springs = rules.enforcement == "penalty" and rules.penalty == "distributed" and rules.area is not None
+    if springs and rules.gap not in (None, "cells and nodes"):
         penalty = 1.0 if state.n_multipliers else subject.penalty(state)
         active = points.select(points.active)
         errors = np.abs(active.pressure + penalty * active.gap) / (penalty * (np.abs(active.gap) + distance))
@@ -821,7 +806,6 @@ def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, 
 
 
 def _breach(points: ContactPoints, traits: Traits) -> str:
-    """Return how the points break the contract, or an empty string."""
     inside = (points.slave_shape < 1).all(axis=1) if points.slave_shape.shape[1] else np.abs(points.c) < 1
     if (points.weighted & inside).any():
         return "a weighted node lies inside a segment"
@@ -834,14 +818,7 @@ def _breach(points: ContactPoints, traits: Traits) -> str:
     return ""
 
 
-def _normal_error(points: ContactPoints) -> float:
-    """Return the largest difference of a normal's length from 1, where a point has a pressure or a normal."""
-    counted = (points.pressure > 0) | np.isfinite(points.normal).all(axis=1)
-    return largest(np.abs(_norms(points.normal[counted]) - 1))
-
-
 def _norms(vectors: FloatArray) -> FloatArray:
-    """Return the lengths (n,) of vectors (n, dim)."""
     return np.hypot(vectors[:, 0], vectors[:, 1]) if vectors.shape[1] == PLANE else np.linalg.norm(vectors, axis=1)
 
 
@@ -927,10 +904,3 @@ def _foot_error(each: Pass, reported: Reported) -> float:
     size += reported.distant * (np.abs(points.gap) / carrier + np.abs(points.xi))
     cosine = np.abs(along[:, 0] * points.normal[:, 1] - along[:, 1] * points.normal[:, 0]) / length
     return largest(np.hypot(errors[:, 0], errors[:, 1]) * cosine / size)
-
-
-def _has_linear_law(traits: Traits) -> bool:
-    """Return whether a pressure is −ε̂ × the gap that is reported beside it."""
-    if traits.rules.enforcement != "penalty" or traits.rules.gap in (None, "cells and nodes"):
-        return False
-    return traits.rules.penalty == "distributed" and traits.rules.area is not None

@@ -26,11 +26,7 @@ from contactverif.problems.arcs import Arcs
 from contactverif.problems.hertz_studies import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies
 from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
-from contactverif_properties.applicability import (
-    refuse_dependent_multipliers,
-    refuse_unknown_pressure,
-    refuse_unknown_total,
-)
+from contactverif_properties import applicability
 from contactverif_properties.exact_forces import pushing_forces, uniform_state
 from contactverif_properties.states import nearest_sum
 
@@ -58,7 +54,9 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
     solver = "the code" if isinstance(subject, EngineSubject) else "Newton's method"
     undecided = _name_failures({mesh: end for mesh, (_, end) in zip(meshes, solved, strict=True) if end}, solver)
     details = {} if ITERATIONS in studies.series.values() else {ITERATIONS: last[ITERATIONS]}
-    errors, lengths = _by_kind([row for row, _ in solved]), [study.size(mesh) for mesh in meshes]
+    kinds = [kind for kind in solved[0][0] if all(kind in row for row, _ in solved)]
+    errors = {kind: [row[kind] for row, _ in solved] for kind in kinds}
+    lengths = [study.size(mesh) for mesh in meshes]
     series = {name: np.array(errors[kind]) for name, kind in studies.series.items() if kind in errors}
     numbers = [
         bound.quantity.check(min(fit_rate(lengths, errors[kind]) for kind in bound.kinds), bound.limit(group))
@@ -92,12 +90,6 @@ def _solve(studies: Studies, instance: ProblemInstance, subject: Subject) -> tup
     return instance.errors(solution) | {ITERATIONS: float(solution.n_iterations)}, end
 
 
-def _by_kind(rows: list[Errors]) -> dict[str, list[float]]:
-    """Return the errors of all meshes by kind, where all have it."""
-    kinds = [kind for kind in rows[0] if all(kind in row for row in rows)]
-    return {kind: [row[kind] for row in rows] for kind in kinds}
-
-
 def exact_forces(studies: Studies, case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) that push the nodes of the coarsest mesh, for pictures."""
     study = studies.read(case)
@@ -111,7 +103,7 @@ def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
         family="accuracy",
         quantities=studies.quantities,
         cases=Cases.from_list(studies.cases),
-        applicable=refuse_dependent_multipliers,
+        applicable=applicability.refuse_dependent_multipliers,
         series=dict.fromkeys(studies.series, "1"),
         bodies=True,
         engines=True,
@@ -196,7 +188,10 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
 
 
 @_define(HERTZ_STUDIES)(
-    id="accuracy.hertz", rank=520, promise=lambda traits: traits.promises.converges, applicable=refuse_unknown_pressure
+    id="accuracy.hertz",
+    rank=520,
+    promise=lambda traits: traits.promises.converges,
+    applicable=applicability.refuse_unknown_pressure,
 )
 def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
     """Forces and pressures of a contact with an edge converge to those of Hertz as meshes are refined.
@@ -276,8 +271,8 @@ def arc_cases() -> tuple[Case, ...]:
     family="accuracy",
     quantities=(SLAVE, MASTER, SLAVE_SUM, MASTER_SUM, ALONG, FORCES, SUM, PRESSURE),
     cases=Cases.from_list(arc_cases),
-    promise=lambda traits: None if refuse_unknown_total(traits) else True,
-    applicable=refuse_unknown_total,
+    promise=lambda traits: None if applicability.refuse_unknown_total(traits) else True,
+    applicable=applicability.refuse_unknown_total,
 )
 def accuracy_arc(case: Case, subject: Subject) -> Measurement:
     """Springs between two concentric arcs press with ε̂ d, and reported pressures say so.
@@ -337,7 +332,6 @@ class _ArcErrors:
 
 
 def _errors(arcs: Arcs, refine: int, subject: Subject) -> _ArcErrors:
-    """Return the errors on one mesh."""
     case = arcs.case(refine)
     state, n_slave = uniform_state(case, subject, arcs.pressure), case.interface.n_slave_nodes
     # Areas of the reference are those of the master's arc, on which the slave lies there.

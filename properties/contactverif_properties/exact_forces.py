@@ -354,12 +354,10 @@ def _normal_of_face(corners: NDArray[Any]) -> NDArray[Any]:
 
 
 def _unit(vector: NDArray[Any]) -> FloatArray:
-    """Return an exact vector (3,) over its length."""
     return np.array([float(entry) for entry in vector]) / sqrt(vector @ vector)
 
 
 def _exact(points: FloatArray) -> NDArray[Any]:
-    """Return points as an array of fractions."""
     return np.array([Fraction(value) for value in points.reshape(-1).tolist()], dtype=object).reshape(points.shape)
 
 

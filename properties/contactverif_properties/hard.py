@@ -35,52 +35,12 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
-from contactverif.problems import block_scenes
+from contactverif.problems import block_scenes, flat_faces, flat_states, hard_corner_states
 from contactverif.problems.blocks import pressure_of
-from contactverif.problems.flat_faces import (
-    deep_face_states,
-    node_hit_face_states,
-    offset_face_states,
-    search_face_states,
-    touching_face_states,
-)
-from contactverif.problems.flat_states import (
-    deep_states,
-    node_hit_states,
-    offset_states,
-    search_states,
-    tiny_segment_states,
-    touching_states,
-)
-from contactverif.problems.hard_corner_states import (
-    concave_corner_states,
-    convex_kink_states,
-    free_end_states,
-    steep_slave_states,
-)
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
+from contactverif_properties import exact_forces, patch_solved
 from contactverif_properties.applicability import knows_total, may_act_twice, refuse_dependent_multipliers
-from contactverif_properties.exact_forces import (
-    exact_solution,
-    forces_of_gap,
-    forces_of_penetration,
-    normal_of,
-    push_apart,
-    pushing_forces,
-    uniform_state,
-    worst_force,
-)
 from contactverif_properties.newton_method import end_details
-from contactverif_properties.patch_solved import (
-    GAP,
-    MULTIPLIERS,
-    PRESSURE,
-    QUANTITIES,
-    STRESS,
-    forces_to_draw,
-    measure_once,
-    patch_dead_zone,
-)
 from contactverif_properties.roundoff import (
     SEGMENT_REASON,
     WEIGHT_REASON,
@@ -113,20 +73,20 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     if tolerance >= 1:
         return Measurement(undecided=VACUOUS)
     exact = _flat_forces(case)
-    slave = pushing_forces(uniform_state(case, subject))[: case.interface.n_slave_nodes]
-    normal = normal_of(case)
+    slave = exact_forces.pushing_forces(exact_forces.uniform_state(case, subject))[: case.interface.n_slave_nodes]
+    normal = exact_forces.normal_of(case)
     numbers = [ALONG.check(ratio(_force_along(case, slave), float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken, finding = "" if push > 0 else "nothing pushes the slave out of the master", None
     if knows_total(traits):
         numbers.append(FLAT_TOTAL.check(abs(push / whole - 1), tolerance))
     if traits.promises.patch.flat is not False:
-        forces, largest = forces_of_gap(case, subject, exact)
+        forces, largest = exact_forces.forces_of_gap(case, subject, exact)
         numbers.append(
             FLAT_NODAL.check(float(np.linalg.norm(forces - exact, axis=1).max()) / whole, tolerance * largest)
         )
         if numbers[-1].ratio > 1:
-            finding = worst_force(case.interface, forces, exact)
+            finding = exact_forces.worst_force(case.interface, forces, exact)
     return Measurement(numbers, broken=broken, finding=finding)
 
 
@@ -139,8 +99,8 @@ def _force_along(case: Case, forces: FloatArray) -> float:
 def _flat_forces(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, dim) of the pressure ε̂ |g| that push the nodes of a flat state."""
     if "weights" not in case.parameters:  # There is no other surface than the flat one.
-        return forces_of_penetration(case)
-    return push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
+        return exact_forces.forces_of_penetration(case)
+    return exact_forces.push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
 
 
 _define_flat = partial(
@@ -149,7 +109,10 @@ _define_flat = partial(
 
 
 @_define_flat(
-    id="hard.offset", rank=420, cases=Cases.from_list(offset_states), cases_in_space=Cases.from_list(offset_face_states)
+    id="hard.offset",
+    rank=420,
+    cases=Cases.from_list(flat_states.offset_states),
+    cases_in_space=Cases.from_list(flat_faces.offset_face_states),
 )
 def hard_offset(case: Case, subject: Subject) -> Measurement:
     """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
@@ -175,7 +138,10 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_flat(
-    id="hard.deep", rank=380, cases=Cases.from_list(deep_states), cases_in_space=Cases.from_list(deep_face_states)
+    id="hard.deep",
+    rank=380,
+    cases=Cases.from_list(flat_states.deep_states),
+    cases_in_space=Cases.from_list(flat_faces.deep_face_states),
 )
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
@@ -197,8 +163,8 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
 @_define_flat(
     id="hard.node-hit",
     rank=410,
-    cases=Cases.from_list(node_hit_states),
-    cases_in_space=Cases.from_list(node_hit_face_states),
+    cases=Cases.from_list(flat_states.node_hit_states),
+    cases_in_space=Cases.from_list(flat_faces.node_hit_face_states),
 )
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
@@ -219,7 +185,10 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
 
 
 @_define_flat(
-    id="hard.search", rank=390, cases=Cases.from_list(search_states), cases_in_space=Cases.from_list(search_face_states)
+    id="hard.search",
+    rank=390,
+    cases=Cases.from_list(flat_states.search_states),
+    cases_in_space=Cases.from_list(flat_faces.search_face_states),
 )
 def hard_search(case: Case, subject: Subject) -> Measurement:
     """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
@@ -255,7 +224,7 @@ def measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measure
     So much of the force may point `aside`, a force ≥ 0.
     """
     bounds = case.parameters["segment_bounds" if subject.traits.rules.gap else "bounds"] * case.penalty
-    slave = pushing_forces(uniform_state(case, subject))[: case.interface.n_slave_nodes]
+    slave = exact_forces.pushing_forces(exact_forces.uniform_state(case, subject))[: case.interface.n_slave_nodes]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
     largest = case.penalty * case.diameter * case.slave_length
     numbers, broken = [SIZE.check(size / largest, 4.0)], ""
@@ -293,7 +262,7 @@ _define_bounded = partial(
 )
 
 
-@_define_bounded(id="hard.convex-kink", rank=340, cases=Cases.from_list(convex_kink_states))
+@_define_bounded(id="hard.convex-kink", rank=340, cases=Cases.from_list(hard_corner_states.convex_kink_states))
 def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
 
@@ -317,7 +286,7 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define_bounded(id="hard.concave-corner", rank=310, cases=Cases.from_list(concave_corner_states))
+@_define_bounded(id="hard.concave-corner", rank=310, cases=Cases.from_list(hard_corner_states.concave_corner_states))
 def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     """A corner in a re-entrant corner of 90° is pushed by both faces, whichever is nearer by a rounding.
 
@@ -337,7 +306,7 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     return measure_bounded(case, subject)
 
 
-@_define_bounded(id="hard.free-end", rank=430, cases=Cases.from_list(free_end_states))
+@_define_bounded(id="hard.free-end", rank=430, cases=Cases.from_list(hard_corner_states.free_end_states))
 def hard_free_end(case: Case, subject: Subject) -> Measurement:
     """At a free end the force is between that of the inner segments and that of all; beyond it is 0.
 
@@ -382,7 +351,7 @@ def promise_no_wild_force(traits: Traits) -> bool | None:
     family="hard",
     quantities=(DIRECTION, TOTAL, SIZE),
     promise=promise_no_wild_force,
-    cases=Cases.from_list(steep_slave_states),
+    cases=Cases.from_list(hard_corner_states.steep_slave_states),
 )
 def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
     """A slave segment at 89.9°, 90° or 180° to the master gives no wild force and no pull.
@@ -424,8 +393,8 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
     rank=140,
     family="hard",
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
-    cases=Cases.from_list(touching_states),
-    cases_in_space=Cases.from_list(touching_face_states),
+    cases=Cases.from_list(flat_states.touching_states),
+    cases_in_space=Cases.from_list(flat_faces.touching_face_states),
     promise=lambda traits: True,
 )
 def hard_touch(case: Case, subject: Subject) -> Measurement:
@@ -502,7 +471,10 @@ def _motions(case: Case) -> tuple[list[FloatArray], FloatArray]:
     directions, interface = case.parameters["directions"], case.interface
     on_slave = (np.arange(interface.n_nodes) < interface.n_slave_nodes)[:, None]
     if interface.dim != PLANE:
-        ways, across = [np.where(on_slave, way, 0.0) for way in directions], np.where(on_slave, normal_of(case), 0.0)
+        ways, across = (
+            [np.where(on_slave, way, 0.0) for way in directions],
+            np.where(on_slave, exact_forces.normal_of(case), 0.0),
+        )
         return [way.reshape(-1) for way in ways], across.reshape(-1)
     along = directions / np.hypot(directions[:, :1], directions[:, 1:])  # Integers, whose length is near 1, are exact.
     along[interface.n_slave_nodes :] = 0.0
@@ -514,24 +486,19 @@ def measure_patch(case: Case, subject: Subject) -> Measurement:
     """Return the errors of a flat state (`measure_flat`), or of a solved scene (`measure_once`)."""
     if not has_bodies(case):
         return measure_flat(case, subject)
-    measurement, traits = measure_once(case, subject), subject.traits
+    measurement, traits = patch_solved.measure_once(case, subject), subject.traits
     if traits.promises.patch.flat and traits.promises.independent_multipliers is False:
         # Newton's method may release a redundant multiplier, and others carry its force: another solution.
         return replace(measurement, undecided="the multipliers are not independent, so the forces are not unique")
     return measurement
 
 
-def patch_forces(case: Case) -> FloatArray:
-    """Return the exact forces (n_nodes, 2) of a state or a scene, for pictures."""
-    return forces_to_draw(case) if has_bodies(case) else _flat_forces(case)
-
-
 _define_solved = partial(Property.define, family="hard", bodies=True)
 _define_patch = partial(
     _define_solved,
-    quantities=(*FLAT_QUANTITIES, *QUANTITIES, MULTIPLIERS),
+    quantities=(*FLAT_QUANTITIES, *patch_solved.QUANTITIES, patch_solved.MULTIPLIERS),
     promise=lambda traits: True if traits.promises.patch.flat else None,  # Which of the cases would fail is not stated.
-    exact=patch_forces,
+    exact=lambda case: patch_solved.forces_to_draw(case) if has_bodies(case) else _flat_forces(case),
 )
 
 
@@ -577,7 +544,7 @@ def hard_contrast(case: Case, subject: Subject) -> Measurement:
 @_define_patch(
     id="hard.short-segment",
     rank=640,
-    cases=Cases.from_list(lambda: tiny_segment_states() + block_scenes.tiny_segment_scenes()),
+    cases=Cases.from_list(lambda: flat_states.tiny_segment_states() + block_scenes.tiny_segment_scenes()),
 )
 def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     """One segment of 1.2e-5 in an interface of 12 changes nothing, at ε̂ = 1, 1e4 and 1e8.
@@ -619,11 +586,10 @@ def hard_stiff(case: Case, subject: Subject) -> Measurement:
     return measure_patch(case, subject)
 
 
-POINTWISE = (GAP.name, PRESSURE.name)
+POINTWISE = (patch_solved.GAP.name, patch_solved.PRESSURE.name)
 
 
 def _divide_by_share(quantity: Quantity) -> Quantity:
-    """Return the quantity with the tolerance that the share adds."""
     term = " + 64 u X ε̂/(p s)" if quantity.name in POINTWISE else ""
     tolerance = f"{quantity.tolerance}{term}; with multipliers X/s in place of X"
     reason = "s is the share of the slave segment that the master covers, by which roundoff of its gap grows."
@@ -633,10 +599,10 @@ def _divide_by_share(quantity: Quantity) -> Quantity:
 @_define_solved(
     id="hard.dead-zone",
     rank=600,
-    quantities=tuple(map(_divide_by_share, patch_dead_zone.quantities)),
+    quantities=tuple(map(_divide_by_share, patch_solved.patch_dead_zone.quantities)),
     cases=Cases.from_list(block_scenes.vanishing_overlap_scenes),
     promise=lambda traits: True if traits.promises.patch.overhang else None,
-    exact=forces_to_draw,
+    exact=patch_solved.forces_to_draw,
     engines=True,
 )
 def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
@@ -658,13 +624,15 @@ def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never.
     """
-    measurement = patch_dead_zone.measure(case, subject)
+    measurement = patch_solved.patch_dead_zone.measure(case, subject)
     if isinstance(subject, EngineSubject):  # It states how accurate it is, and has no matrix.
         return measurement
     rounding = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure_of(case, case.penalty)
     more = rounding / covered_share(case)
     if subject.traits.rules.enforcement == "multiplier":
-        growth = 1 + more / measurement.tolerances[STRESS.name]  # The other tolerances are multiples of this one.
+        growth = (
+            1 + more / measurement.tolerances[patch_solved.STRESS.name]
+        )  # The other tolerances are multiples of this one.
         numbers = [replace(number, tolerance=growth * number.tolerance) for number in measurement.numbers]
     else:
         numbers = [
@@ -686,7 +654,10 @@ def covered_share(case: Case) -> float:
 def _rank(case: Case, subject: Subject) -> dict[str, float]:
     """Return the reciprocal condition and the lack of rank of the matrix at the exact solution."""
     scene, formulation = scene_of(case), subject.for_case(case)
-    system, u = System(scene, formulation, use_tangent=False), exact_solution(scene, case, subject, formulation)
+    system, u = (
+        System(scene, formulation, use_tangent=False),
+        exact_forces.exact_solution(scene, case, subject, formulation),
+    )
     matrix = system.matrix(u, system.pair(u))[0]
     rows, columns = scale_factors(matrix, scene.n_free)
     sizes = linalg.svdvals(rows[:, None] * matrix * columns)
@@ -757,22 +728,17 @@ def hard_zero_load(case: Case, subject: Subject) -> Measurement:
 
 
 _define_for_codes = partial(
-    Property.define, family="engine", needs=frozenset({SOLVE}), promise=lambda traits: True, bodies=True, engines=True
+    Property.define, family="engine", needs=frozenset({SOLVE}), promise=lambda traits: True, bodies=True
 )
 _define_patch_for_codes = partial(
     _define_for_codes,
-    quantities=(*QUANTITIES, MULTIPLIERS),
+    quantities=(*patch_solved.QUANTITIES, patch_solved.MULTIPLIERS),
     promise=lambda traits: True if traits.promises.patch.flat else None,
-    exact=forces_to_draw,
+    exact=patch_solved.forces_to_draw,
 )
 
 
-def scenes_among(cases: tuple[Case, ...]) -> tuple[Case, ...]:
-    """Return the cases that have bodies."""
-    return tuple(filter(has_bodies, cases))
-
-
-@_define_patch_for_codes(id="engine.c", cases=Cases.from_list(lambda: scenes_among(block_scenes.case_c())))
+@_define_patch_for_codes(id="engine.c", cases=Cases.from_list(lambda: tuple(filter(has_bodies, block_scenes.case_c()))))
 def engine_c(case: Case, subject: Subject) -> Measurement:
     """Cases C and C′ of the reference paper give the exact stress.
 
@@ -785,7 +751,7 @@ def engine_c(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where the code finds no solution.
     """
-    return measure_once(case, subject)
+    return patch_solved.measure_once(case, subject)
 
 
 @_define_patch_for_codes(id="engine.short-segment", cases=Cases.from_list(block_scenes.tiny_segment_scenes))
@@ -801,7 +767,7 @@ def engine_short_segment(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where the code finds no solution.
     """
-    return measure_once(case, subject)
+    return patch_solved.measure_once(case, subject)
 
 
 CODE_TERMS = "64 u (X/ℓ)(1 + ε̂ ℓ/E) + 1e-12 κ S/ℓ + a S/ℓ"

@@ -410,8 +410,9 @@ def remote(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more.
     """
     if "behind" in case.parameters:
-        slave, master = _no_part(case), case.parameters["behind"]
-        return compare(BESIDE_OTHERS, subject, case, *add_parts(case, slave, _as_part(master)))
+        nothing = np.empty((0, case.interface.dim))
+        part = _as_part(case.parameters["behind"])
+        return compare(BESIDE_OTHERS, subject, case, *add_parts(case, (nothing, nothing.astype(np.int64)), part))
     first = case.interface.dim != PLANE and case.seed % 2 == 1  # Multipliers of a plane case keep their places.
     return compare(BESIDE_OTHERS, subject, case, *add_parts(case, *make_far_pair(case), first=first))
 
@@ -440,12 +441,6 @@ def _as_part(nodes: FloatArray) -> Part:
     if nodes.shape[1] == PLANE:
         return nodes, np.column_stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))])
     return nodes, PLATE if len(nodes) == 8 else np.array([[0, 1, 2]])
-
-
-def _no_part(case: Case) -> Part:
-    """Return a part without nodes."""
-    dim = case.interface.dim
-    return np.empty((0, dim)), np.empty((0, dim), np.int64)
 
 
 def add_parts(case: Case, slave: Part, master: Part, *, first: bool = False) -> tuple[Case, Carry]:
@@ -687,7 +682,6 @@ _define_for_codes = partial(
     needs=frozenset({SOLVE}),
     promise=lambda traits: True,
     bodies=True,
-    engines=True,
 )
 
 

@@ -124,7 +124,6 @@ def _measure_curvature(state: FrozenState, directions: FloatArray, columns: IntA
 
 
 def _pair_at(state: FrozenState, z: FloatArray) -> FrozenState:
-    """Return the state on the pairing at z (n,)."""
     return replace(state, pairing=state.formulation.pair(state.case.interface, z))
 
 

@@ -31,11 +31,7 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import closed_cases, solid_cases
-from contactverif_properties.applicability import (
-    promise_exact_tangent,
-    refuse_dependent_multipliers,
-    refuse_unknown_pressure,
-)
+from contactverif_properties import applicability
 from contactverif_properties.kinks import find_kink
 from contactverif_properties.roundoff import (
     COORDINATE_ROUNDING,
@@ -143,9 +139,9 @@ _define = partial(
     Property.define,
     family="newton",
     cases=Cases.random(solid_cases),
-    promise=promise_exact_tangent,
+    promise=applicability.promise_exact_tangent,
     needs=frozenset({"tangent"}),
-    applicable=refuse_dependent_multipliers,
+    applicable=applicability.refuse_dependent_multipliers,
     bodies=True,
     usual_undecided=0.004,
 )
@@ -410,7 +406,7 @@ STEPS = Quantity(
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),
     promise=lambda traits: True,
-    applicable=refuse_unknown_pressure,
+    applicable=applicability.refuse_unknown_pressure,
     bodies=True,
 )
 def newton_units(case: Case, subject: Subject) -> Measurement:
@@ -582,7 +578,7 @@ class Attained:
     quantities=(ADDED, RESIDUAL, ERROR),
     cases=Cases.random(closed_cases),
     promise=lambda traits: traits.promises.translation_stable,
-    applicable=refuse_dependent_multipliers,
+    applicable=applicability.refuse_dependent_multipliers,
     bodies=True,
     usual_undecided=0.002,
 )
@@ -642,7 +638,6 @@ def newton_attainable(case: Case, subject: Subject) -> Measurement:
 
 
 def _load_less(scene: Scene, share: float) -> Scene:
-    """Return the scene with a share of its loads and imposed displacements."""
     if share == 1:
         return scene
     bodies = tuple(replace(body, imposed=share * body.imposed, load=share * body.load) for body in scene.bodies)

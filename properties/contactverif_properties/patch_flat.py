@@ -27,50 +27,19 @@ from contactverif.oracle import nodal_spring_weights, nodal_surface_weights
 from contactverif.problems.flat_faces import equal_area_states
 from contactverif.problems.flat_states import equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
-from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases
+from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
 from contactverif.strategies.straight import steep_cases, tilted_cases
-from contactverif.strategies.surfaces import (
-    flat_surface_cases,
-    matched_surface_cases,
-    overhung_surface_cases,
-    tilted_plane_cases,
-)
-from contactverif_properties import roundoff
+from contactverif_properties import exact_forces, roundoff
 from contactverif_properties.applicability import may_act_twice, promise_normal, promise_single, refuse_unknown_total
-from contactverif_properties.exact_forces import (
-    consistent_forces,
-    directions,
-    distance_from_line,
-    exact_slave_forces,
-    forces_of_penetration,
-    knows_linear_total,
-    measure_transmission,
-    node_gaps,
-    normal_of,
-    point_errors,
-    push_apart,
-    pushing_forces,
-    slave_forces,
-    total_force,
-    uniform_state,
-    unit_forces,
-    worst_force,
-)
 from contactverif_properties.kinks import explain_by_kink
-from contactverif_properties.roundoff import (
-    COORDINATE_ROUNDING,
-    gap_quantity,
-    gap_tolerance,
-    rounding_distance,
-)
 from contactverif_properties.states import FrozenState
 
-FORCE = gap_quantity("error of a nodal force")
-TOTAL = gap_quantity("error of the total force")
-GAP = gap_quantity("error of a reported gap")
-PRESSURE = gap_quantity("error of a reported pressure")
-REPORTED_FORCE = gap_quantity("error of a reported nodal force")
-STATED = gap_quantity("difference from the stated forces")
+FORCE = roundoff.gap_quantity("error of a nodal force")
+TOTAL = roundoff.gap_quantity("error of the total force")
+GAP = roundoff.gap_quantity("error of a reported gap")
+PRESSURE = roundoff.gap_quantity("error of a reported pressure")
+REPORTED_FORCE = roundoff.gap_quantity("error of a reported nodal force")
+STATED = roundoff.gap_quantity("difference from the stated forces")
 LOST_END = "a slave node faces a free end of the master exactly, and roundoff decides whether it is over the master"
 _MOVED = 16.0  # A moved end node bends shares by 128uX over a segment, which the tolerance 8uX/|g| does not cover.
 
@@ -86,9 +55,9 @@ _define = partial(Property.define, family="patch")
     role="exact",
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
-    cases_in_space=Cases.random(flat_surface_cases),
+    cases_in_space=Cases.random(surfaces.flat_surface_cases),
     promise=lambda traits: traits.promises.patch.flat,
-    exact=forces_of_penetration,
+    exact=exact_forces.forces_of_penetration,
     usual_undecided=WITHOUT_TOLERANCE,
     asks=WITH_BARRIER,
 )
@@ -119,7 +88,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
     """
     most = 0.0 if subject.traits.promises.translation_stable else case.largest_coordinate / case.shortest_segment
-    return _unless_end_is_lost(case, partial(measure_transmission, FORCE, subject=subject), most)
+    return _unless_end_is_lost(case, partial(exact_forces.measure_transmission, FORCE, subject=subject), most)
 
 
 @_define(
@@ -129,7 +98,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     turn=4,
     quantities=(TOTAL,),
     cases=Cases.random(flat_cases),
-    cases_in_space=Cases.random(flat_surface_cases),
+    cases_in_space=Cases.random(surfaces.flat_surface_cases),
     promise=lambda traits: None if refuse_unknown_total(traits) else True,
     applicable=refuse_unknown_total,
     usual_undecided=WITHOUT_TOLERANCE,
@@ -156,17 +125,17 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     formulation = subject.for_case(case)
     stretched = replace(case, interface=interface)
     state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
-    exact = forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
+    exact = exact_forces.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     if subject.traits.rules.area == "reference":
         exact = exact * stretch ** (interface.dim - 1)
-    total = pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
+    total = exact_forces.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
     error = float(np.linalg.norm(total - exact))
-    value, tolerance = error / float(np.linalg.norm(exact)), gap_tolerance(case, penetration)
+    value, tolerance = error / float(np.linalg.norm(exact)), roundoff.gap_tolerance(case, penetration)
     undecided = ""
     if value > tolerance:
-        rounding = COORDINATE_ROUNDING * case.largest_coordinate
+        rounding = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
         undecided = explain_by_kink(state, rounding, {"forces": error})
-    finding = total_force(total, exact) if value > tolerance else None
+    finding = exact_forces.total_force(total, exact) if value > tolerance else None
     return Measurement([TOTAL.check(value, tolerance)], undecided, finding=finding)
 
 
@@ -190,12 +159,12 @@ def _unless_end_is_lost(case: Case, measure: Callable[[Case], Measurement], most
 
 def _measure_once(case: Case, subject: Subject) -> Measurement:
     """Return the numbers of `measure_class`; nothing is undecided yet."""
-    transmission = measure_transmission(FORCE, case, subject=subject)
+    transmission = exact_forces.measure_transmission(FORCE, case, subject=subject)
     numbers = [*transmission.numbers]
-    state = uniform_state(case, subject)
+    state = exact_forces.uniform_state(case, subject)
     if state.has_points and subject.traits.rules.enforcement != "barrier":  # Its gaps are open, its pressures its own.
-        tolerance = gap_tolerance(case, case.parameter("penetration"))
-        gap, pressure = point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
+        tolerance = roundoff.gap_tolerance(case, case.parameter("penetration"))
+        gap, pressure = exact_forces.point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
         numbers.append(GAP.check(gap, tolerance))
         if subject.traits.rules.penalty != "nodal":  # A nodal formulation knows forces only.
             numbers.append(PRESSURE.check(pressure, tolerance))
@@ -203,7 +172,6 @@ def _measure_once(case: Case, subject: Subject) -> Measurement:
 
 
 def _is_within(measurement: Measurement, factor: float) -> bool:
-    """Return whether all values are at most `factor` times their tolerances."""
     return all(number.value <= factor * number.tolerance for number in measurement.numbers)
 
 
@@ -221,7 +189,7 @@ def _move_ends_inwards(case: Case) -> Case | None:
     if case.interface.dim != PLANE:
         return None
     interface, along = case.interface, case.parameters["along"].copy()
-    reach = COORDINATE_ROUNDING * case.largest_coordinate
+    reach = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
     slave = interface.slave
     master_ends = along[interface.master.segments[interface.master.neighbours < 0]]
     positions = case.positions.copy()
@@ -241,7 +209,7 @@ def _move_ends_inwards(case: Case) -> Case | None:
 _define_class = partial(
     _define,
     quantities=(FORCE, GAP, PRESSURE),
-    exact=forces_of_penetration,
+    exact=exact_forces.forces_of_penetration,
     usual_undecided=WITHOUT_TOLERANCE,
     asks=WITH_BARRIER,
 )
@@ -252,7 +220,7 @@ _define_class = partial(
     rank=160,
     role="exact",
     cases=Cases.random(normal_cases),
-    cases_in_space=Cases.random(matched_surface_cases),
+    cases_in_space=Cases.random(surfaces.matched_surface_cases),
     promise=promise_normal,
 )
 def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
@@ -309,7 +277,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     rank=90,
     quantities=(FORCE, GAP, REPORTED_FORCE),
     cases=Cases.random(overhung_cases),
-    cases_in_space=Cases.random(overhung_surface_cases),
+    cases_in_space=Cases.random(surfaces.overhung_surface_cases),
     promise=lambda traits: True if traits.rules.penalty == "nodal" and traits.rules.enforcement == "penalty" else None,
     asks=frozenset({"penalty"}),
     applicable=lambda traits: "" if traits.rules.penalty == "nodal" else "there are no nodal springs",
@@ -346,18 +314,18 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
         weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
     else:
         weights = nodal_surface_weights(interface, case.parameters["plane"], both_surfaces=unbiased)
-    exact = spring * push_apart(case, weights, 1.0)
+    exact = spring * exact_forces.push_apart(case, weights, 1.0)
     forces = -state.forces
     if unbiased:
         likeness = float((forces * exact).sum())
         forces = forces * (float((exact**2).sum()) / likeness if likeness > 0 else 1.0)
-    tolerance, size = gap_tolerance(case, depth), spring * float(weights[: interface.n_slave_nodes].sum())
+    tolerance, size = roundoff.gap_tolerance(case, depth), spring * float(weights[: interface.n_slave_nodes].sum())
     values = {FORCE: float(np.linalg.norm(forces - exact, axis=1).max()) / size}
     if state.has_points:
-        values[GAP] = point_errors(state, case.penalty, case.penalty * depth)[0]
+        values[GAP] = exact_forces.point_errors(state, case.penalty, case.penalty * depth)[0]
         if not unbiased:
-            values[REPORTED_FORCE] = point_errors(state, case.penalty, spring)[1]
-    finding = worst_force(interface, forces, exact) if values[FORCE] > tolerance else None
+            values[REPORTED_FORCE] = exact_forces.point_errors(state, case.penalty, spring)[1]
+    finding = exact_forces.worst_force(interface, forces, exact) if values[FORCE] > tolerance else None
     return Measurement(check_all(values, tolerance), finding=finding)
 
 
@@ -395,8 +363,8 @@ def patch_flat_published(case: Case, subject: Subject) -> Measurement:
         return Measurement(idle=True)
     n_slave, forces = case.interface.n_slave_nodes, _forces_of_unit(case, subject)
     error = float(np.linalg.norm(forces - stated, axis=1).max() / np.abs(stated[:n_slave]).sum())
-    number = STATED.check(error, gap_tolerance(case, case.parameter("penetration")))
-    finding = worst_force(case.interface, forces, stated) if number.ratio > 1 else None
+    number = STATED.check(error, roundoff.gap_tolerance(case, case.parameter("penetration")))
+    finding = exact_forces.worst_force(case.interface, forces, stated) if number.ratio > 1 else None
     return Measurement([number], finding=finding)
 
 
@@ -407,7 +375,7 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
         raise ContractError(f"Traits.published_forces: found {', '.join(sorted(strangers))}; needed {needed}")
     if case.name not in traits.evidence.published_forces:
         consistent = traits.promises.patch.flat and traits.rules.penalty == "distributed"
-        return consistent_forces(case, 1.0) if consistent else None
+        return exact_forces.consistent_forces(case, 1.0) if consistent else None
     slave, master = parse_forces(traits.evidence.published_forces[case.name])
     slave_x, master_x = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     if (len(slave), len(master)) != (len(slave_x), len(master_x)):
@@ -422,9 +390,9 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
 
 def _forces_of_unit(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_nodes, 2) over penalty × penetration, or those of unit multipliers."""
-    state = uniform_state(case, subject, 1.0)
+    state = exact_forces.uniform_state(case, subject, 1.0)
     if state.case.n_multipliers:
-        return np.asarray(-unit_forces(state).sum(axis=1).reshape(-1, 2))
+        return np.asarray(-exact_forces.unit_forces(state).sum(axis=1).reshape(-1, 2))
     return -state.forces / (subject.penalty(case) * case.parameter("penetration"))
 
 
@@ -458,7 +426,7 @@ PUSH = Quantity(
     asks=frozenset({"penalty"}),
 )
 def total_stiffness(case: Case, subject: Subject) -> Measurement:
-    """The springs of a flat interface have the stiffness ε̂ L together, or 2 ε̂ L in two passes.
+    """The total contact stiffness of a flat interface is ε̂ L, or 2 ε̂ L with two passes.
 
     **Question.** Slave and master are flat, equally long, and penetrate each other by the same depth everywhere. Is the
     force the penalty times the penetration times the length, or twice that?
@@ -484,11 +452,11 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
     """
     n, traits, depth = _count_springs(case), subject.traits, case.parameter("penetration")
     away = np.zeros_like(case.positions)
-    away[: case.interface.n_slave_nodes] = depth / 2 * normal_of(case)
+    away[: case.interface.n_slave_nodes] = depth / 2 * exact_forces.normal_of(case)
     parameters = {**case.parameters, "penetration": np.array(depth / 2)}
     half = replace(case, z=(case.positions + away).reshape(-1), parameters=parameters)
     (springs, opposite, largest), (shallow, *_) = _springs(case, subject), _springs(half, subject)
-    tolerance = gap_tolerance(half, depth / 2, rounding_distance(case, traits))
+    tolerance = roundoff.gap_tolerance(half, depth / 2, roundoff.rounding_distance(case, traits))
     details = {"springs over ε̂ L": springs}
     if abs(shallow - springs) > 2 * tolerance * abs(springs):
         return Measurement(details=details)
@@ -510,7 +478,6 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
 
 
 def _say(springs: float, remark: str) -> str:
-    """Return a sentence about the stiffness of all springs over ε̂ L."""
     return f"your springs are {springs:#.3g} ε̂ L: {remark}"
 
 
@@ -520,7 +487,7 @@ def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
     The third number is the largest force on a node over that of a slave segment of mean length, or of the mean area of
     a slave node.
     """
-    pushes = -uniform_state(case, subject).forces @ normal_of(case)
+    pushes = -exact_forces.uniform_state(case, subject).forces @ exact_forces.normal_of(case)
     size = case.penalty * case.parameter("penetration") * case.slave_measure
     slave, master = np.split(pushes / size, [case.interface.n_slave_nodes])
     largest = float(np.abs(pushes).max()) / size * _count_springs(case)
@@ -528,7 +495,6 @@ def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
 
 
 def _count_springs(case: Case) -> int:
-    """Return the number of slave segments, or of slave nodes in space."""
     interface = case.interface
     return len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes
 
@@ -546,15 +512,10 @@ def resultant_cases(interface: Interface | None = None) -> dict[str, SearchStrat
     return {TILTED: tilted, STEEP: steep} if tilted is not None and steep is not None else None
 
 
-def refuse_unknown_direction(traits: Traits) -> str:
-    """Return why the direction of the forces is unknown from the traits, or an empty string if they state it."""
-    stated = traits.rules.force_along is not None
-    return "" if stated else "the trait `force_along` is not stated, so the direction of the force is unknown"
-
-
 def _tolerance(case: Case, traits: Traits) -> float:
-    """Return `STATED_GAP_TOLERANCE` as a number, for the mean penetration."""
-    return roundoff.gap_tolerance(case, abs(float(node_gaps(case).mean())), roundoff.rounding_distance(case, traits))
+    return roundoff.gap_tolerance(
+        case, abs(float(exact_forces.node_gaps(case).mean())), roundoff.rounding_distance(case, traits)
+    )
 
 
 @Property.define(
@@ -563,10 +524,14 @@ def _tolerance(case: Case, traits: Traits) -> float:
     family="patch",
     quantities=(OFF_NORMAL, TILTED_TOTAL),
     cases=Cases.by_kind(resultant_cases),
-    cases_in_space=Cases.random(tilted_plane_cases),
+    cases_in_space=Cases.random(surfaces.tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
-    applicable=refuse_unknown_direction,
+    applicable=lambda traits: (
+        ""
+        if traits.rules.force_along is not None
+        else "the trait `force_along` is not stated, so the direction of the force is unknown"
+    ),
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
@@ -593,16 +558,17 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
     """
-    traits, total = subject.traits, slave_forces(case, subject).sum(axis=0)
-    if not total.any() and _may_overlook(case, traits):
+    traits, total = subject.traits, exact_forces.slave_forces(case, subject).sum(axis=0)
+    # No rule says that a formulation sees what it is so steep to.
+    if not total.any() and case.kind == STEEP and traits.rules.gap is None:
         return Measurement()
-    normal = directions(case)[0 if traits.rules.force_along == "master normal" else 1]
-    push, across = float(total @ normal), distance_from_line(total, normal)
+    normal = exact_forces.directions(case)[0 if traits.rules.force_along == "master normal" else 1]
+    push, across = float(total @ normal), exact_forces.distance_from_line(total, normal)
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     values = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}
     errors = {OFF_NORMAL: across}
-    if knows_linear_total(traits):
-        exact = float(np.linalg.norm(exact_slave_forces(case, traits).sum(axis=0)))
+    if exact_forces.knows_linear_total(traits):
+        exact = float(np.linalg.norm(exact_forces.exact_slave_forces(case, traits).sum(axis=0)))
         errors[TILTED_TOTAL] = abs(push - exact)
         values[TILTED_TOTAL] = errors[TILTED_TOTAL] / exact
     tolerance = _tolerance(case, traits)
@@ -614,16 +580,11 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerance), undecided, broken)
 
 
-def _may_overlook(case: Case, traits: Traits) -> bool:
-    """Return whether no stated rule says that the slave sees what it is so steep to."""
-    return case.kind == STEEP and traits.rules.gap is None
-
-
 def refuse_unknown_integral(traits: Traits) -> str:
     """Return why no exact nodal force follows from the traits, or an empty string if one does."""
     if traits.rules.enforcement == "multiplier":
         return "multipliers have pressures of their own, not those of a gap"
-    if not knows_linear_total(traits):
+    if not exact_forces.knows_linear_total(traits):
         return "the traits `penalty`, `area`, `gap` and `force_along` do not state all of the integral"
     return ""
 
@@ -634,7 +595,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
     family="patch",
     quantities=(TILTED_NODAL,),
     cases=Cases.random(tilted_cases),
-    cases_in_space=Cases.random(tilted_plane_cases),
+    cases_in_space=Cases.random(surfaces.tilted_plane_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
     applicable=refuse_unknown_integral,
 )
@@ -653,8 +614,8 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never: the slave is in contact with all its length, and far from the ends of the master.
     """
-    exact, forces = exact_slave_forces(case, subject.traits), slave_forces(case, subject)
+    exact, forces = exact_forces.exact_slave_forces(case, subject.traits), exact_forces.slave_forces(case, subject)
     error = float(np.linalg.norm(forces - exact, axis=1).max()) / float(np.linalg.norm(exact.sum(axis=0)))
     number = TILTED_NODAL.check(error, _tolerance(case, subject.traits))
-    finding = worst_force(case.interface, forces, exact) if number.ratio > 1 else None
+    finding = exact_forces.worst_force(case.interface, forces, exact) if number.ratio > 1 else None
     return Measurement([number], idle=not forces.any(), finding=finding)

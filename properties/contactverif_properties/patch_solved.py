@@ -33,15 +33,8 @@ from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
 from contactverif.strategies.solids import UNIFORM, block_cases, dead_zone_cases, variant_cases
+from contactverif_properties import exact_forces
 from contactverif_properties.applicability import promise_normal, promise_single
-from contactverif_properties.exact_forces import (
-    consistent_forces,
-    exact_solution,
-    gap_error,
-    nearest_multipliers,
-    normal_of,
-    point_errors,
-)
 from contactverif_properties.newton_method import end_details
 from contactverif_properties.states import FrozenState
 
@@ -93,7 +86,7 @@ def measure_engine(
         tolerances |= {quantity: (tolerance + rounding) / share for quantity, (_, share) in reported.items()}
         penetration = pressure / penalty if traits.enforcement == "penalty" else 0.0
         state = replace(case, z=solution.state.z, penalty=penalty)
-        values[gap] = gap_error(state, penetration, pressure / penalty)
+        values[gap] = exact_forces.gap_error(state, penetration, pressure / penalty)
         tolerances[gap] = tolerance * (1 + penalty * float(case.parameters["compliance"].sum()))
     return Measurement(check_all(values, tolerances), details=details)
 
@@ -107,7 +100,7 @@ def _judge_reports(
     pressures are those of nodes of the slave that the master covers with both their segments.
     """
     errors: dict[Quantity, tuple[float, float]] = {}
-    exact, n_slave = consistent_forces(case, pressure), case.interface.n_slave_nodes
+    exact, n_slave = exact_forces.consistent_forces(case, pressure), case.interface.n_slave_nodes
     if answer.contact_forces is not None:
         differences = np.linalg.norm(answer.contact_forces[scene.nodes_in_reach] - exact, axis=1)
         errors[REPORTED_FORCES] = float(differences.max() / (pressure * case.slave_length)), 1.0
@@ -123,16 +116,17 @@ def _judge_reports(
 
 def _mean_pressure(case: Case, solution: Solution) -> float:
     """Return the mean pressure on the slave where the master covers it."""
-    normal, n_slave = normal_of(case), case.interface.n_slave_nodes
+    normal, n_slave = exact_forces.normal_of(case), case.interface.n_slave_nodes
     force, length = (
-        float((forces[:n_slave] @ normal).sum()) for forces in (solution.forces, consistent_forces(case, 1.0))
+        float((forces[:n_slave] @ normal).sum())
+        for forces in (solution.forces, exact_forces.consistent_forces(case, 1.0))
     )
     return force / length
 
 
 def _force_errors(case: Case, scene: Scene, solution: Solution, pressure: float) -> tuple[float, float]:
     """Return the largest error of a nodal force on the slave and on the master, over p L."""
-    errors = np.linalg.norm(solution.forces - consistent_forces(case, pressure), axis=1)
+    errors = np.linalg.norm(solution.forces - exact_forces.consistent_forces(case, pressure), axis=1)
     rigid = np.concatenate(
         [np.full(len(body.contact_nodes), body.rigid) for body in (scene.bodies[i] for i in scene.bodies_in_reach)]
     )
@@ -215,9 +209,9 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     state = replace(case, z=scene.positions(q), penalty=penalty)
     contact = contact_at(state, trace, formulation)
     values = _errors(contact, scene, q, pressure)
-    values[GAP] = gap_error(state, pressure / penalty, pressure / penalty)
+    values[GAP] = exact_forces.gap_error(state, pressure / penalty, pressure / penalty)
     if contact.has_points:
-        gap, reported = point_errors(contact, penalty, pressure)
+        gap, reported = exact_forces.point_errors(contact, penalty, pressure)
         values[GAP] = max(values[GAP], gap)
         if subject.traits.rules.penalty != "nodal":
             values[PRESSURE] = reported
@@ -249,17 +243,17 @@ def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
     """
     scene, pressure, penalty = scene_of(case), pressure_of(case, np.inf), case.penalty
     formulation = subject.for_case(case)
-    exact = exact_solution(scene, case, subject, formulation)
+    exact = exact_forces.exact_solution(scene, case, subject, formulation)
     multipliers = exact[scene.n_free :]
 
     def measure_errors(u: FloatArray) -> Measurement:
         """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
         q = u[: scene.n_free]
         state = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
-        nearest, sharpness = nearest_multipliers(state, scene, formulation, multipliers)
+        nearest, sharpness = exact_forces.nearest_multipliers(state, scene, formulation, multipliers)
         state = state.with_multipliers(nearest)
         values = _errors(FrozenState.at(formulation, state), scene, q, pressure)
-        values[GAP] = gap_error(state, 0.0, pressure / penalty)
+        values[GAP] = exact_forces.gap_error(state, 0.0, pressure / penalty)
         tolerance = uniform_tolerances(state, scene, pressure).stress
         tolerances = _tolerances(case, penalty, tolerance)
         if subject.traits.rules.penalty == "distributed":
@@ -310,7 +304,7 @@ def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> Fr
 
 def forces_to_draw(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) at the penalty of the case, for pictures."""
-    return consistent_forces(case, pressure_of(case, case.penalty))
+    return exact_forces.consistent_forces(case, pressure_of(case, case.penalty))
 
 
 def force_errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> tuple[float, float]:
@@ -328,7 +322,7 @@ def force_errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: floa
         if scene.bodies[index].rigid:
             by_bodies[first:last] = by_contact[first:last]
         first = last
-    exact = consistent_forces(case, pressure)
+    exact = exact_forces.consistent_forces(case, pressure)
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
     errors /= pressure * case.slave_length
     n_slave = case.interface.n_slave_nodes

@@ -457,5 +457,4 @@ def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_
 
 
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:
-    """Return all bits of an interface."""
     return interface.nodes.tobytes(), interface.slave.faces.tobytes(), interface.master.faces.tobytes()

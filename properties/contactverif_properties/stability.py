@@ -25,51 +25,25 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
 from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.problems import wave_blocks
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.stability_states import stability_scenes, stability_states
-from contactverif.problems.wave_blocks import (
-    LENGTH,
-    MEAN_PRESSURE,
-    SOFT,
-    WAVE,
-    WaveAnswer,
-    matching_answer,
-    wave_blocks,
-    wave_cases,
-    wave_work,
-)
 from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.surfaces import translated_surface_cases
 from contactverif.strategies.translations import translated_cases
+from contactverif_properties import exact_forces, roundoff
 from contactverif_properties.applicability import knows_total, refuse_unknown_pressure
-from contactverif_properties.exact_forces import (
-    exact_multipliers,
-    exact_slave_forces,
-    knows_linear_total,
-    uniform_multiplier,
-)
 from contactverif_properties.kinks import explain_by_rounded_decision
-from contactverif_properties.roundoff import (
-    MOST_ROUNDINGS,
-    Conditioning,
-    count_tangent_roundings,
-    forces_quantity,
-    make_sweep_measurement,
-    measure_conditioning,
-    measure_tangent_slope,
-    ratio,
-    tangent_quantity,
-)
 from contactverif_properties.states import FrozenState, ask_forces_and_tangents, freeze_state, move_state
 
-FORCES = forces_quantity("change of the forces in roundings")
-TANGENT = tangent_quantity("change of the tangent in roundings")
-SEARCH = forces_quantity("change of the forces with a new pairing in roundings")
-FORCES_THERE = forces_quantity("error of the forces in roundings")
-TOTAL_THERE = forces_quantity("error of the total force in roundings")
+FORCES = roundoff.forces_quantity("change of the forces in roundings")
+TANGENT = roundoff.tangent_quantity("change of the tangent in roundings")
+SEARCH = roundoff.forces_quantity("change of the forces with a new pairing in roundings")
+FORCES_THERE = roundoff.forces_quantity("error of the forces in roundings")
+TOTAL_THERE = roundoff.forces_quantity("error of the total force in roundings")
 KINDS = ("uniform penetration", "linear penetration")
 LARGEST_DENOMINATOR = 13  # The hypotenuses of the triples are 5 and 13.
-SWEPT_ROUNDINGS = forces_quantity("error of a force in roundings")
+SWEPT_ROUNDINGS = roundoff.forces_quantity("error of a force in roundings")
 
 
 @Property.define(
@@ -106,21 +80,25 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
     near = freeze_state(case, subject)
     far = replace(near, case=move_state(near.case, case.parameters["shift"]))
     (forces, forces_there), tangents = ask_forces_and_tangents(near, far)
-    conditioning = measure_conditioning(near, forces)
+    conditioning = roundoff.measure_conditioning(near, forces)
     values = {FORCES: conditioning.count_roundings(forces_there - forces)}
     if tangents:
         here, there = tangents
-        values[TANGENT] = count_tangent_roundings(near.case, here, there, measure_tangent_slope(near, here))
+        values[TANGENT] = roundoff.count_tangent_roundings(
+            near.case, here, there, roundoff.measure_tangent_slope(near, here)
+        )
     excusable = near.pairing is None  # A plugin without a pairing decides anew in each residual.
     if near.pairing is not None:
-        excusable = max(values.values()) <= MOST_ROUNDINGS  # The frozen pairing decides the same in both places.
+        excusable = (
+            max(values.values()) <= roundoff.MOST_ROUNDINGS
+        )  # The frozen pairing decides the same in both places.
         searched = FrozenState.at(near.formulation, far.case)
         values[SEARCH] = conditioning.count_roundings(searched.residual - forces)
     undecided = ""
-    if excusable and max(values.values()) > MOST_ROUNDINGS:
+    if excusable and max(values.values()) > roundoff.MOST_ROUNDINGS:
         undecided = explain_by_rounded_decision(near)
     idle = not forces[: case.interface.n_unknowns].any()
-    return Measurement(check_all(values, MOST_ROUNDINGS), undecided, idle=idle)
+    return Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided, idle=idle)
 
 
 def refuse_unknown_forces(traits: Traits) -> str:
@@ -177,11 +155,11 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
     give the same gap there, but a search that asks for 0 ≤ ξ ≤ 1 may lose the point between them.
     """
     linear = "slope" in case.parameters
-    pressure = uniform_multiplier(case) if linear else case.penalty * case.parameter("penetration")
+    pressure = exact_forces.uniform_multiplier(case) if linear else case.penalty * case.parameter("penetration")
     far = FrozenState.with_multiplier(subject.for_case(case), move_state(case, case.parameters["shift"]), pressure)
     near = replace(far, case=case.with_multipliers(far.case.multipliers))
     forces = far.residual
-    conditioning = measure_conditioning(near, near.residual)
+    conditioning = roundoff.measure_conditioning(near, near.residual)
     find_errors = _errors_of_linear if linear else _errors_of_uniform
     errors = find_errors(near.case, subject.traits, forces)
     if FORCES_THERE not in errors and subject.traits.abilities.takes_longdouble:
@@ -192,10 +170,11 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
     if FORCES_THERE in errors:
         values[FORCES_THERE] = conditioning.count_roundings(errors[FORCES_THERE])
     if TOTAL_THERE in errors:
-        values[TOTAL_THERE] = _count_total(near.case, errors[TOTAL_THERE], conditioning)
-    failed = max(values.values()) > MOST_ROUNDINGS
+        reach = float(conditioning.reach[: case.interface.n_slave_nodes].sum())
+        values[TOTAL_THERE] = roundoff.ratio(float(np.hypot(*errors[TOTAL_THERE])), UNIT_ROUNDOFF * reach)
+    failed = max(values.values()) > roundoff.MOST_ROUNDINGS
     undecided = explain_by_rounded_decision(near) if failed else ""
-    return Measurement(check_all(values, MOST_ROUNDINGS), undecided)
+    return Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided)
 
 
 def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
@@ -204,7 +183,7 @@ def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Q
         return {FORCES_THERE: _error_of_patch(case, forces)}
     if not knows_total_of_springs(traits):
         return {}
-    n_slave, exact = 2 * case.interface.n_slave_nodes, exact_forces(case)
+    n_slave, exact = 2 * case.interface.n_slave_nodes, exact_residual(case)
     totals = [
         float(sum(map(Fraction, forces[axis:n_slave:2].tolist())) - sum(exact[axis:n_slave:2])) for axis in (0, 1)
     ]
@@ -213,17 +192,17 @@ def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Q
 
 def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
     """Return the same under a linear penetration, of the rows of slave nodes."""
-    if traits.rules.enforcement != "penalty" or not knows_linear_total(traits):
+    if traits.rules.enforcement != "penalty" or not exact_forces.knows_linear_total(traits):
         return {}
     n_slave = case.interface.n_slave_nodes
-    error = forces[: 2 * n_slave].reshape(-1, 2) + exact_slave_forces(case, traits)
+    error = forces[: 2 * n_slave].reshape(-1, 2) + exact_forces.exact_slave_forces(case, traits)
     errors = {TOTAL_THERE: error.sum(axis=0)}
     if traits.promises.integrates_linear_gap:
         errors[FORCES_THERE] = np.concatenate([error.reshape(-1), np.zeros(len(forces) - 2 * n_slave)])
     return errors
 
 
-def exact_forces(case: Case) -> list[Fraction]:
+def exact_residual(case: Case) -> list[Fraction]:
     """Return the exact residual of a uniform pressure ε̂ |g| (n_unknowns entries), which pulls nodes back."""
     weights = uniform_pressure_weights_exact(case.interface, case.parameters["along"])
     x, y = (Fraction(entry).limit_denominator(LARGEST_DENOMINATOR) for entry in case.parameters["direction"].tolist())
@@ -237,7 +216,7 @@ def exact_forces(case: Case) -> list[Fraction]:
 
 def _error_of_patch(case: Case, forces: FloatArray) -> FloatArray:
     """Return the error of the position rows; constraint rows, which are not judged here, get 0."""
-    exact, n = exact_forces(case), case.interface.n_unknowns
+    exact, n = exact_residual(case), case.interface.n_unknowns
     scale = Fraction(1)
     if case.n_multipliers:
         n_slave = 2 * case.interface.n_slave_nodes
@@ -248,12 +227,6 @@ def _error_of_patch(case: Case, forces: FloatArray) -> FloatArray:
             scale = (exact_totals[0] * exact_totals[0] + exact_totals[1] * exact_totals[1]) / projection
     errors = [float(Fraction(force) * scale - right) for force, right in zip(forces[:n].tolist(), exact, strict=True)]
     return np.array([*errors, *([0.0] * case.n_multipliers)])
-
-
-def _count_total(case: Case, error: FloatArray, conditioning: Conditioning) -> float:
-    """Return the error (2,) of the slave's total force over what roundings of all its nodes allow."""
-    reach = float(conditioning.reach[: case.interface.n_slave_nodes].sum())
-    return ratio(float(np.hypot(*error)), UNIT_ROUNDOFF * reach)
 
 
 def knows_forces(traits: Traits) -> bool:
@@ -308,8 +281,8 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
     there = replace(state, case=move_swept(state.case))
     expected: FloatArray = np.array(state.residual)
     expected[: case.interface.n_unknowns] = ExactMotion.from_case(case).turn(state.forces).reshape(-1)
-    error, conditioning = there.residual - expected, measure_conditioning(state, state.residual)
-    return make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, error, idle=not state.residual.any())
+    error, conditioning = there.residual - expected, roundoff.measure_conditioning(state, state.residual)
+    return roundoff.make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, error, idle=not state.residual.any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -346,7 +319,7 @@ class ExactMotion:
         return (vectors @ self._matrix) / self._hypotenuse
 
 
-ROUNDINGS = forces_quantity("error of a solved force in roundings")
+ROUNDINGS = roundoff.forces_quantity("error of a solved force in roundings")
 MOST_STEPS = 30  # Newton's steps at each penalty. Linear springs take about four.
 STEPS = 5  # Steps of the turned system, which start at its solution but for roundoff.
 # The penalty grows by this factor at most from one solution to the next. A larger one gives forces that buckle springs.
@@ -446,7 +419,7 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
         return Measurement(undecided="the matrix has no inverse in floats")
     state = FrozenState(system.formulation, replace(case, z=system.state(u)), pairing)
     error = turned.forces(u_turned) - motion.turn(state.forces).reshape(-1)
-    return make_sweep_measurement(ROUNDINGS, _conditioning(state, scene), error, idle=not state.forces.any())
+    return roundoff.make_sweep_measurement(ROUNDINGS, _conditioning(state, scene), error, idle=not state.forces.any())
 
 
 def _solve(system: System, pairing: Pairing | None, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -490,7 +463,6 @@ class _SingularMatrix(Exception):
 
 
 def _step(system: System, matrix: FloatArray, residual: FloatArray) -> FloatArray:
-    """Return the step of Newton's method (n,)."""
     change = system.step(matrix, -residual).change
     if change is None:
         raise _SingularMatrix
@@ -505,7 +477,6 @@ def _penalties(case: Case) -> list[float]:
 
 
 def _system(case: Case, subject: Subject, penalty: float) -> System:
-    """Return the equations of the scene at a penalty ε̂."""
     return System(scene_of(case), subject.for_case(replace(case, penalty=penalty)))
 
 
@@ -519,9 +490,9 @@ def _matrix(system: System, pairing: Pairing | None, u: FloatArray) -> FloatArra
     return dense(system.stiffness) + transformation.T @ contact @ transformation
 
 
-def _conditioning(state: FrozenState, scene: Scene) -> Conditioning:
+def _conditioning(state: FrozenState, scene: Scene) -> roundoff.Conditioning:
     """Return the conditioning of the contact forces, to which the bodies add |S| |z − z̄| at their contact nodes."""
-    conditioning, positions = measure_conditioning(state, state.residual), state.case.positions
+    conditioning, positions = roundoff.measure_conditioning(state, state.residual), state.case.positions
     transformation = abs(dense(scene.transformation))
     distances = np.abs(positions - positions.mean(axis=0)).reshape(-1)
     bulk = transformation @ (abs(dense(scene.stiffness)) @ (transformation.T @ distances))
@@ -536,7 +507,7 @@ def _conditioning(state: FrozenState, scene: Scene) -> Conditioning:
     family="stability",
     quantities=(DRIFT, ROUGHNESS),
     needs=frozenset({"pair"}),
-    cases=Cases.from_list(wave_cases),
+    cases=Cases.from_list(wave_blocks.wave_cases),
     promise=lambda traits: None if traits.promises.locks is None else not traits.promises.locks,
     applicable=refuse_unknown_pressure,
     bodies=True,
@@ -586,20 +557,20 @@ def measure_locking(
     answer = answer_at(columns, case.parameter("stiffness"))
     if answer is None:
         return Measurement(undecided=unsolved)
-    smooth = matching_answer(n_slave, case.penalty).pressure_range
+    smooth = wave_blocks.matching_answer(n_slave, case.penalty).pressure_range
     by_forces, by_points = answer.force_range / smooth, answer.point_range / smooth
     values = {ROUGHNESS: float(np.fmax(by_forces, by_points))}
     details = {"roughness of nodal forces": by_forces}
     if np.isfinite(by_points):
         details["roughness of reported pressures"] = by_points
     if subject.traits.rules.enforcement == "penalty":
-        soft = answer_at(columns, SOFT)
+        soft = answer_at(columns, wave_blocks.SOFT)
         if soft is None:
             return Measurement(undecided=unsolved)
-        at_soft = wave_blocks(*columns, SOFT, wave=0.0).penalty
+        at_soft = wave_blocks.wave_blocks(*columns, wave_blocks.SOFT, wave=0.0).penalty
         factor = soft.stiffness / at_soft  # Springs may act twice.
-        ratio = answer.compliance / mean_of_matching(columns, factor * case.penalty)
-        values[DRIFT] = 1 - ratio * mean_of_matching(columns, factor * at_soft) / soft.compliance
+        share = answer.compliance / mean_of_matching(columns, factor * case.penalty)
+        values[DRIFT] = 1 - share * mean_of_matching(columns, factor * at_soft) / soft.compliance
         details["stiffness of the springs over the penalty"] = factor
     tolerances = {DRIFT: MOST_DRIFT, ROUGHNESS: MOST_ROUGHNESS}
     return Measurement(check_all(values, tolerances), details=details)
@@ -607,7 +578,7 @@ def measure_locking(
 
 def mean_of_matching(columns: tuple[int, int], distributed: float) -> float:
     """Return the mean compliance of matching meshes with the segments of the slave and with those of the master."""
-    answers: list[WaveAnswer] = [matching_answer(number, distributed) for number in columns]
+    answers: list[wave_blocks.WaveAnswer] = [wave_blocks.matching_answer(number, distributed) for number in columns]
     return sum(answer.compliance for answer in answers) / len(answers)
 
 
@@ -632,7 +603,7 @@ class InterfaceAnswer:
 
 def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> InterfaceAnswer | None:
     """Solve two blocks with the wave and without it."""
-    uniform, wavy = (wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, WAVE))
+    uniform, wavy = (wave_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, wave_blocks.WAVE))
     formulation = subject.for_case(uniform.case())
     systems = System(uniform, formulation), System(wavy, formulation)
     start = _uniform_state(systems[0], subject)
@@ -653,7 +624,7 @@ def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -
 
 def answer_of_code(columns: tuple[int, int], penalty: float, subject: EngineSubject) -> InterfaceAnswer | None:
     """Let a whole code solve two blocks with the wave and without it."""
-    uniform, wavy = (wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, WAVE))
+    uniform, wavy = (wave_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, wave_blocks.WAVE))
     before, after = (solve_by_engine(scene, subject, linear=True)[0] for scene in (uniform, wavy))
     if before.no_solution or after.no_solution:
         return None
@@ -667,9 +638,9 @@ def _interface_answer(
     """Return the answer of two solutions (n_free,), and the forces (n_nodes, 2) that the wave adds at the interface."""
     total = -float((uniform.bodies[0].load * uniform.displacements(before)[0]).sum())
     bodies = float(uniform.facts["compliance"].sum())
-    springs = abs(total) / (MEAN_PRESSURE**2 * LENGTH) - bodies
+    springs = abs(total) / (wave_blocks.MEAN_PRESSURE**2 * wave_blocks.LENGTH) - bodies
     return InterfaceAnswer(
-        compliance=wave_work(uniform, wavy, before, after),
+        compliance=wave_blocks.wave_work(uniform, wavy, before, after),
         stiffness=1 / max(springs, _LEAST_SHARE * bodies),
         force_range=_force_range(uniform.interface, forces[:, 1]),
     )
@@ -679,10 +650,12 @@ def _uniform_state(system: System, subject: Subject) -> FloatArray:
     """Return the unknowns, and the multipliers behind them, of the exact uniform pressure."""
     scene = system.scene
     if not system.n_multipliers:
-        return exact_unknowns(scene, MEAN_PRESSURE, scene.penalty)
-    exact = exact_unknowns(scene, MEAN_PRESSURE, np.inf)
+        return exact_unknowns(scene, wave_blocks.MEAN_PRESSURE, scene.penalty)
+    exact = exact_unknowns(scene, wave_blocks.MEAN_PRESSURE, np.inf)
     state = replace(scene.case(), z=scene.positions(exact))
-    return np.append(exact, exact_multipliers(state, subject, system.formulation, MEAN_PRESSURE))
+    return np.append(
+        exact, exact_forces.exact_multipliers(state, subject, system.formulation, wave_blocks.MEAN_PRESSURE)
+    )
 
 
 def _force_range(interface: Interface, across: FloatArray) -> float:
@@ -692,7 +665,7 @@ def _force_range(interface: Interface, across: FloatArray) -> float:
         (interface.master, slice(interface.n_slave_nodes, None)),
     )
     lengths = [(shape_integrals(surface, interface.nodes), nodes) for surface, nodes in sides]
-    return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / WAVE
+    return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / wave_blocks.WAVE
 
 
 def _point_range(before: FrozenState, after: FrozenState) -> float:
@@ -700,7 +673,7 @@ def _point_range(before: FrozenState, after: FrozenState) -> float:
     if pressures[0].shape != pressures[1].shape:
         return np.nan  # A formulation without a pairing may have other points.
     change = pressures[1] - pressures[0]
-    return float(np.ptp(change[np.isfinite(change)])) / WAVE
+    return float(np.ptp(change[np.isfinite(change)])) / wave_blocks.WAVE
 
 
 def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
@@ -735,11 +708,10 @@ def _iterate(system: System, start: FloatArray, pairing: Pairing | None) -> Floa
     id="engine.locking",
     family="engine",
     quantities=(DRIFT, ROUGHNESS),
-    cases=Cases.from_list(wave_cases),
+    cases=Cases.from_list(wave_blocks.wave_cases),
     promise=lambda traits: None,
     needs=frozenset({SOLVE}),
     bodies=True,
-    engines=True,
 )
 def engine_locking(case: Case, subject: Subject) -> Measurement:
     """With stiff springs or multipliers the interface is no stiffer and its pressure no rougher than it should be.

@@ -437,7 +437,11 @@ def measure_blocks(case: Case, subject: Subject) -> Measurement:
     excess, excuses = comparison.excess, Excuses(0, 0)
     if (excess > 1).any():
         excess, excuses = _excuse(judge, comparison)
-    lacking = len(lacking_entries(judge, comparison, excess)) if (excess > 1).any() else 0
+    lacking = 0
+    if (excess > 1).any():  # Blocks that do not fail lack nothing.
+        part = np.ix_(judge.groups.of_unknowns, judge.groups.of_unknowns)
+        unstored = ~judge.pattern & (np.abs(comparison.derivative) > comparison.tolerance[part])
+        lacking = int((unstored & (excess[part] > 1)).sum())
     row, column = np.unravel_index(int(excess.argmax()), excess.shape)
     size = float(comparison.largest[row, column]) or 1.0
     value = float(excess[row, column])
@@ -480,17 +484,6 @@ def worst_entry(judge: BlockJudge, comparison: Comparison, row: int, column: int
         "derivative",
         f"largest entry of the block {comparison.largest[row, column]:.3g}",
     )
-
-
-def lacking_entries(judge: BlockJudge, comparison: Comparison, excess: FloatArray) -> IntArray:
-    """Return rows and columns (n_entries, 2) of derivatives that are not zero where the tangent has no entry.
-
-    Blocks of which `excess` (count, count) says that they do not fail lack nothing.
-    """
-    of_unknowns = judge.groups.of_unknowns
-    part = np.ix_(of_unknowns, of_unknowns)
-    lacking = ~judge.pattern & (np.abs(comparison.derivative) > comparison.tolerance[part]) & (excess[part] > 1)
-    return np.argwhere(lacking)
 
 
 @dataclass(frozen=True, slots=True)
@@ -829,7 +822,6 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
 
 
 def _central_steps(case: Case, length: float) -> FloatArray:
-    """Return the steps of central differences of a residual that bends over a length."""
     steps: FloatArray = np.array(STEPS) * length * (UNIT_ROUNDOFF * case.largest_coordinate / length) ** (1 / 3)
     return steps
 
@@ -852,10 +844,11 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
     if (kink := find_kink(state, 4 * step, direction)) or state.pairing is None:
         return kink, ""
     beside = [pair(sign * 2.0**-10 * np.arange(1, 4)) for sign in (1, -1)]
-    if all(map(_all_agree, beside)):
+    if all(pairing == first for first, *others in beside for pairing in others):
         return "a kink: the pairing changes here, and is steady on either side", ""
     around = [pair(scale * np.arange(-2, 4)) for scale in (1, 2.0**-5, 2.0**-10)]
-    if all(map(_all_differ, around)) and _change_forces(list(chain(*around)), state, directions):
+    differ = all(one != other for pairings in around for one, other in combinations(pairings, 2))
+    if differ and _change_forces(list(chain(*around)), state, directions):
         return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
     return "", ""
 
@@ -872,16 +865,6 @@ def _change_forces(pairings: Sequence[Pairing | None], state: FrozenState, direc
     roundoff = COORDINATE_ROUNDING * case.largest_coordinate * slope
     others = (replace(state, pairing=pairing).residual_at(places) for pairing in pairings)
     return any(np.abs(other - forces).max() > roundoff for other in others)
-
-
-def _all_agree(pairings: Sequence[Pairing | None]) -> bool:
-    """Return whether all of some pairings are alike."""
-    return all(pairing == pairings[0] for pairing in pairings)
-
-
-def _all_differ(pairings: Sequence[Pairing | None]) -> bool:
-    """Return whether no two of some pairings are alike."""
-    return all(first != second for first, second in combinations(pairings, 2))
 
 
 def first_directions(case: Case, n_random: int) -> FloatArray:

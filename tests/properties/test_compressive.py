@@ -1,18 +1,27 @@
-"""The properties `unilateral` and `nodal-push`: no force across an open gap, and a push where surfaces penetrate."""
+"""`unilateral` and `nodal-push`, and the constraint rows of multipliers."""
 
 from typing import Any
 
 import numpy as np
 import pytest
-from subjects import judge_as, load_subject
+from subjects import Changed, change_verbs, judge_as, load_property, load_subject
+from textbook_springs import NodalMultipliers
 
+import contactverif_mortar
 from contactverif import Case, Interface, Pairing, Subject, Verdict, judge_case, load_properties, named_case
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.run.run import run
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_properties.compressive import allowed_pushes, lift_slave, nodal_push, unilateral
+from contactverif_nts import vts_ppt
+from contactverif_properties.compressive import (
+    allowed_pushes,
+    check_constraint_rows,
+    lift_slave,
+    nodal_push,
+    unilateral,
+)
 from contactverif_properties.states import FrozenState
 
 
@@ -150,3 +159,134 @@ def test_a_master_node_may_be_pulled_by_as_much_as_a_foot_lies_past_its_segment(
     assert allowance[2] == pytest.approx(0.005 / 1.995 * 0.1, rel=1e-9)
     assert -state.forces[2, 1] < 0  # The other node carries the slave's second node too.
     assert judge_case(nodal_push, case, subject).verdict is Verdict.PASS
+
+
+SLAVE = [[0.446875, -0.875], [1.446875, -0.375]]
+CORNER = Interface.from_chains(SLAVE, [[1.005, 0.0], [1.0025, -0.5], [0.0025, -0.5], [0.0, 0.0]])
+STRAIGHT = Interface.from_chains([[0.0, -0.25], [1.0, -0.25]], [[1.5, 0.0], [0.5, 0.0], [-0.5, 0.0]])
+
+
+VALLEY = Interface.from_chains([[-0.05, -0.2], [0.05, -0.2]], [[1.0, 0.5], [0.0, 0.0], [-1.0, 0.5]])
+
+
+def pull(node: int, sign: float) -> Subject:
+    """Return VTS-PPT with forces times a sign, but for one node, which is pulled."""
+
+    def residual(right: Any, *state: Any) -> Any:
+        forces = np.array(right(*state))
+        forces[..., 2 * node + 1] -= 2 * np.abs(forces).max()
+        return sign * forces
+
+    return Subject("pulled", lambda *, penalty: change_verbs(vts_ppt(penalty=penalty), residual=residual))
+
+
+def _judge(subject: Subject, interface: Interface) -> Verdict:
+    return judge_case(nodal_push, Case(interface, interface.nodes.reshape(-1)), subject).verdict
+
+
+@pytest.mark.parametrize("name", ["sts", "mortar", "nts-ar", "vts-me"])
+def test_a_formulation_whose_feet_are_where_its_points_are_passes_round_a_corner(name: str) -> None:
+    assert _judge(load_subject(name), CORNER) is Verdict.PASS
+
+
+def test_a_part_of_a_force_round_a_corner_is_no_reason_to_accuse() -> None:
+    """Eq. 6 leaves ξ unclipped: the foot of a part is past the neighbour of its point's segment by its whole length."""
+    assert _judge(load_subject("vts-ppt"), CORNER) is Verdict.UNDECIDED
+
+
+def test_a_node_that_is_pulled_where_there_is_no_corner_is_found() -> None:
+    assert _judge(load_subject("vts-ppt"), STRAIGHT) is Verdict.PASS
+    assert _judge(pull(3, 1.0), STRAIGHT) is Verdict.FAIL
+
+
+def test_a_slave_node_that_is_pulled_beside_a_corner_is_found() -> None:
+    assert _judge(pull(0, -1.0), CORNER) is Verdict.FAIL
+
+
+@pytest.mark.parametrize("name", ["nts-ar", "nts", "two-pass/nts-ar"])
+def test_without_points_a_foot_past_the_end_of_a_segment_is_no_reason_to_accuse(name: str) -> None:
+    """Both slave nodes are nearest to the vertex of the valley, and so lever the outer nodes of the master up."""
+    inner = load_subject(name)
+    assert _judge(inner, VALLEY) is Verdict.PASS
+
+    def make(*, penalty: float) -> Changed:
+        return Changed(inner.with_penalty(penalty).plugin, contact_points=None)
+
+    assert _judge(Subject(name, make), VALLEY) is Verdict.UNDECIDED
+
+
+def test_without_points_a_slave_node_that_is_pulled_is_found() -> None:
+    def make(*, penalty: float) -> Changed:
+        return Changed(pull(0, -1.0).with_penalty(penalty).plugin, contact_points=None)
+
+    assert _judge(Subject("pulled", make), STRAIGHT) is Verdict.FAIL
+
+
+PRESSURES = ("mortar-lm:normals=averaged", "two-pass/vts-me-lm", "two-pass/mortar-dual-lm", "vts-ppt-lm:n=1")
+
+
+def largest_error(name: str, case: Any) -> float:
+    subject = load_subject(name)
+    lifted = lift_slave(case, 2 * case.parameter("penetration"))
+    return check_constraint_rows(subject.for_case(case), case, lifted, subject.traits.rules, subject.penalty(case))
+
+
+@pytest.mark.parametrize("name", ["nts-lm", "vts-me-lm:n=3,area=reference", "vts-ppt-lm", "mortar-lm", *PRESSURES])
+@pytest.mark.parametrize("case", ["a1", "b", "c-prime-swapped"])
+def test_rows_are_those_of_the_contract(name: str, case: str) -> None:
+    assert largest_error(name, named_case(case)) < 0.5
+
+
+def test_a_node_that_loses_a_free_end_as_the_slave_is_lifted_is_not_accused() -> None:
+    last_bit = float(np.spacing(1.0))
+    master = flat_master([0, 1])
+    for excess in np.arange(-4, 5) * last_bit:
+        for turn in ((1, 0, 1), (3, 4, 5), (5, 12, 13)):
+            case = flat_state("", [-excess, 1 + excess], master, depth=0.25, turn=turn)
+            assert largest_error("nts-lm:tau=0", case) < 0.5
+
+
+def test_the_multipliers_of_a_textbook_are_not_accused() -> None:
+    textbook = Subject("textbook", lambda *, penalty: NodalMultipliers(penalty=penalty))
+    result = run([textbook], [load_property(name) for name in ("multipliers.rank", "unilateral")], examples=40, seed=0)
+    assert [row.verdict for row in result.rows] == [Verdict.PASS, Verdict.PASS], [row.reason for row in result.rows]
+
+
+def test_a_row_of_another_size_breaks_the_contract_and_is_told_beside_the_right_one() -> None:
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_mortar.mortar_lm(penalty=penalty)
+
+        def residual(interface: Any, pairing: Any, z: Any) -> Any:
+            answer = np.array(inner.residual(interface, pairing, z))
+            answer[..., interface.n_unknowns :] *= penalty
+            return answer
+
+        return Changed(inner, residual=residual)
+
+    outcome = judge_case(unilateral, named_case("a1"), Subject("scaled", make))
+    assert outcome.breach
+    assert "breaks the contract: residual: constraint row 1 is 2 at a gap of -0.0625" in outcome.reason
+    assert "c = 16; needed −area · gap = 0.125 with the area 2, since λ − c gap is" in outcome.reason
+
+
+def test_a_decision_that_is_late_by_a_hair_is_told() -> None:
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_mortar.mortar_lm(penalty=penalty)
+
+        def pair(interface: Any, z: Any) -> Any:
+            n = interface.n_unknowns
+            return inner.pair(interface, np.append(z[:n], z[n:] + 1e-6 * np.abs(z[n:]).max()))
+
+        return Changed(inner, pair=pair)
+
+    outcome = judge_as(Verdict.FAIL, unilateral, named_case("b"), Subject("late", make))
+    assert outcome.breach
+    assert "needed area · λ = -" in outcome.reason
+
+
+def test_a_slave_that_nothing_holds_has_no_redundant_multipliers() -> None:
+    """Both nodes of its only segment lie beside the master, so no constraint is active, and the slave may move."""
+    question, subject = load_property("multipliers.rank"), load_subject("nts-lm")
+    (row,) = run([subject], [question], examples=40, seed=0).rows
+    assert row.verdict is Verdict.PASS
+    assert {kind: counts.failed for kind, counts in row.tally.kinds.items()} == {"covered": 0, "overhang": 0}

@@ -1,18 +1,144 @@
-"""The hard cases: nobody right is accused, what is promised is asked, and details say what nobody promises."""
+"""The hard cases: their exact forces, and what right and wrong formulations get."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from functools import partial
+from math import hypot
 from typing import Any
 
+import numpy as np
 import pytest
+from exact_projection import project_point
 from hard_strangers import PointSprings, Softened, simpson, trapezoid
 from subjects import load_property, load_subject, with_promises
 
 import contactverif_nts
-from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
+from contactverif import Body, Measurement, Outcome, Property, Subject, Verdict, judge_case, load_properties
+from contactverif.contract.case import Case
 from contactverif.contract.traits import Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif.mechanics import bulk
+from contactverif.mechanics.scene import forget_bodies
 from contactverif.plugins.registry import property_ids
+from contactverif.problems.flat_states import (
+    STEEP,
+    TURNED,
+    UPRIGHT,
+    deep_states,
+    node_hit_states,
+    offset_states,
+    read_frame,
+    search_states,
+    tiny_segment_states,
+    touching_states,
+)
+from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
+from contactverif.sampling.draw import draw_cases
+from contactverif_properties.applicability import knows_total
 from contactverif_properties.hard import covered_share
+
+TURNS = (UPRIGHT, TURNED, STEEP)
+FLAT_STATES = [*offset_states(), *deep_states(), *node_hit_states(), *search_states(), *tiny_segment_states()]
+
+
+def turn_of(case: Case) -> tuple[int, int, int]:
+    """Return the triple by which a flat state is turned."""
+    return next(turn for turn in TURNS if np.allclose(case.parameters["direction"], np.array(turn[:2]) / turn[2]))
+
+
+@pytest.mark.parametrize("case", FLAT_STATES, ids=lambda case: case.name)
+def test_a_flat_state_is_flat_to_the_last_bit(case: Case) -> None:
+    n_slave = case.interface.n_slave_nodes
+    loaded = np.flatnonzero(case.parameters["weights"][n_slave:]) + n_slave
+    _, heights = read_frame(case.positions, turn_of(case), case.positions[loaded[0]])
+    assert len(set(heights[:n_slave])) == 1
+    assert {heights[node] for node in loaded} == {0}
+    assert -heights[0] == Fraction(case.parameter("penetration"))
+
+
+@pytest.mark.parametrize("case", FLAT_STATES, ids=lambda case: case.name)
+def test_each_point_of_the_slave_is_nearest_to_the_flat_part(case: Case) -> None:
+    loaded = set(np.flatnonzero(case.parameters["weights"]).tolist())
+    for segment in range(len(case.interface.slave)):
+        for c in (-1.0, -0.5, 0.0, 0.5, 1.0):
+            projection = project_point(case.interface, case.z, segment, c)
+            assert set(case.interface.master.segments[projection.segment].tolist()) <= loaded
+            assert -projection.signed_squared_gap == Fraction(case.parameter("penetration")) ** 2
+
+
+@pytest.mark.parametrize("case", FLAT_STATES, ids=lambda case: case.name)
+def test_the_exact_forces_of_a_flat_state_balance(case: Case) -> None:
+    forces = load_property("hard.offset").exact(case)
+    size = np.abs(forces).sum()
+    assert np.abs(forces.sum(axis=0)).max() <= 1e-15 * size
+    arms = case.positions - case.positions[0]
+    moment = float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum())
+    assert abs(moment) <= 1e-14 * size * case.diameter
+
+
+def test_near_1e8_the_stored_gap_is_one_step_of_the_doubles() -> None:
+    (case,) = (case for case in offset_states() if case.name == "1e8, gap of one step")
+    assert case.parameter("penetration") == float(np.spacing(1e8))
+
+
+def test_surfaces_touch_exactly_at_1000_angles() -> None:
+    angles = set()
+    for case in touching_states():
+        if case.parameter("shift") != 0:
+            continue
+        for segment in range(len(case.interface.slave)):
+            assert project_point(case.interface, case.z, segment, -1.0).signed_squared_gap == 0
+            assert project_point(case.interface, case.z, segment, 0.5).signed_squared_gap == 0
+        angles |= {tuple(direction) for direction in case.parameters["directions"].tolist()}
+    assert len(angles) == 1000
+
+
+def test_no_surface_in_touch_is_above_or_below_another_pair() -> None:
+    """Along a slave segment the masters of other pairs lie before its first node or past its second one."""
+    for case in touching_states():
+        x = case.positions
+        for first, second in case.interface.slave.segments:
+            along = x[second] - x[first]
+            direction = case.parameters["directions"][first]
+            for segment in case.interface.master.segments:
+                places = (x[segment] - x[first]) @ along / (along @ along)
+                own = (case.parameters["directions"][segment[0]] == direction).all()
+                assert own or places.max() < 0 or places.min() > 1
+
+
+@pytest.mark.parametrize("shift", [1e-16, -1e-16])
+def test_stored_gaps_of_1e_16_have_either_sign_or_none(shift: float) -> None:
+    signs = {
+        project_point(case.interface, case.z, 0, -1.0).gap_sign
+        for case in touching_states()
+        if case.parameter("shift") == shift
+    }
+    assert signs >= {int(np.sign(shift))}
+
+
+@pytest.mark.parametrize("case", [*convex_kink_states(), *concave_corner_states()], ids=lambda case: case.name)
+def test_the_nearest_segments_give_a_total_within_the_bounds(case: Case) -> None:
+    """The midpoints of 64 parts of each segment, in rationals, along the normals of the nearest segments."""
+    total = np.zeros(2)
+    parts = 64
+    for segment, length in enumerate(case.interface.slave.lengths(case.positions)):
+        for part in range(parts):
+            projection = project_point(case.interface, case.z, segment, -1 + (2 * part + 1) / parts)
+            assert projection.gap_sign < 0
+            first, second = case.positions[case.interface.master.segments[projection.segment]]
+            along = (second - first) / hypot(*(second - first))
+            gap = float(-projection.signed_squared_gap) ** 0.5
+            total += length / parts * gap * np.array([along[1], -along[0]])
+    low, high = case.parameters["segment_bounds"]
+    assert low * (1 - 1e-12) <= total @ case.parameters["axis"] <= high * (1 + 1e-12)
+    wide_low, wide_high = case.parameters["bounds"]
+    assert wide_low <= low * (1 + 1e-12)
+    assert high <= wide_high * (1 + 1e-12)
+
+
+def test_a_total_is_known_of_distributed_springs_alone() -> None:
+    known = {name: knows_total(load_subject(name).traits) for name in ("nts", "nts-ar", "two-pass/nts-ar", "sts")}
+    assert known == {"nts": False, "nts-ar": True, "two-pass/nts-ar": False, "sts": True}
+
 
 HARD = [name for name in property_ids() if name.startswith("hard.")]
 STATES = [name for name in HARD if not load_property(name).bodies]
@@ -180,3 +306,37 @@ def test_without_a_load_a_law_that_is_not_linear_is_not_accused() -> None:
     soft = Subject("soft", lambda *, penalty: Softened(penalty))
     for name in ("free, pushed in", "held, touching"):
         assert judge_named("hard.zero-load", name, soft).verdict in (Verdict.PASS, Verdict.UNDECIDED)
+
+
+WITHOUT_BODIES = [item.id for item in load_properties(["*"]) if isinstance(item, Property) and not item.bodies]
+MOST_FACTORISED = {"patch.flat.solve": 2, "patch.variants": 2, "newton.units": 4, "newton.attainable": 4}
+
+
+@pytest.mark.parametrize("property_id", WITHOUT_BODIES)
+def test_a_property_without_bodies_builds_none(property_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(self: Any) -> None:
+        raise AssertionError("a body")
+
+    question, subject = load_property(property_id), load_subject("vts-ppt")
+    monkeypatch.setattr(Body, "__post_init__", refuse)
+    cases = draw_cases(question.cases(None), seed="0", examples=3).cases
+    for case in cases[:3]:
+        judge_case(question, case, subject)
+
+
+@pytest.mark.parametrize("property_id", MOST_FACTORISED)
+def test_each_mesh_is_factorised_once(property_id: str) -> None:
+    """Two penalties share their bodies, also far from the origin; rounded nodes and other units are new meshes."""
+    question, subject = load_property(property_id), load_subject("vts-ppt")
+    (case,) = draw_cases(question.cases(None), seed="1", examples=1).cases
+    forget_bodies()
+    assert judge_case(question, case, subject).verdict is Verdict.PASS
+    assert 0 < bulk._factorise.cache_info().misses <= MOST_FACTORISED[property_id]
+
+
+def test_bodies_with_other_loads_share_a_factorisation_on_hertz_meshes() -> None:
+    question, subject = load_property("accuracy.hertz"), load_subject("vts-ppt")
+    forget_bodies()
+    for case in question.cases(None)[:3]:
+        judge_case(question, case, subject)
+    assert bulk._factorise.cache_info().misses <= 8  # Four meshes of each body, whatever the penalty.

@@ -1,4 +1,4 @@
-"""The patch tests of classes of meshes, of nodal springs and of stated forces: `patch.flat.normal` to `published`."""
+"""The flat patch tests by class of meshes, tilted slaves, the total stiffness, and the worst force in words."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,20 +10,31 @@ from typing import Any
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
+from hard_strangers import PointSprings, Softened, simpson, trapezoid
 from strangers import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
 from strangers.segment_penalty import SegmentPenalty
-from subjects import load_property, load_subject, with_promises
+from subjects import change_verbs, judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
 
-from contactverif import Case, PatchPromises, Promises, Rules, Subject, Traits, Verdict, judge_case
+import contactverif_nts
+from contactverif import Case, Interface, PatchPromises, Promises, Rules, Subject, Traits, Verdict, judge_case
 from contactverif.contract.published_forces import parse_forces
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif_nts import force_tables
-from contactverif_properties.patch_flat import LOST_END
+from contactverif_properties.exact_forces import (
+    directions,
+    exact_slave_forces,
+    forces_of_penetration,
+    node_gaps,
+    total_force,
+    worst_force,
+)
+from contactverif_properties.invariants import BITS
+from contactverif_properties.patch_flat import LOST_END, STEEP, TILTED
 
 NORMAL, SINGLE, NODAL, PUBLISHED = (f"patch.flat.{name}" for name in ("normal", "single", "nodal", "published"))
 EXAMPLES = 30
@@ -290,3 +301,283 @@ def test_nothing_is_asked_where_nothing_is_known() -> None:
     assert idle == {"a1": False, "b": True}
     (row,) = run([subject], [question]).rows
     assert (row.verdict, row.unexpected) == (Verdict.PASS, "")
+
+
+SCALE = load_property("total-stiffness")
+CASES = {case.name: case for case in SCALE.cases(None)}
+SILENT = Traits()
+
+
+def scale_springs(factor: float, traits: Traits) -> Subject:
+    """Return quarter-point springs of another stiffness, which state these traits."""
+
+    class Scaled(PointSprings):
+        def __init__(self, penalty: float) -> None:
+            super().__init__(factor * penalty)
+            self.traits = traits
+
+    return Subject("scaled", lambda *, penalty: Scaled(penalty))
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_without_a_trait_one_pass_and_two_passes_pass(factor: float, name: str) -> None:
+    outcome = judge_as(Verdict.PASS, SCALE, CASES[name], scale_springs(factor, SILENT))
+    assert outcome.measurement is not None
+    assert outcome.measurement.details["springs over ε̂ L"] == pytest.approx(factor)
+    sentences = {1.0: "None", 2.0: "your springs are 2.00 ε̂ L: two passes, or twice too stiff"}
+    assert str(outcome.measurement.finding) == sentences[factor]
+
+
+@pytest.mark.parametrize("factor", [3.0, 1 / 3, 1.5, 0.5, 4.0, -1.0, 0.0])
+def test_another_factor_fails_in_silence_too(factor: float) -> None:
+    for case in CASES.values():
+        outcome = judge_as(Verdict.FAIL, SCALE, case, scale_springs(factor, SILENT))
+        assert f"your springs are {factor:#.3g} ε̂ L: one pass has 1 ε̂ L, two passes have 2 ε̂ L" in outcome.reason
+
+
+def test_a_long_interface_shows_what_a_short_one_hides() -> None:
+    """Half a percent too stiff, and the number of a segment in one byte."""
+
+    class OneByte(PointSprings):
+        def pair(self, interface: Any, z: Any) -> Any:
+            pairing = dict(super().pair(interface, z))
+            (name,) = (key for key, numbers in pairing.items() if numbers.dtype == np.int64 and numbers.max() > 200)
+            return {**pairing, name: pairing[name].astype(np.uint8).astype(np.int64)}
+
+    long = CASES["304 segments"]
+    judge_as(Verdict.FAIL, SCALE, long, scale_springs(1.005, SILENT))
+    judge_as(Verdict.PASS, SCALE, CASES["16 segments, stiff"], scale_springs(1.005, SILENT))
+    judge_as(Verdict.FAIL, SCALE, long, Subject("one byte", lambda *, penalty: OneByte(penalty)))
+
+
+def test_a_master_that_gets_more_than_the_slave_fails_whatever_is_promised() -> None:
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = np.array(right(interface, pairing, z))
+        forces[2 * interface.n_slave_nodes :] *= 1.5
+        return forces
+
+    subject = Subject("more", lambda *, penalty: change_verbs(contactverif_nts.nts(penalty=penalty), residual=residual))
+    for case in CASES.values():
+        outcome = judge_as(Verdict.FAIL, SCALE, case, subject)
+        assert "the master gets 1.6" in outcome.reason or "the master gets 1.5" in outcome.reason
+
+
+def test_springs_that_state_their_area_act_once() -> None:
+    traits = Traits(rules=Rules(penalty="distributed", area="current"))
+    outcome = judge_as(Verdict.FAIL, SCALE, CASES["8 segments"], scale_springs(2.0, traits))
+    assert outcome.reason.endswith("your springs are 2.00 ε̂ L: one pass has 1 ε̂ L")
+
+
+@pytest.mark.parametrize("name", ["nts", "two-pass/nts"])
+def test_nodal_springs_pass_whether_they_state_their_unit_or_not(name: str) -> None:
+    inner = load_subject(name)
+    silent = with_promises(lambda *, penalty: inner.with_penalty(penalty).plugin, penalty=None, unbiased=None)
+    for case in CASES.values():
+        for subject in (inner, silent):
+            judge_as(Verdict.PASS, SCALE, case, subject)
+
+
+RIGHT_STIFFNESSES = {  # Beside all `STRANGERS`, which `test_strangers.py` asks.
+    "quarter points": PointSprings,
+    "nodes": trapezoid,
+    "Simpson's rule, the last of equals": lambda penalty: simpson(penalty, last=True),
+    "no traits": lambda penalty: PointSprings(penalty, stated=False),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT_STIFFNESSES)
+def test_a_right_stiffness_of_a_stranger_is_not_accused(name: str) -> None:
+    subject = Subject(name, lambda *, penalty: RIGHT_STIFFNESSES[name](penalty=penalty))
+    for case in CASES.values():
+        judge_as(Verdict.PASS, SCALE, case, subject)
+
+
+def test_springs_that_lose_both_ends_to_roundoff_pass() -> None:
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        ends = np.zeros(interface.n_nodes, bool)
+        ends[interface.slave.segments[interface.slave.neighbours < 0]] = True
+        return np.where(np.repeat(ends, 2), 0.0, right(interface, pairing, z))
+
+    subject = Subject(
+        "open ends", lambda *, penalty: change_verbs(contactverif_nts.nts(penalty=penalty), residual=residual)
+    )
+    for case in CASES.values():
+        judge_as(Verdict.PASS, SCALE, case, subject)
+
+
+def test_a_law_that_is_not_linear_has_no_stiffness_and_is_not_judged() -> None:
+    outcome = judge_case(SCALE, CASES["8 segments"], Subject("soft", lambda *, penalty: Softened(penalty)))
+    assert outcome.verdict is Verdict.PASS
+    assert outcome.measurement is not None
+    assert not outcome.measurement.numbers
+    assert 0 < outcome.measurement.details["springs over ε̂ L"] < 0.5
+
+
+def test_multipliers_and_barriers_are_not_asked() -> None:
+    assert SCALE.refusal(load_subject("nts-lm").traits)
+    assert SCALE.refusal(Traits(rules=Rules(enforcement="barrier")))
+    assert not SCALE.refusal(SILENT)
+    assert SCALE.promise(SILENT)
+
+
+def test_surfaces_are_equally_long_with_segments_of_the_mean_length_1() -> None:
+    for case in CASES.values():
+        along, interface = [Fraction(place) for place in case.parameters["along"].tolist()], case.interface
+        slave, master = along[: interface.n_slave_nodes], along[interface.n_slave_nodes :]
+        assert (min(slave), max(slave)) == (min(master), max(master))
+        assert len(interface.slave) == len(interface.master) == max(slave) - min(slave) >= 8
+        assert len(set(slave) & set(master)) == 2  # The ends.
+
+
+TILTED_IDS = ("patch.tilted.resultant", "patch.tilted.nodal", "locality.bend")
+TILTED_EXAMPLES = 8
+
+
+MASTER = {"force_along": "master normal", "local": True}
+SLAVE = {"force_along": "slave normal", "local": True}
+RIGHT_TILTED = {  # Beside all `STRANGERS`, which `test_strangers.py` asks.
+    **{
+        make.__name__: with_promises(make, **(SLAVE if make.traits.rules.gap == "slave normal" else MASTER))
+        for make in (PointsFirst, TurnedFrame, SlaveNormalAtGaussPoints, NearbyOnly)
+    },
+    **{
+        f"Gauss springs, {name}": with_promises(
+            partial(GaussSprings, way=way, before=before),
+            gap="closest point",
+            integrates_linear_gap=True,
+            translation_stable=True,
+            **MASTER,
+        )
+        for name, (way, before) in RIGHT.items()
+    },
+    "textbook springs about the mean of all nodes": with_promises(CentredSprings, integrates_linear_gap=True, **MASTER),
+    "textbook cells": with_promises(ClippedCells, integrates_linear_gap=True, **SLAVE),
+    "textbook mortar": with_promises(WeightedGaps, **SLAVE),
+}
+
+
+def cases_of(property_id: str, examples: int = TILTED_EXAMPLES) -> tuple[Case, ...]:
+    return draw_cases(load_property(property_id).cases(None), seed=f"straight/{property_id}", examples=examples).cases
+
+
+@pytest.mark.parametrize("property_id", TILTED_IDS)
+@pytest.mark.parametrize("name", RIGHT_TILTED)
+def test_a_right_formulation_of_a_stranger_is_not_accused(name: str, property_id: str) -> None:
+    question, subject = load_property(property_id), RIGHT_TILTED[name]
+    if question.promise(subject.traits) is None:
+        return
+    for case in cases_of(property_id):
+        judge_as(Verdict.PASS, question, case, subject)
+
+
+def test_all_slaves_are_straight_tilted_and_wholly_in_contact() -> None:
+    for case in cases_of("patch.tilted.resultant", 60):
+        master, slave = directions(case)
+        angle = np.degrees(np.arccos(float(master @ slave)))
+        assert 34 < angle < 89.1 if case.kind == STEEP else 3 < angle < 35
+        assert (node_gaps(case) < 0).all()
+        n, points = case.interface.n_slave_nodes, case.positions
+        heights = (points[:n] - points[0]) @ slave, (points[n:] - points[n]) @ master
+        for side in heights:
+            assert np.ptp(side) <= 2.0**-50 * case.largest_coordinate
+
+
+def test_half_of_the_steep_slaves_are_tilted_by_80_to_88_degrees_and_no_gap_is_longer_than_two_segments() -> None:
+    cases = [case for case in cases_of("patch.tilted.resultant", 200) if case.kind == STEEP]
+    assert len(cases) == 100
+    cosines = np.array([float(np.multiply(*directions(case)).sum()) for case in cases])
+    assert (np.abs(np.degrees(np.arccos(cosines)) - 84) < 4).sum() >= 40
+    for case, cosine in zip(cases, cosines, strict=True):
+        deepest = -float(node_gaps(case).min()) / cosine
+        assert deepest < 2 * case.interface.master.lengths(case.positions).min()
+
+
+def test_only_who_states_no_rule_for_gaps_may_overlook_a_steep_slave() -> None:
+    class Blind(ClippedCells):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return np.zeros_like(z)
+
+    question = load_property("patch.tilted.resultant")
+    cases = {case.kind: case for case in cases_of(question.id)}
+    assert set(cases) == {TILTED, STEEP}
+    for kind, gap, verdict in (
+        (STEEP, None, Verdict.PASS),
+        (TILTED, None, Verdict.FAIL),
+        (STEEP, "slave normal", Verdict.FAIL),
+    ):
+        judge_as(verdict, question, cases[kind], with_promises(Blind, force_along="slave normal", gap=gap))
+
+
+def tilted_segment() -> Case:
+    """One slave segment from (0, −1) to (4, −4) below a master on the x-axis: gaps −1 and −4, length 5."""
+    nodes = np.array([[0.0, -1.0], [4.0, -4.0], [16.0, 0.0], [-16.0, 0.0]])
+    interface = Interface.from_chains(nodes[:2] * [1, 0], nodes[2:])
+    return Case(interface, nodes.reshape(-1), penalty=2.0)
+
+
+def test_the_exact_forces_are_those_of_a_hand_calculation() -> None:
+    case, traits = tilted_segment(), load_subject("vts-g").traits
+    assert exact_slave_forces(case, traits) == pytest.approx(np.array([[0, 10.0], [0, 15.0]]))
+    # Along the slave's normal, with cosine 4/5, gaps are 5/4 as long.
+    assert exact_slave_forces(case, load_subject("sts").traits) == pytest.approx(
+        1.25 * np.array([[6.0, 8.0], [9.0, 12.0]])
+    )
+    reference = load_subject("nts-ar:area=reference").traits
+    assert exact_slave_forces(case, reference).sum(axis=0) == pytest.approx([0, 20.0])
+
+
+def test_a_force_along_the_other_normal_is_told_by_its_direction() -> None:
+    question = load_property("patch.tilted.resultant")
+    outcome = judge_case(question, tilted_segment(), with_promises(ClippedCells, force_along="master normal"))
+    assert outcome.verdict is Verdict.FAIL
+    assert outcome.reason.startswith("part of the force off the normal 0.6")
+
+
+@pytest.mark.parametrize("name", ["nts-ar", "vts-ppt-balanced", "sts", "mortar", "two-pass/nts", "nts-lm"])
+def test_our_own_formulations_keep_every_bit_beside_a_bend(name: str) -> None:
+    for case in cases_of("locality.bend"):
+        measurement = load_property("locality.bend").measure(case, load_subject(name))
+        assert measurement.details[BITS] == 0
+        assert not measurement.idle
+
+
+def test_a_factor_at_a_free_end_is_named() -> None:
+    case = named_case("c")
+    exact = forces_of_penetration(case)
+    wrong = exact.copy()
+    wrong[0] *= 2
+    finding = worst_force(case.interface, wrong, exact)
+    assert finding.place == "slave node 0 (free end)"
+    assert finding.found == pytest.approx(2 * np.array(finding.right))
+    assert finding.remark == "ratio 2"
+    assert str(finding).startswith("slave node 0 (free end): force ")
+
+
+def test_a_force_the_other_way_has_a_negative_ratio() -> None:
+    case = named_case("c")
+    exact = forces_of_penetration(case)
+    assert worst_force(case.interface, -exact, exact).remark == "ratio -1"
+
+
+@pytest.mark.parametrize("share", [2.0**-40, -(2.0**-40)])
+def test_a_ratio_that_four_digits_call_1_says_by_how_much_it_is_not(share: float) -> None:
+    case = named_case("c")
+    exact = forces_of_penetration(case)
+    remark = worst_force(case.interface, exact * (1 + share), exact).remark
+    assert remark == f"ratio 1 {'+' if share > 0 else '−'} 9.1e-13"
+
+
+def test_a_force_aside_has_both_components() -> None:
+    case = named_case("c")
+    exact = forces_of_penetration(case)
+    wrong = exact + np.where(np.arange(len(exact)) == case.interface.n_slave_nodes, 1.0, 0.0)[:, None] * exact.max()
+    wrong[:, 0] += np.abs(exact).max() * (np.arange(len(exact)) == 1)
+    finding = worst_force(case.interface, wrong, exact)
+    assert len(finding.found) == 2
+    assert "x and y" in finding.place
+
+
+def test_nothing_beside_a_force_has_no_ratio() -> None:
+    finding = total_force(np.array([0.0, 2.0]), np.zeros(2))
+    assert (finding.found, finding.right, finding.remark) == ((2.0,), (0.0,), "")

@@ -1,4 +1,4 @@
-"""The order of Newton's method: fits of known laws, and what scenes show about a tangent."""
+"""`newton.order`, `newton.history`, `newton.units` and `newton.attainable`."""
 
 from dataclasses import replace
 from math import inf, isnan
@@ -9,20 +9,28 @@ import pytest
 from subjects import Changed, change_verbs, judge_as, load_subject
 
 import contactverif_nts
-from contactverif import End, Rectangle, Subject, Trace, Verdict, judge_case, solve, two_blocks
+from contactverif import Case, End, Rectangle, Subject, Trace, Traits, Verdict, judge_case, solve, two_blocks
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.pairing import Pairing
+from contactverif.mechanics.changed_scenes import snap
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.run import run
+from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.solids import solid_cases
 from contactverif_properties.newton_method import (
     DISTANCES,
+    OFFSETS,
     SERIES,
+    STEPS,
+    examine,
     fit_order,
     newton_attainable,
     newton_history,
     newton_order,
+    newton_units,
+    settle,
     spectral_radius,
 )
 
@@ -203,3 +211,97 @@ def test_entries_of_the_pairing_that_change_no_force_leave_nothing_undecided() -
             run([each], [question], examples=12, seed=3, shrink="none").rows for each in (inner, noisy)
         )
         assert (row.verdict, row.undecided) == (Verdict.PASS, quiet_row.undecided)
+
+
+def draw(examples: int) -> tuple[Case, ...]:
+    strategy = solid_cases()
+    assert strategy is not None
+    return draw_cases(strategy, seed="units", examples=examples).cases
+
+
+@pytest.mark.parametrize("name", ["nts", "vts-ppt", "mortar", "nts-lm"])
+def test_who_uses_the_four_operations_and_square_roots_takes_the_same_steps_to_the_last_bit(name: str) -> None:
+    for case in draw(8):
+        measurement = newton_units.measure(case, load_subject(name))
+        assert measurement.values == {STEPS.name: 0.0}
+        assert not measurement.broken
+        assert measurement.details["steps that agree to the last bit"] == measurement.details["iterations"]
+
+
+def make_with_angles(*, penalty: float) -> Any:
+    """Return a right formulation, times a power and an angle that equal 1 but for rounding."""
+    inner = contactverif_nts.vts_me(penalty=penalty)
+
+    def evaluate_one(positions: Any) -> Any:
+        along = positions[2:4] - positions[0:2]
+        length = np.exp(np.log(along @ along) / 2)
+        angle = np.arctan2(along[1], along[0])
+        return length * np.hypot(np.cos(angle), np.sin(angle)) / np.sqrt(along @ along)
+
+    def residual(interface: Any, pairing: Any, z: Any) -> Any:
+        return evaluate_one(z) * inner.residual(interface, pairing, z)
+
+    return Changed(inner, residual=residual, traits=inner.traits.revise(batched=False, takes_complex=False))
+
+
+def test_a_power_and_an_angle_are_not_accused() -> None:
+    subject = Subject("angles", make_with_angles)
+    outcomes = [judge_case(newton_units, case, subject) for case in draw(25)]
+    assert all(outcome.verdict is not Verdict.FAIL for outcome in outcomes)
+    values = [outcome.measurement.values[STEPS.name] for outcome in outcomes if outcome.measurement]
+    assert max(values) > 0
+
+
+def test_another_pairing_in_other_units_is_told_in_words() -> None:
+    def make(*, penalty: float) -> Any:
+        inner = contactverif_nts.nts(penalty=penalty)
+
+        def pair(interface: Any, z: Any) -> Any:
+            pairing = inner.pair(interface, z)
+            long = np.abs(z).max() > 1e3  # The limit has a unit.
+            return {**pairing, "active": pairing["active"] & long}
+
+        return Changed(inner, pair=pair)
+
+    outcomes = [judge_case(newton_units, case, Subject("limit", make)) for case in draw(10)]
+    assert any("the pairing is another one in other units" in outcome.reason for outcome in outcomes)
+
+
+def test_who_does_not_state_the_unit_of_its_penalty_is_not_asked() -> None:
+    assert "unit is unknown" in newton_units.refusal(Traits())
+    assert "not independent" in newton_units.refusal(load_subject("vts-ppt-lm").traits)
+
+
+# Virtual slave nodes lie off master nodes, and nothing of the scene is a multiple of the way.
+SCENE = "c-prime:penalty=1e4"
+
+
+def test_the_error_of_the_solution_grows_with_the_way() -> None:
+    details = newton_attainable.measure(load_scene_case(SCENE), load_subject("nts")).details
+    errors = [details[f"error over the shortest segment at 2^{power}"] for power in OFFSETS]
+    assert errors[-1] > 1e3 * errors[0]
+    assert errors[-1] < 1e-8
+
+
+def test_who_promises_nothing_breaks_nothing() -> None:
+    assert newton_attainable.promise(load_subject("nts").traits.revise(translation_stable=None)) is None
+    assert newton_attainable.promise(load_subject("nts").traits.revise(translation_stable=True)) is True
+
+
+def test_a_matrix_without_inverse_is_undecided() -> None:
+    case = load_scene_case(SCENE)
+    system = System(scene_of(case), load_subject("nts").for_case(case))
+    slave, master = system.scene.condensed_bodies
+    apart = np.concatenate([slave.unknowns % 2, -(master.unknowns % 2)]).astype(np.float64)
+    assert examine(system, case, apart) is None  # The slave hangs free, above the master.
+
+
+def test_the_roundoff_grows_with_the_distance_alone() -> None:
+    case = load_scene_case(SCENE)
+    system = System(snap(scene_of(case), 2.0**-20), load_subject("nts").for_case(case))
+    solution = examine(system, case, system.scene.start)
+    assert solution is not None
+    assert (solution.roundoff(0.0) == 2.0**-50 * solution.terms).all()
+    added = solution.roundoff(2.0**30) - solution.roundoff(2.0**29)
+    assert added == pytest.approx(2.0**29 * 2.0**-50 * solution.contact)
+    assert settle(solution, case, [2.0**20])[0].added <= 1.0
