@@ -63,7 +63,7 @@ def limits_of(
 def _strongest(wanted: Isolation | None, opened: tuple[str, ...], argument: str) -> Isolation:
     """Return the place that the user wants, which must be possible, or else the safest that is."""
     from contactverif.isolation.box import Box, why_no_box
-    from contactverif.isolation.landlock import landlock_version
+    from contactverif.isolation.confine import landlock_version
 
     reason = "" if wanted is Isolation.LANDLOCK else why_no_box(Box(opened))
     if reason and wanted is Isolation.BOX:
@@ -78,7 +78,7 @@ def _strongest(wanted: Isolation | None, opened: tuple[str, ...], argument: str)
 
 def _absolute(opened: Iterable[str]) -> list[str]:
     """Return what is open by absolute paths, each of which must exist."""
-    from contactverif.isolation.landlock import NETWORK
+    from contactverif.isolation.confine import NETWORK
 
     paths = [path if path == NETWORK else os.path.abspath(path) for path in opened]
     for path in paths:

@@ -19,7 +19,7 @@ from contactverif.contract.property import Property, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import end_all
-from contactverif.isolation.remote_formulation import RemoteSubject
+from contactverif.isolation.remote import RemoteSubject
 from contactverif.run.ranking import by_rank
 
 if TYPE_CHECKING:

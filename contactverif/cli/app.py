@@ -34,7 +34,7 @@ from contactverif.cli.stability_command import stability
 from contactverif.cli.verify_command import verify
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.foreign_text import name_line, one_line
-from contactverif.isolation.one_thread import ONE_THREAD
+from contactverif.isolation.confine import ONE_THREAD
 
 app = typer.Typer(
     help="Find out whether a contact formulation is right: random meshes, exact answers, small counterexamples.",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from contactverif.contract.result import NotLoaded
     from contactverif.contract.subject import Subject
     from contactverif.contract.traits import Traits
-    from contactverif.isolation.loading import Wrapper
+    from contactverif.isolation.remote import Wrapper
 
 _YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
     ("normal", "passes with node on node", "fails with node on node"),

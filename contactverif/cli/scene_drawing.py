@@ -15,8 +15,8 @@ from contactverif.cli.output_files import SOLVED_SCENE, OutputFiles
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError
+from contactverif.isolation.file_reader import check_ordinary
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.ordinary import check_ordinary
 from contactverif.mechanics.scene import has_bodies
 from contactverif.plugins.registry import formulation_names, load_formulation, the_formulation, the_property
 from contactverif.problems.catalogue import load_scene

@@ -3,6 +3,9 @@
 Rules: in the box nothing can be written but a temporary folder, a store of compiled kernels, and what the user opens.
 No process, no network, no terminal and no other shared memory is seen there, and nothing of it outlives its process.
 What the box needs is tried before a plugin runs in it, so that no plugin is blamed for a box that cannot be made.
+A control group limits all of its processes together, where this user may make one; else each has limits alone.
+
+The temporary files of plugins without a box lie in a folder that goes with the judge's process or with the next one.
 """
 
 from __future__ import annotations
@@ -12,19 +15,31 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
+import uuid
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
+from time import monotonic, sleep, time
 
-from contactverif.isolation.control_group import MOST_PROCESSES
-from contactverif.isolation.landlock import NETWORK, WRITABLE, landlock_version
+from contactverif.isolation.confine import NETWORK, PROCESSES, WRITABLE, landlock_version
 
-PROCESSES = "CONTACTVERIF_PROCESSES"  # The environment variable with the most processes and threads in a box.
 _SECONDS_TO_TRY = 10.0
 _INSTALL = "install the package bubblewrap of the system, or contactverif[box]"
 _ALLOW = "allow user namespaces, see 'What a plugin can do' in the documentation"
+MOST_PROCESSES = 512  # Processes and threads.
+_BASE_MEMORY = 512 << 20  # Bytes beyond the limit of memory, for Python and what it has loaded.
+_GROUP_PREFIX = "contactverif-"
+_SECONDS_TO_END = 10.0
+_SECONDS_TO_JOIN = 60.0
+_ROOT = Path("/sys/fs/cgroup")
+# The shell joins the groups, and becomes the program: from its first moment on all that it starts is in them.
+_JOIN = 'while [ "$1" != -- ]; do echo $$ > "$1/cgroup.procs"; shift; done; shift; exec "$@"'
+_FOLDER_PREFIX = "contactverif-plugins-"
+_LOCK = ".held"
+_locks: list[int] = []  # The descriptor of the lock of this process.
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,3 +184,102 @@ def _hide(path: str) -> list[str]:
     if os.path.isdir(path):
         return ["--tmpfs", os.path.realpath(path)]
     return ["--ro-bind", os.devnull, os.path.realpath(path)] if os.path.exists(path) else []
+
+
+class ControlGroup:
+    """The folders in which the system keeps a group, one for each thing that it limits; none where it may not be."""
+
+    def __init__(self, megabytes: int) -> None:
+        name = f"{_GROUP_PREFIX}{uuid.uuid4().hex}"
+        limits = {"memory": (megabytes << 20) + _BASE_MEMORY, "pids": MOST_PROCESSES}
+        self.folders: list[Path] = []
+        for controller, parent in _find_parents():
+            for abandoned in parent.glob(f"{_GROUP_PREFIX}*"):  # One that is new may be about to get its first process.
+                with suppress(OSError):
+                    if time() - abandoned.stat().st_mtime > _SECONDS_TO_JOIN:
+                        abandoned.rmdir()
+            with suppress(OSError):
+                folder = parent / name
+                folder.mkdir(exist_ok=True)
+                self.folders += [folder] if folder not in self.folders else []
+                # The file has another name in each version of the system's interface.
+                for file in ("memory.max", "memory.limit_in_bytes", "pids.max"):
+                    if file.startswith(controller) and (folder / file).exists():
+                        (folder / file).write_text(str(limits[controller]))
+
+    def join(self, command: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the command that runs a command in the group."""
+        return ("/bin/sh", "-c", _JOIN, "sh", *map(str, self.folders), "--", *command) if self.folders else command
+
+    def remove(self) -> None:
+        """Remove the group, once its processes have ended; the system takes a moment for that."""
+        deadline = monotonic() + _SECONDS_TO_END
+        while self.folders and not _remove(self.folders[-1]) and monotonic() < deadline:
+            sleep(0.01)
+        self.folders = [folder for folder in self.folders if not _remove(folder)]
+
+
+def _remove(folder: Path) -> bool:
+    """Remove a group without processes; return whether it is gone."""
+    with suppress(OSError):
+        folder.rmdir()
+    return not folder.exists()
+
+
+def _find_parents() -> Iterator[tuple[str, Path]]:
+    """Yield (what is limited, the folder in which a group for it may be made)."""
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+    except OSError:  # Only Linux has control groups.
+        return
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        for controller in {"memory", "pids"} & set(controllers.split(",")):
+            yield controller, _ROOT / controller / path.lstrip("/")
+        if not controllers and path != "/":  # The second version: a group with processes has none below it.
+            parent = (_ROOT / path.lstrip("/")).parent
+            with suppress(OSError):
+                enabled = (parent / "cgroup.subtree_control").read_text().split()
+                yield from ((controller, parent) for controller in ("memory", "pids") if controller in enabled)
+
+
+def may_group() -> bool:
+    """Return whether a group can be made here."""
+    return any(os.access(parent, os.W_OK) for _, parent in _find_parents())
+
+
+@cache
+def plugin_folder() -> str:
+    """Return the folder of this process of the judge."""
+    # A process that is killed removes nothing. The lock of a folder ends with the process that made it.
+    for path in Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"):
+        with suppress(OSError):  # It belongs to another user, or a process has just made it or holds it.
+            descriptor = os.open(path / _LOCK, os.O_RDWR)
+            try:
+                _lock(descriptor)
+            finally:
+                os.close(descriptor)
+            shutil.rmtree(path, ignore_errors=True)
+    folder = tempfile.mkdtemp(prefix=_FOLDER_PREFIX)
+    with suppress(OSError):
+        _locks.append(os.open(os.path.join(folder, _LOCK), os.O_CREAT | os.O_RDWR, 0o600))
+        _lock(_locks[-1])
+    return folder
+
+
+def remove_plugin_folder() -> None:
+    """Remove the folder, if this process has one."""
+    if plugin_folder.cache_info().currsize:
+        shutil.rmtree(plugin_folder(), ignore_errors=True)
+        plugin_folder.cache_clear()
+    while _locks:
+        os.close(_locks.pop())
+
+
+def _lock(descriptor: int) -> None:
+    """Lock an open file for this process alone, or raise an OSError."""
+    try:
+        import fcntl
+    except ImportError:
+        raise OSError("no locks on this system") from None
+    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

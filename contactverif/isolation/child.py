@@ -1,28 +1,120 @@
-"""A child process and the line to it: started, limited, and ended, for plugins and for files of strangers.
+"""A child process and the line to it, for plugins and for files of strangers: started, spoken to, and ended.
 
-Rule: a child is a session of its own, so that all of it can be ended, and Ctrl-C reaches the parent alone.
+Rules: a child is a session of its own, so that all of it can be ended, and Ctrl-C reaches the parent alone. Over the
+line go frames of bytes: eight bytes of length, little-endian, then the bytes. The other end may send anything, or
+nothing, or a byte now and then. So a frame has a deadline for all of it, and no memory is taken before its bytes come.
 """
 
 from __future__ import annotations
 
 import os
+import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from math import ceil, inf
 from time import perf_counter, sleep
-from typing import Any
 
-from contactverif.isolation.channel import Channel
-from contactverif.isolation.limits import MEGABYTE
+from contactverif.isolation.confine import SOCKET
 
 # A fork takes milliseconds, since everything is imported already. On macOS a fork may crash in the system's own code.
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"
-SOCKET = "CONTACTVERIF_SOCKET"  # The environment variable with the number of the child's end of the line.
 _SECONDS_TO_DIE = 5.0
+_LENGTH = struct.Struct("<Q")
+_PIECE = 1 << 16
+_LARGEST_PIECE = 1 << 22
+
+
+class ClosedError(Exception):
+    """The other end is closed."""
+
+
+class TooLateError(Exception):
+    """The deadline has passed."""
+
+
+class TooLargeError(Exception):
+    """A frame is longer than it may be."""
+
+
+class Channel:
+    """One end of a socket, which takes frames of at most `largest` bytes."""
+
+    def __init__(self, end: socket.socket, largest: int = 1 << 62) -> None:
+        end.setblocking(False)
+        self._end, self._largest = end, largest
+        self._file = end.fileno()
+        self._rest = b""
+        self._polls = {event: select.poll() for event in (select.POLLIN, select.POLLOUT)}
+        for event, poll in self._polls.items():
+            poll.register(self._file, event)
+
+    def send(self, frame: bytes, seconds: float = inf) -> None:
+        """Send a frame, or raise a ClosedError, or a TooLateError if the other end does not read all of it in time."""
+        data = memoryview(_LENGTH.pack(len(frame)) + frame)
+        deadline = perf_counter() + seconds
+        while data:
+            try:
+                data = data[os.write(self._file, data[:_LARGEST_PIECE]) :]
+            except BlockingIOError:
+                self._wait(select.POLLOUT, deadline)
+            except OSError:
+                raise ClosedError from None
+
+    def receive(self, seconds: float = inf, largest: int | None = None) -> bytes:
+        """Return the next frame, or raise one of the errors above. What has come too late is kept for the next call.
+
+        `largest` is a limit of bytes for this frame, where it is less than that of all.
+        """
+        deadline = perf_counter() + seconds
+        data = self._rest or self._read(_PIECE, deadline)
+        end = _LENGTH.size + _LENGTH.unpack_from(data)[0] if len(data) >= _LENGTH.size else 1 << 63
+        if end > len(data):
+            head = self._gather(data, _LENGTH.size, deadline)
+            length = int(_LENGTH.unpack_from(head)[0])
+            if length > (most := min(self._largest, largest or self._largest)):
+                raise TooLargeError(f"{length} bytes; needed at most {most}")
+            end = _LENGTH.size + length
+            data = self._gather(head, end, deadline)
+        self._rest = data[end:]
+        return data[_LENGTH.size : end]
+
+    def _gather(self, data: bytes, size: int, deadline: float) -> bytes:
+        """Return the data and what follows it, so many bytes at least."""
+        parts, have = [data], len(data)
+        while have < size:
+            try:
+                parts.append(self._read(min(max(size - have, _PIECE), _LARGEST_PIECE), deadline))
+            except TooLateError:
+                self._rest = b"".join(parts)
+                raise
+            have += len(parts[-1])
+        return b"".join(parts)
+
+    def _read(self, size: int, deadline: float) -> bytes:
+        self._wait(select.POLLIN, deadline)
+        try:
+            data = os.read(self._file, size)
+        except OSError:
+            data = b""
+        if not data:
+            raise ClosedError
+        return data
+
+    def _wait(self, event: int, deadline: float) -> None:
+        """Wait until the socket can be read or written."""
+        left = None if deadline == inf else max(0, ceil(1000 * (deadline - perf_counter())))
+        if not self._polls[event].poll(left):
+            raise TooLateError
+
+    def close(self) -> None:
+        """Close this end."""
+        self._end.close()
 
 
 class Child:
@@ -125,32 +217,6 @@ class _Fork:
 def socket_of_parent() -> socket.socket:
     """Return the child's end of the line, in a program that `Child.start` has started."""
     return socket.socket(fileno=int(os.environ[SOCKET]))
-
-
-def limit_memory(megabytes: int) -> None:
-    """Limit the address space of this process beyond what it has, and write no image of it when it crashes."""
-    resource: Any
-    try:
-        import resource
-    except ImportError:  # Windows has no such limits.
-        return
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    with open("/proc/self/statm" if os.path.exists("/proc/self/statm") else os.devnull) as file:
-        pages = int((file.read().split() or ["0"])[0])
-    limit = pages * resource.getpagesize() + megabytes * MEGABYTE
-    _, most = resource.getrlimit(resource.RLIMIT_AS)
-    if most == resource.RLIM_INFINITY or limit < most:
-        with suppress(OSError, ValueError):  # Not every system has this limit.
-            resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-
-
-def limit_processes(most: int) -> None:
-    """Limit the processes and threads of this user's namespace; the system counts those of other namespaces apart."""
-    try:
-        import resource
-    except ImportError:  # Windows has no such limits.
-        return
-    resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
 
 
 def name_of_signal(number: int) -> str:

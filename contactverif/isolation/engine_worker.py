@@ -39,7 +39,7 @@ if __name__ == "__main__":  # The folder of this file holds modules of the harne
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, SceneArrays
-from contactverif.isolation.confinement import confine
+from contactverif.isolation.confine import SOCKET, confine
 from contactverif.isolation.plain_msgpack import decode, encode
 
 _LENGTH = struct.Struct("<Q")
@@ -49,7 +49,7 @@ _LONGEST = 500  # Characters of the words of an error.
 def main(make: Callable[[], Any]) -> None:
     """Answer the judge until it is gone."""
     confine()
-    line = socket.socket(fileno=int(os.environ["CONTACTVERIF_SOCKET"]))
+    line = socket.socket(fileno=int(os.environ[SOCKET]))
     stream, engine = line.makefile("rb"), None
     while head := stream.read(_LENGTH.size):
         replies = []

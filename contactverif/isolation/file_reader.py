@@ -12,25 +12,51 @@ import importlib
 import io
 import os
 import signal
+import stat
 import sys
 from collections.abc import Callable
 from functools import partial
 
+from contactverif.contract.errors import MisuseError
 from contactverif.isolation import child
-from contactverif.isolation.channel import Channel, ClosedError, TooLargeError, TooLateError
-from contactverif.isolation.child import Child, limit_memory, name_of_signal, socket_of_parent
-from contactverif.isolation.limits import MEGABYTE, Limits
-from contactverif.isolation.parent_death import die_with_parent
+from contactverif.isolation.child import Channel, Child, ClosedError, TooLargeError, TooLateError, name_of_signal
+from contactverif.isolation.confine import MEGABYTE, die_with_parent, limit_memory
+from contactverif.isolation.limits import Limits
 
 _READ, _FAILED = b"+", b"-"  # The first byte of an answer.
 _LONGEST_REASON = 300  # Characters of a message from a library.
 # meshio reads a million nodes of a text format in 10 s, and the arrays of so many are 0.1 GB. A report with a million
 # cases takes half a minute and 1 GB. Both files have tens of megabytes.
 _LEAST_SECONDS, _BYTES_A_SECOND, _MEGABYTES = 20.0, 1e6, 4096
+_NOT_ORDINARY = {
+    stat.S_IFDIR: "which is a folder",
+    stat.S_IFIFO: "which is a pipe",
+    stat.S_IFSOCK: "which is a socket",
+    stat.S_IFCHR: "which is a device",
+    stat.S_IFBLK: "which is a device",
+}
 
 
 class ReadError(Exception):
     """The child could not read the file; the message is one line."""
+
+
+def check_ordinary(path: str | os.PathLike[str], argument: str, needed: str) -> os.stat_result:
+    """Check that a name is that of an ordinary file that may be read: no folder, no pipe, and no device."""
+    name = os.fspath(path)
+    try:
+        status = os.stat(path)
+        kind = _NOT_ORDINARY.get(stat.S_IFMT(status.st_mode), "")
+        if not kind:
+            with open(path, "rb"):
+                return status
+    except FileNotFoundError:
+        kind = "which does not exist"
+    except OSError as error:
+        kind = f"which cannot be read ({error.strerror})"
+    except ValueError as error:  # A name with NUL.
+        kind = f"which is no name of a file ({error})"
+    raise MisuseError(argument, f"{name}, {kind}", needed)
 
 
 def limits_for(size: int) -> Limits:
@@ -79,7 +105,10 @@ def _answer(reader: str, path: str, limits: Limits, channel: Channel) -> None:
     faulthandler.disable()  # A crash is told by its status, and not by a traceback.
     _discard_outputs()
     function = _load(reader)
-    _end_without_parent(limits)
+    die_with_parent()
+    with contextlib.suppress(AttributeError, ValueError):  # Nobody may wait any more, but not every system has alarms.
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(int(limits.seconds) + 2)
     limit_memory(limits.memory)
     try:
         answer = _READ + function(path)
@@ -99,15 +128,7 @@ def _discard_outputs() -> None:
     sys.stdout = sys.stderr = io.StringIO()
 
 
-def _end_without_parent(limits: Limits) -> None:
-    """Let this process end by itself where nobody waits for it any more."""
-    die_with_parent()
-    with contextlib.suppress(AttributeError, ValueError):  # Not every system has alarms.
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(int(limits.seconds) + 2)
-
-
 if __name__ == "__main__":
     _, _reader, _path, _seconds, _memory = sys.argv
-    _answer(_reader, _path, Limits(float(_seconds), int(_memory)), Channel(socket_of_parent()))
+    _answer(_reader, _path, Limits(float(_seconds), int(_memory)), Channel(child.socket_of_parent()))
     os._exit(0)

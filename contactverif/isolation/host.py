@@ -25,7 +25,8 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.lockstep import wait_in_lockstep
-from contactverif.isolation.messages import (
+from contactverif.isolation.process import PINNING, PluginProcess, Question, end_marked
+from contactverif.isolation.wire import (
     MOST_QUESTIONS,
     Answer,
     Ask,
@@ -34,18 +35,16 @@ from contactverif.isolation.messages import (
     Load,
     Loaded,
     Make,
+    PackedArray,
     Reply,
     Request,
     ShareInterface,
     SharePairing,
     Solve,
     Solved,
-    encode_part,
+    encode_one,
     join,
 )
-from contactverif.isolation.one_core import JUDGE
-from contactverif.isolation.packed import PackedArray
-from contactverif.isolation.process import PluginProcess, Question, end_marked
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
 _MOST_HANGS = 2  # After so many calls without an answer neither, in all of its processes.
@@ -269,13 +268,15 @@ class Host:
         most = MOST_QUESTIONS if known else 1
         frames: list[bytes] = []
         asked: list[Question] = []
+        size = 0
         for request, question in waiting:
-            frame = encode_part(request)
+            frame = encode_one(request)
             is_full = question is not None and len(asked) >= most
-            if frames and (is_full or sum(map(len, frames)) + len(frame) > _TOGETHER):
+            if frames and (is_full or size + len(frame) > _TOGETHER):
                 self._ask(process, frames, asked)
-                frames, asked = [], []
+                frames, asked, size = [], [], 0
             frames.append(frame)
+            size += len(frame)
             asked += [question] if question is not None else []
         self._ask(process, frames, asked)
 
@@ -389,7 +390,7 @@ def end_all() -> dict[str, bytes]:
     """End the processes of all plugins, and return the last words that those of each name printed."""
     for host in _HOSTS.values():
         host.end()
-    JUDGE.let_go()
+    PINNING.let_go()
     if _HOSTS:
         end_marked()
     printed = last_words() | _foreign_words

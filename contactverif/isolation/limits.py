@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.box import Box
 
-MEGABYTE = 2**20
 _START_FACTOR = 5.0  # Import, first calls and compilation take longer than what follows.
 
 

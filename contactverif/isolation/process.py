@@ -14,32 +14,24 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache, cached_property
 from multiprocessing import util
 from pathlib import Path
+from time import perf_counter
 from typing import IO
 
 import psutil
 
 from contactverif.contract.errors import PluginError
-from contactverif.isolation.active_clock import ActiveClock
-from contactverif.isolation.box import enclose, temporary_folder
-from contactverif.isolation.box import environment as box_environment
-from contactverif.isolation.channel import ClosedError, TooLargeError, TooLateError
-from contactverif.isolation.child import Child, name_of_signal
-from contactverif.isolation.confinement import MEMORY
-from contactverif.isolation.control_group import ControlGroup
-from contactverif.isolation.limits import MEGABYTE, Limits
-from contactverif.isolation.mapped_code import mapped_files
-from contactverif.isolation.messages import MessageError, Reply, decode_replies
-from contactverif.isolation.one_core import JUDGE
-from contactverif.isolation.one_thread import ONE_THREAD
-from contactverif.isolation.plugin_folder import plugin_folder, remove_plugin_folder
+from contactverif.isolation import box as boxes
+from contactverif.isolation.child import Child, ClosedError, TooLargeError, TooLateError, name_of_signal
+from contactverif.isolation.confine import MEGABYTE, MEMORY, ONE_THREAD, PROGRESS
+from contactverif.isolation.limits import Limits
+from contactverif.isolation.wire import MessageError, Reply, decode_replies
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
-PROGRESS = "CONTACTVERIF_PROGRESS"  # The number of an open file of one byte, see `docs/reference/protocol.md`.
 _run = uuid.uuid4().hex
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36
@@ -58,6 +50,11 @@ _SIGNALED = 128  # A box ends with this status plus the number of the signal tha
 _SETTINGS = ONE_THREAD | {"PYTHONDONTWRITEBYTECODE": "1"}
 # A second process of the same plugin differs in what no answer may depend on. The number of threads is not among it.
 _OTHER_SETTINGS = {"PYTHONHASHSEED": "4711"}
+_QUESTIONS_FIRST = 32  # The judge is not held to one core before so many questions.
+_SECONDS_ON_A_CORE = 0.5  # The judge waits so long at most for a core that another program took.
+_LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
+# A process that waits for a core uses at least this share of the time, so that it ends however many take the core.
+_LEAST_SHARE = 1 / 16
 
 
 class Question:
@@ -95,15 +92,15 @@ class PluginProcess:
         largest = min(limits.memory, _LARGEST_ANSWER) * MEGABYTE
         settings, files = _SETTINGS | (_OTHER_SETTINGS if second else {}), [self._progress.fileno()]
         encloses = limits.box is not None and not limits.box.by_rules
-        folder = temporary_folder() if encloses else plugin_folder()
-        numbers |= {"TMPDIR": folder} if limits.box is None else box_environment(limits.box, folder)
+        folder = boxes.temporary_folder() if encloses else boxes.plugin_folder()
+        numbers |= {"TMPDIR": folder} if limits.box is None else boxes.environment(limits.box, folder)
         self._group = None
         if limits.box is not None and encloses:
-            self._group = ControlGroup(limits.memory)
-            command = self._group.join(enclose(tuple(command), limits.box, limits.memory))
+            self._group = boxes.ControlGroup(limits.memory)
+            command = self._group.join(boxes.enclose(tuple(command), limits.box, limits.memory))
         self._encloses = encloses
         try:
-            with JUDGE.on_one_core():
+            with PINNING.on_one_core():
                 self._child = Child.start(
                     command, largest, environment=settings | numbers, files=files, output=self.output.end
                 )
@@ -174,11 +171,11 @@ class PluginProcess:
 
     def _follow(self) -> None:
         """Put the process on the core of the judge."""
-        JUDGE.ask()
-        if JUDGE.core not in (-1, self._core):
+        PINNING.ask()
+        if PINNING.core not in (-1, self._core):
             with suppress(OSError):
-                os.sched_setaffinity(self._worker_pid, {JUDGE.core})
-            self._core = JUDGE.core
+                os.sched_setaffinity(self._worker_pid, {PINNING.core})
+            self._core = PINNING.core
 
     @property
     def code_files(self) -> list[Path]:
@@ -267,6 +264,110 @@ def _file_of_one_byte() -> IO[bytes]:
     return os.fdopen(number, "r+b", buffering=0)
 
 
+class CpuPinning:
+    """The core that the judge and a plugin's process share, for one of the two always waits for the other.
+
+    To wake a process that sleeps on another core takes longer than most answers, and the system likes to wake a process
+    on a core that sleeps. So both are held on one core, and let go now and then for one question: then the system may
+    move the judge to a better core. A plugin's process starts on one core and stays on one, for what counts cores.
+
+    Attributes
+    ----------
+    core : int
+        The core that it is held on; −1 if it may run on any of its cores.
+    """
+
+    def __init__(self) -> None:
+        self.core = -1
+        self._n_questions = 0
+        self._cores: set[int] = set()
+        self._until = 0.0
+
+    def ask(self) -> None:
+        """Note that a question is about to be asked; let this process go if it was held long enough."""
+        self._n_questions += 1
+        if self._n_questions <= _QUESTIONS_FIRST or _LIBC is None:
+            return
+        now = perf_counter()
+        if self.core < 0:
+            self._cores = os.sched_getaffinity(0)
+            self._hold(int(_LIBC.sched_getcpu()), now)
+        elif now > self._until:
+            self.let_go()
+
+    def _hold(self, core: int, now: float) -> None:
+        self.core, self._until = core, now + _SECONDS_ON_A_CORE
+        with suppress(OSError):
+            os.sched_setaffinity(0, {core})
+
+    @contextmanager
+    def on_one_core(self) -> Iterator[None]:
+        """Open a block in which this process is on one core, so that a process that it starts there is held on it."""
+        self.let_go()
+        if _LIBC is not None:
+            self._cores = os.sched_getaffinity(0)
+            self._hold(int(_LIBC.sched_getcpu()), perf_counter())
+        try:
+            yield
+        finally:
+            self.let_go()
+
+    def let_go(self) -> None:
+        """Let this process run on any of its cores."""
+        if self.core >= 0:
+            self.core = -1
+            with suppress(OSError):
+                os.sched_setaffinity(0, self._cores)
+
+
+PINNING = CpuPinning()
+
+
+class ActiveClock:
+    """A clock that goes on with each look at a process and its descendants.
+
+    A process that sleeps, or was stopped, uses all of the time that passes. One that runs, or waits for a core, uses
+    the time that the processor has worked for it: on a busy machine that is less.
+
+    Attributes
+    ----------
+    seconds : float
+        The time used up since the first look.
+    """
+
+    def __init__(self, pid: int) -> None:
+        self._pid, self.seconds = pid, 0.0
+        self._before = perf_counter(), self._look()[1]
+
+    def look(self) -> None:
+        """Add the time that was used up since the last look."""
+        runs, processor = self._look()
+        now = perf_counter()
+        passed, worked = now - self._before[0], processor - self._before[1]
+        self.seconds += min(passed, max(worked, _LEAST_SHARE * passed)) if runs else passed
+        self._before = now, processor
+
+    def _look(self) -> tuple[bool, float]:
+        """Return whether one of the processes runs or is ready to, and the processor's time of all, ended ones too."""
+        runs, processor = False, 0.0
+        with suppress(psutil.Error):
+            root = psutil.Process(self._pid)
+            for process in (root, *root.children(recursive=True)):
+                with suppress(psutil.Error), process.oneshot():
+                    runs = process.status() == psutil.STATUS_RUNNING or runs
+                    processor += sum(process.cpu_times()[:4])
+        return runs, processor
+
+
+def mapped_files(pid: int | str) -> Iterator[Path]:
+    """Yield the files from which a process has mapped code."""
+    with suppress(OSError):  # It has ended, or the system has no such folder.
+        for line in os.fsdecode(Path(f"/proc/{pid}/maps").read_bytes()).split("\n"):
+            _, rights, *_, name = line.split(maxsplit=5) or ("", "", "")
+            if "x" in rights and name.startswith("/"):
+                yield Path(name)
+
+
 @cache
 def _end_at_exit() -> None:
     """Let this process end its plugins' processes when it ends. One of a pool does not call what `atexit` has."""
@@ -292,4 +393,4 @@ def end_marked() -> None:
             if os.getsid(process.pid) != os.getsid(0):
                 process.kill()
                 process.wait(_SECONDS_TO_DIE)
-    remove_plugin_folder()
+    boxes.remove_plugin_folder()

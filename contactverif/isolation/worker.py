@@ -1,19 +1,25 @@
 """The program of a plugin's process: it loads one formulation, and answers questions until its judge is gone.
 
 Rules: nothing of the judge comes here, no expected answer and no other plugin. A plugin may do to this process what it
-likes, so the judge checks every answer again. It is checked here first, so that an error has the same words as in the
-judge's own process.
+likes, so the judge checks every answer again. What cannot travel is checked here, and so is what the judge may not look
+into, so that an error has the same words as in the judge's own process.
 """
 
 from __future__ import annotations
 
 import mmap
 import os
+import shutil
+import signal
+import sys
+import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import fields
 from functools import partial
+from importlib import import_module
 from time import perf_counter
+from types import FrameType
 from typing import Any
 
 import msgspec
@@ -25,11 +31,18 @@ from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import CheckedFormulation, Subject, copy_entries
-from contactverif.isolation.channel import Channel, ClosedError
-from contactverif.isolation.child import FORKS, socket_of_parent
-from contactverif.isolation.confinement import confine
-from contactverif.isolation.messages import (
+from contactverif.contract.subject import CheckedFormulation, Subject, _call_plugin, _check_forces, copy_entries
+from contactverif.isolation.child import (
+    FORKS,
+    Channel,
+    Child,
+    ClosedError,
+    TooLargeError,
+    name_of_signal,
+    socket_of_parent,
+)
+from contactverif.isolation.confine import PROCESSES, PROGRESS, SOCKET, confine, die_with_parent, hide_memory
+from contactverif.isolation.wire import (
     Answer,
     Ask,
     Failure,
@@ -37,23 +50,27 @@ from contactverif.isolation.messages import (
     Load,
     Loaded,
     Make,
+    MessageError,
+    PackedArray,
     Reply,
     Request,
     ShareInterface,
     SharePairing,
     Unloaded,
     Wraps,
+    decode_replies,
     decode_requests,
     encode,
 )
-from contactverif.isolation.method_calls import MethodCalls
-from contactverif.isolation.packed import PackedArray
-from contactverif.isolation.process import PROGRESS
-from contactverif.isolation.survey_copy import survey_in_copy
 
+METHODS = frozenset({"pair", "residual", "tangent", "residual_and_tangent"})
 _SHORT = 1e-3  # Seconds. Other processes have used the caches before a call, so a shorter one is timed when repeated.
-COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.
+_COMPRESSED = ("data", "indices", "indptr")  # The arrays of a csr or csc matrix of scipy.
 _USUAL = (np.float64, np.int32, np.int64)
+_FORCES = ("<f8", "<c16")
+_LARGEST_SURVEY = 1 << 20  # Bytes of a reply. Traits are some hundred.
+_CHANGED = 113  # The status with which a process ends that a copy has changed.
+_FOLDERS = tempfile.gettempdir(), "/dev/shm"  # The folders that may be written in a box.
 
 Loader = Callable[[str], Any]  # {name: a `Subject`, a `NotLoaded`, or a `Wrapper`}.
 
@@ -61,7 +78,7 @@ Loader = Callable[[str], Any]  # {name: a `Subject`, a `NotLoaded`, or a `Wrappe
 def main(load: Loader, survey: Loader) -> None:
     """Answer the judge until it is gone. `survey` loads a name with the defaults of its options, also of a wrapper."""
     confine()
-    channel, desk = Channel(socket_of_parent()), Desk(load, survey)
+    channel, handler = Channel(socket_of_parent()), RequestHandler(load, survey)
     progress = mmap.mmap(int(os.environ[PROGRESS]), 1)
     while True:
         try:
@@ -71,14 +88,14 @@ def main(load: Loader, survey: Loader) -> None:
         replies: list[Reply] = []
         for request in decode_requests(data):
             progress[0] = len(replies)  # So the judge knows which call has ended this process.
-            reply = desk.reply(request)
+            reply = handler.reply(request)
             if reply is not None:
                 replies.append(reply)
         if replies:
             channel.send(encode(replies))
 
 
-class Desk:
+class RequestHandler:
     """The store of a plugin's process: the formulation, and by number its instances, interfaces and pairings."""
 
     def __init__(self, load: Loader, survey: Loader) -> None:
@@ -127,7 +144,7 @@ class Desk:
 
     def _load(self, request: Load) -> Reply:
         if request.survey and FORKS:
-            return survey_in_copy(partial(self._describe, request), request.question)
+            return _survey_in_copy(partial(self._describe, request), request.question)
         return self._describe(request)
 
     def _describe(self, request: Load) -> Reply:
@@ -157,6 +174,8 @@ class Desk:
             if ask.method == "pair":
                 answer: Any = formulation.own_pairing(interface, arguments[2])
                 self._store[ask.question] = answer
+            elif ask.method == "residual":
+                answer = _residual(formulation, *arguments)
             else:
                 answer = getattr(formulation, ask.method)(*arguments)
             if not ask.timed or watch.seconds > _SHORT:
@@ -165,9 +184,42 @@ class Desk:
         return Answer(ask.question, _pack(ask.method, answer), watch.seconds, watch.calls, handle=handle)
 
 
+def _residual(formulation: CheckedFormulation, interface: Interface, pairing: Any, z: Any) -> Any:
+    """Return the forces. The judge checks their shape and their numbers, so they are not checked twice."""
+    size = interface.n_unknowns + formulation.n_multipliers(interface)
+    if z.shape != (size,) or formulation.decides_anew(pairing):
+        return formulation.residual(interface, pairing, z)
+    forces = _call_plugin("residual", formulation.plugin.residual, interface, pairing, z)
+    return (
+        forces if type(forces) is np.ndarray and forces.dtype.str in _FORCES else _check_forces("residual", forces, z)
+    )
+
+
 def _plain(value: Any) -> Any:
     """Return a value of a trait that is of a kind that does not travel as one that does."""
     return dict(value) if isinstance(value, Mapping) else value.item()
+
+
+class MethodCalls:
+    """A block in which `count` grows by one for each call of a Python function that has the name of a method.
+
+    So it has those that a plugin calls itself. Unlike seconds they are the same on every machine.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._before: Any = None
+
+    def __enter__(self) -> MethodCalls:
+        self._before = sys.getprofile()
+        sys.setprofile(self._see)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.setprofile(self._before)
+
+    def _see(self, frame: FrameType, event: str, _: Any) -> None:
+        self.count += event == "call" and frame.f_code.co_name in METHODS
 
 
 class Stopwatch:
@@ -206,7 +258,7 @@ def _tangent_arrays(tangent: Any) -> dict[str, Any]:
         return {"dense": tangent}
     if tangent.format == "coo":
         return {name: getattr(tangent, name) for name in ("row", "col", "data")}
-    return {f"{tangent.format} {name}": getattr(tangent, name) for name in COMPRESSED}
+    return {f"{tangent.format} {name}": getattr(tangent, name) for name in _COMPRESSED}
 
 
 _POINTS = [entry.name for entry in fields(ContactPoints)]
@@ -222,7 +274,7 @@ _ARRAYS: dict[str, Callable[[Any], dict[str, Any]]] = {
 def _keep_compressed(verb: str, tangent: Any) -> Any:
     """Return a csr or csc matrix as the plugin made it, since the judge checks and copies it; else a checked copy."""
     if tangent.format in ("csr", "csc"):
-        parts = [getattr(tangent, name) for name in COMPRESSED]
+        parts = [getattr(tangent, name) for name in _COMPRESSED]
         if all(type(part) is np.ndarray and part.dtype in _USUAL for part in parts):
             return tangent
     return copy_entries(verb, tangent)
@@ -240,3 +292,88 @@ def _failure(question: int, error: BaseException) -> Failure:
         case MisuseError():
             return Failure(question, "misuse", "exception", (error.argument, error.found, error.needed))
     return Failure(question, "plugin", "exception", (f"its process: {describe_error(error)}",))
+
+
+def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
+    """Return the reply of a function that a copy of this process calls, or how the copy ended.
+
+    So no plugin sees what another one has done: the process that is copied loads none. If a copy has changed what the
+    next one would find, the process ends, too. Nothing ends the wait but the judge, if the reply is late.
+    """
+    hide_memory(hidden=True)
+    import_module("contactverif.geometry.chain_search")  # What most plugins import is imported once.
+    _end_what_is_left()
+    before = _state()
+    copy = Child.fork(partial(_send_description, describe, question), _LARGEST_SURVEY)
+    try:
+        (reply,) = decode_replies(copy.channel.receive(), loading=True)
+    except ClosedError:
+        status = copy.wait() or 0
+        words = f"its process ended with status {status}"
+        if status < 0:
+            words = f"{name_of_signal(-status)} ended its process"
+        return Failure(question, "plugin", "exit", (f"import: {words}",))
+    except (TooLargeError, MessageError, ValueError) as error:
+        return Failure(question, "plugin", "channel", (f"import: {error}",))
+    else:
+        return reply
+    finally:
+        copy.end()
+        _end_what_is_left()
+        if _has_changed(before):
+            os._exit(_CHANGED)
+
+
+def _send_description(describe: Callable[[], Reply], question: int, channel: Channel) -> None:
+    """Call the function in the copy, and send what it returns."""
+    os.close(int(os.environ[SOCKET]))  # The line of the process that was copied.
+    hide_memory(hidden=False)  # A plugin may want to look at itself.
+    die_with_parent()
+    try:
+        reply = describe()
+    except BaseException as error:  # A plugin may raise anything.
+        reply = Failure(question, "plugin", "exception", (f"import: {describe_error(error)}",))
+    channel.send(encode([reply]))
+
+
+def _end_what_is_left() -> None:
+    """End all other processes in the box and delete files. Without a box the judge does so when the survey is over."""
+    if PROCESSES in os.environ and os.getppid() == 1:  # Outside of a box these would be all of the user.
+        with suppress(ProcessLookupError):
+            os.kill(-1, signal.SIGKILL)
+        for folder in _FOLDERS:
+            with suppress(OSError, RecursionError):  # What cannot be deleted is a change.
+                _empty(folder)
+
+
+def _empty(folder: str) -> None:
+    """Delete what lies in a folder, whatever rights a plugin took from it."""
+    for place, folders, files in os.walk(folder):
+        for name in folders:
+            with suppress(OSError):
+                os.chmod(os.path.join(place, name), 0o700)
+        for name in files:
+            with suppress(OSError):
+                os.unlink(os.path.join(place, name))
+    for entry in os.scandir(folder):
+        shutil.rmtree(entry.path, ignore_errors=True)
+
+
+def _has_changed(before: tuple[object, ...]) -> bool:
+    """Return whether this process, or its box, is not as it was."""
+    try:
+        return _state() != before
+    except OSError:  # It may not open another file.
+        return True
+
+
+def _state() -> tuple[object, ...]:
+    """Return what a copy can change for those after it: the limits of this process, and the files in its box."""
+    if sys.platform == "win32":  # There are no copies, and no such limits.
+        return ()
+    import resource
+
+    limits = [resource.getrlimit(getattr(resource, name)) for name in dir(resource) if name.startswith("RLIMIT_")]
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
+    files = [os.listdir(folder) for folder in _FOLDERS] if PROCESSES in os.environ else []
+    return limits, cores, os.getpriority(os.PRIO_PROCESS, 0), files

@@ -19,9 +19,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.isolation.file_reader import ReadError, limits_for, read_in_child
-from contactverif.isolation.ordinary import check_ordinary
-from contactverif.isolation.packed import PackedArray
+from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
+from contactverif.isolation.wire import PackedArray
 
 # The cell data in which formats that number their groups store the numbers.
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "ugrid:ref", "su2:tag", "nastran:ref", "avsucd:material")

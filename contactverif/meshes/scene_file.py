@@ -18,9 +18,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
-from contactverif.isolation.file_reader import ReadError, limits_for, read_in_child
-from contactverif.isolation.ordinary import check_ordinary
-from contactverif.isolation.packed import PackedArray
+from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
+from contactverif.isolation.wire import PackedArray
 from contactverif.mechanics.packed_bodies import pack_bodies, unpack_bodies
 from contactverif.mechanics.scene import Scene
 

@@ -35,8 +35,14 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.box import kernel_folder
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import Wrapper, load_remote, python_program, survey
-from contactverif.isolation.remote_engine import engine_program, load_remote_engine
+from contactverif.isolation.remote import (
+    Wrapper,
+    engine_program,
+    load_remote,
+    load_remote_engine,
+    python_program,
+    survey,
+)
 
 if TYPE_CHECKING:
     from contactverif.problems.problem import Problem

@@ -25,7 +25,7 @@ from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.contract.traits import traits_behind
 from contactverif.isolation.lockstep import in_lockstep
-from contactverif.isolation.remote_formulation import RemoteSubject, count_ends
+from contactverif.isolation.remote import RemoteSubject, count_ends
 from contactverif.problems.named_states import named_case
 from contactverif.run import judge
 from contactverif.run.judge import badness

@@ -28,7 +28,7 @@ from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
 from contactverif.diagnosis.diagnose import diagnose
-from contactverif.isolation.remote_formulation import places
+from contactverif.isolation.remote import places
 from contactverif.plugins.provenance import collect_provenance
 from contactverif.plugins.registry import unknown_property_error
 from contactverif.run import judge

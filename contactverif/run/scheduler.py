@@ -32,7 +32,7 @@ from contactverif.contract.result import NotLoaded, Row
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote_formulation import code_files, note_code_files
+from contactverif.isolation.remote import code_files, note_code_files
 from contactverif.plugins.registry import installed_properties, load_property, load_subject
 
 Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]

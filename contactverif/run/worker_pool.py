@@ -17,8 +17,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from contactverif.contract.errors import MisuseError
-from contactverif.isolation.one_thread import ONE_THREAD, one_thread_for_children
-from contactverif.isolation.parent_death import die_with_parent
+from contactverif.isolation.confine import ONE_THREAD, die_with_parent, one_thread_for_children
 
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
 # What the server of processes imports once for all workers: the judge, and, as it is imported, all properties.

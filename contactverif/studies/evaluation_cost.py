@@ -19,7 +19,7 @@ from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.isolation.remote_formulation import RemoteFormulation
+from contactverif.isolation.remote import RemoteFormulation
 from contactverif_reports.compare.comparison import PARTS, Cost
 
 TURNS = 9  # The least number of turns that are timed.

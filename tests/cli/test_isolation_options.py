@@ -9,7 +9,7 @@ from contactverif.api.plugin_places import Isolation
 from contactverif.cli.isolation_options import IsolationOptions, place_line
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation import box as boxes
-from contactverif.isolation import landlock, process
+from contactverif.isolation import confine, process
 
 FORBIDDEN = "bwrap: setting up uid map: Permission denied; allow user namespaces"
 
@@ -22,7 +22,7 @@ def with_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def without_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(boxes, "why_no_box", lambda box=None: FORBIDDEN)
-    monkeypatch.setattr(landlock, "landlock_version", lambda: 0)
+    monkeypatch.setattr(confine, "landlock_version", lambda: 0)
 
 
 @pytest.mark.usefixtures("with_boxes")
@@ -54,7 +54,7 @@ def test_without_boxes_plugins_are_in_a_process_and_the_last_line_says_why(monke
 @pytest.mark.usefixtures("without_boxes")
 def test_where_there_are_rules_of_landlock_they_stand_in_for_a_box(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("PYTEST_CURRENT_TEST")
-    monkeypatch.setattr(landlock, "landlock_version", lambda: 7)
+    monkeypatch.setattr(confine, "landlock_version", lambda: 7)
     assert IsolationOptions().settle().isolation is Isolation.LANDLOCK
     assert IsolationOptions(Isolation.PROCESS).settle().isolation is Isolation.PROCESS
     words = place_line("process (Landlock 7)")

@@ -15,7 +15,7 @@ from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote_engine import engine_program, load_remote_engine
+from contactverif.isolation.remote import engine_program, load_remote_engine
 from contactverif.plugins.registry import load_engine, load_subject
 from contactverif.problems.catalogue import load_scene_case
 

@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 
 from contactverif.isolation.box import why_no_box
-from contactverif.isolation.landlock import landlock_version
+from contactverif.isolation.confine import landlock_version
 from contactverif_reports.netcdf.differences import same_data
 
 NAMES = ("nts", "nts-ar", "vts-ppt", "vts-ppt-lm", "mortar-dual-lm", "two-pass/nts")

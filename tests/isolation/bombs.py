@@ -13,7 +13,7 @@ import time
 import numpy as np
 from isolation.hostile_few import Springs
 
-from contactverif.isolation.loading import python_program
+from contactverif.isolation.remote import python_program
 from contactverif.isolation.worker import main
 from contactverif.plugins.registry import subject_of
 

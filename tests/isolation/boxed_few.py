@@ -15,8 +15,8 @@ from pathlib import Path
 
 import psutil
 
-from contactverif.isolation.loading import python_program
-from contactverif.isolation.process import PROGRESS
+from contactverif.isolation.confine import PROGRESS
+from contactverif.isolation.remote import python_program
 from contactverif.isolation.worker import main
 from contactverif.plugins.registry import subject_of
 

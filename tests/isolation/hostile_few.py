@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from contactverif import Handle, Subject
-from contactverif.isolation.loading import python_program
+from contactverif.isolation.remote import python_program
 from contactverif.isolation.worker import main
 from contactverif.plugins.registry import subject_of
 

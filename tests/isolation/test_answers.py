@@ -11,7 +11,7 @@ from contactverif.contract.arrays import dense
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.isolation import process
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
+from contactverif.isolation.remote import load_remote
 
 CASE = named_case("c")
 METHODS = ("residual", "tangent", "residual_and_tangent", "residual")

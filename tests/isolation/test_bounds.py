@@ -13,9 +13,8 @@ from contactverif import Subject, named_case
 from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
-from contactverif.isolation.messages import MessageError, decode_replies
-from contactverif.isolation.remote_formulation import RemoteSubject
+from contactverif.isolation.remote import RemoteSubject, load_remote
+from contactverif.isolation.wire import MessageError, decode_replies
 
 CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)

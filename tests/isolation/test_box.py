@@ -19,13 +19,12 @@ from contactverif import Subject, load_formulation, named_case
 from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import box as boxes
-from contactverif.isolation import control_group, process
-from contactverif.isolation.box import Box, why_no_box
-from contactverif.isolation.control_group import MOST_PROCESSES, ControlGroup, may_group
+from contactverif.isolation import process
+from contactverif.isolation.box import MOST_PROCESSES, Box, ControlGroup, may_group, why_no_box
+from contactverif.isolation.confine import NETWORK, landlock_version
 from contactverif.isolation.host import end_all
-from contactverif.isolation.landlock import NETWORK, landlock_version
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote, python_program
+from contactverif.isolation.remote import load_remote, python_program
 
 LIMITS = Limits(seconds=20.0, memory=2000, box=Box())
 needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
@@ -159,7 +158,7 @@ def test_all_processes_of_a_box_share_the_limits(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(ControlGroup, "__init__", lambda self, *limit: (groups.append(self), make(self, *limit))[1])
     assert try_targets(monkeypatch, Box(), fork_often=2 * MOST_PROCESSES) == set()
     assert try_targets(monkeypatch, Box(), fork_often=MOST_PROCESSES // 4) == {"fork_often"}
-    monkeypatch.setattr(control_group, "_BASE", 256 << 20)
+    monkeypatch.setattr(boxes, "_BASE_MEMORY", 256 << 20)
     small = replace(LIMITS, memory=1000)
     assert try_targets(monkeypatch, Box(), small, fill_memory=3600) == set()
     assert try_targets(monkeypatch, Box(), small, fill_memory=400) == {"fill_memory"}
@@ -210,11 +209,12 @@ def test_rules_of_landlock_hold_in_a_box(tmp_path: Path, monkeypatch: pytest.Mon
 @needs_box
 def test_a_box_that_forgets_to_end_with_its_parent_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plugin that may attach to the first process of its box can make it leave its session and outlive its parent."""
+    real = boxes.enclose
 
     def enclose(*arguments: Any) -> tuple[str, ...]:
-        return tuple("--new-session" if word == "--die-with-parent" else word for word in boxes.enclose(*arguments))
+        return tuple("--new-session" if word == "--die-with-parent" else word for word in real(*arguments))
 
-    monkeypatch.setattr(process, "enclose", enclose)
+    monkeypatch.setattr(boxes, "enclose", enclose)
     code = "print('begins', flush=True); import time; time.sleep(60)"
     plugin = process.PluginProcess((sys.executable, "-c", code), LIMITS)
     with pytest.raises(PluginError):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from contactverif.isolation.channel import Channel, ClosedError, TooLargeError, TooLateError
+from contactverif.isolation.child import Channel, ClosedError, TooLargeError, TooLateError
 
 Ends = tuple[socket.socket, socket.socket]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contactverif import load_formulation, named_case
-from contactverif.isolation.messages import (
+from contactverif.isolation.wire import (
     Answer,
     Ask,
     Failure,
@@ -12,14 +12,14 @@ from contactverif.isolation.messages import (
     Load,
     Make,
     MessageError,
+    PackedArray,
     Request,
     ShareInterface,
     SharePairing,
     decode_replies,
     encode,
 )
-from contactverif.isolation.packed import PackedArray
-from contactverif.isolation.worker import Desk
+from contactverif.isolation.worker import RequestHandler
 
 INTERFACE = named_case("c").interface
 Z = named_case("c").z
@@ -41,11 +41,11 @@ def share(nodes: PackedArray) -> ShareInterface:
     ],
 )
 def test_what_has_no_reply_never_gets_one_even_if_it_fails(request_: Request) -> None:
-    assert Desk(load_formulation, load_formulation).reply(request_) is None
+    assert RequestHandler(load_formulation, load_formulation).reply(request_) is None
 
 
 def test_an_error_waits_for_the_question_that_needs_what_is_missing() -> None:
-    desk = Desk(load_formulation, load_formulation)
+    desk = RequestHandler(load_formulation, load_formulation)
     desk.reply(LOAD)
     desk.reply(Make(1, 10.0))
     desk.reply(share(CUT))

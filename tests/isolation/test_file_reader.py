@@ -8,9 +8,8 @@ import pytest
 
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation import child
-from contactverif.isolation.file_reader import ReadError, read_in_child
+from contactverif.isolation.file_reader import ReadError, check_ordinary, read_in_child
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.ordinary import check_ordinary
 
 HERE = Path(__file__).parent
 

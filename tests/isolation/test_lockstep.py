@@ -10,9 +10,8 @@ from isolation import hostile_few
 from contactverif import Verdict, load_formulation, load_properties
 from contactverif.isolation import lockstep, process
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
 from contactverif.isolation.lockstep import in_lockstep, wait_in_lockstep
-from contactverif.isolation.remote_formulation import RemoteSubject, count_ends
+from contactverif.isolation.remote import RemoteSubject, count_ends, load_remote
 from contactverif.run.run import run
 
 LIMITS = Limits(seconds=20.0, memory=2000)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.isolation.mapped_code import list_libraries, mapped_files
+from contactverif.isolation.process import mapped_files
+from contactverif.isolation.remote import list_libraries
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux shows what a process has mapped")
 MAPS = """

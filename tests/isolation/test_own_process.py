@@ -15,8 +15,7 @@ from contactverif.contract.errors import ContractError, MisuseError, PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import host, process
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
-from contactverif.isolation.remote_formulation import RemoteSubject, count_ends, places
+from contactverif.isolation.remote import RemoteSubject, count_ends, load_remote, places
 from contactverif.run.worker_pool import worker_pool
 
 CASE = named_case("c")

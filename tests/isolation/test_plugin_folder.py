@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.isolation.plugin_folder import plugin_folder, remove_plugin_folder
+from contactverif.isolation.box import plugin_folder, remove_plugin_folder
 
 HOLDER = """
-from contactverif.isolation.plugin_folder import plugin_folder
+from contactverif.isolation.box import plugin_folder
 
 print(plugin_folder(), flush=True)
 input()

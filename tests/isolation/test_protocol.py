@@ -12,8 +12,8 @@ from contactverif import Subject, Verdict, load_properties, named_case, verify
 from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
-from contactverif.isolation.messages import Reply, Request
+from contactverif.isolation.remote import load_remote
+from contactverif.isolation.wire import Reply, Request
 
 PLAIN = Path(__file__).with_name("plain_program.py")
 PAGE = Path(__file__).parents[2] / "docs/reference/protocol.md"

@@ -15,12 +15,11 @@ from isolation import bombs, hostile_few
 from contactverif import Subject, Verdict, load_properties, named_case, verify
 from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
-from contactverif.isolation import active_clock, host, process
-from contactverif.isolation.active_clock import ActiveClock
-from contactverif.isolation.channel import Channel, TooLateError
+from contactverif.isolation import host, process
+from contactverif.isolation.child import Channel, TooLateError
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.loading import load_remote
-from contactverif.isolation.remote_formulation import RemoteSubject, count_ends
+from contactverif.isolation.process import ActiveClock
+from contactverif.isolation.remote import RemoteSubject, count_ends, load_remote
 
 CASE = named_case("c")
 QUICK = Limits(seconds=20.0, memory=2000)
@@ -54,7 +53,7 @@ def test_time_is_used_up_asleep_by_the_clock_and_awake_by_the_processor(
     replies = iter([(True, 0.0), *looks])
     monkeypatch.setattr(ActiveClock, "_look", lambda self: next(replies))
     times = iter(8.0 * number for number in range(len(looks) + 1))
-    monkeypatch.setattr(active_clock, "perf_counter", lambda: next(times))
+    monkeypatch.setattr(process, "perf_counter", lambda: next(times))
     clock = ActiveClock(0)
     for _ in looks:
         clock.look()
@@ -242,3 +241,18 @@ def test_a_question_that_was_interrupted_is_asked_again(
         formulation.residual(CASE.interface, pairing, CASE.z)
     assert caught.value.cause == "not asked"
     assert count_ends(subject) == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system holds no process on a core")
+def test_a_judge_is_held_after_some_questions_and_let_go_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    cores = os.sched_getaffinity(0)
+    monkeypatch.setattr(process, "_QUESTIONS_FIRST", 2)
+    monkeypatch.setattr(process, "_SECONDS_ON_A_CORE", 0.0)
+    judge = process.CpuPinning()
+    states = []
+    for _ in range(5):
+        judge.ask()
+        states.append((judge.core >= 0, os.sched_getaffinity(0) == ({judge.core} if judge.core >= 0 else cores)))
+    judge.let_go()
+    assert states == [(False, True), (False, True), (True, True), (False, True), (True, True)]
+    assert os.sched_getaffinity(0) == cores

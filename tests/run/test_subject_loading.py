@@ -12,7 +12,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote_formulation import code_files, note_code_files, places
+from contactverif.isolation.remote import code_files, note_code_files, places
 from contactverif.plugins.registry import load_subject
 from contactverif.run.scheduler import begin_loading
 from contactverif.run.worker_pool import worker_pool

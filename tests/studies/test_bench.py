@@ -27,12 +27,12 @@ from contactverif import MisuseError, Subject, Traits
 from contactverif.contract.arrays import dense
 from contactverif.contract.errors import PluginError
 from contactverif.contract.result import NotLoaded
-from contactverif.isolation import remote_formulation
+from contactverif.isolation import remote
 from contactverif.isolation.host import answer_of
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.messages import Answer
 from contactverif.isolation.process import Question
-from contactverif.isolation.remote_formulation import RemoteSubject
+from contactverif.isolation.remote import RemoteSubject
+from contactverif.isolation.wire import Answer
 from contactverif.mechanics.bulk import condense
 from contactverif.mechanics.solving import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.system import System
@@ -248,7 +248,7 @@ def test_times_that_cannot_be_are_no_times(seconds: float, monkeypatch: pytest.M
     def lie(question: Question) -> Answer:
         return structs.replace(answer_of(question), seconds=seconds)
 
-    monkeypatch.setattr(remote_formulation, "answer_of", lie)
+    monkeypatch.setattr(remote, "answer_of", lie)
     assert np.isnan(run_cell(WAVY, [load_formulation("vts-ppt", Limits())], 0, solve=False).runs["vts-ppt"].evaluation)
 
 

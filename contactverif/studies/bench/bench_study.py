@@ -15,7 +15,7 @@ import numpy as np
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
-from contactverif.isolation.remote_formulation import RemoteSubject, places
+from contactverif.isolation.remote import RemoteSubject, places
 from contactverif.plugins.provenance import collect_provenance
 from contactverif.studies.bench.bench_journal import FinishedCells, Header, open_journal
 from contactverif.studies.bench.bench_plan import BenchPlan

@@ -19,8 +19,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.isolation.method_calls import MethodCalls
-from contactverif.isolation.remote_formulation import RemoteFormulation
+from contactverif.isolation.remote import RemoteFormulation
+from contactverif.isolation.worker import MethodCalls
 from contactverif_reports.bench.results import COUNTS
 
 _COUNTS_OF_VERB = {

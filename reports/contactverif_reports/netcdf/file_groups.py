@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from contactverif.contract.columns import Group, Variable
 from contactverif.contract.errors import MisuseError
-from contactverif.isolation.file_reader import ReadError, limits_for, read_in_child
-from contactverif.isolation.ordinary import check_ordinary
-from contactverif.isolation.packed import PackedArray
+from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
+from contactverif.isolation.wire import PackedArray
 
 # zlib makes nothing smaller than a 1032nd. A file that says that it holds more lies; the rest is for small files.
 MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20

@@ -1,6 +1,6 @@
 """Plugins that speak the harness' own language on the line to it, and say there what no honest process says.
 
-Rule for the next editor: the messages here are those of `contactverif.isolation.messages`, and change with them.
+Rule for the next editor: the messages here are those of `contactverif.isolation.wire`, and change with them.
 """
 
 import os

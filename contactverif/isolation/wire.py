@@ -7,18 +7,64 @@ memory here than a few times its bytes: lists and mappings, whose entries take m
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from contactverif.contract.foreign_text import one_line
-from contactverif.isolation.packed import PackedArray
 
 MOST_QUESTIONS = 128  # The number of questions in a message.
 _MOST_NAMES = 256  # The number of arrays in an answer, and of methods.
 _MOST_WORDS = 3  # A misuse has so many; other failures have one.
 _LONGEST_REASON = 200  # Characters of what msgspec says of a message.
+_DTYPE = re.compile(r"[<>|=][biufcS][1-9]\d{0,8}")  # Booleans, integers, real and complex numbers, and characters.
+_USUAL = frozenset(np.dtype(kind).str for kind in (np.float64, np.int64, np.int32, np.complex128, np.bool_))
+MOST_AXES = 8
+
+
+class PackedArray(msgspec.Struct, array_like=True, frozen=True):
+    """An array: its dtype as numpy writes it, its shape, and its entries in the order of C."""
+
+    dtype: str
+    shape: Annotated[tuple[int, ...], msgspec.Meta(max_length=MOST_AXES)]
+    data: bytes  # A copy, for an array inside a message would not lie where compiled code wants it.
+
+    @classmethod
+    def pack(cls, values: Any, name: str = "an array") -> PackedArray:
+        """Return an array of numbers or characters, packed, or raise a ValueError that begins with its name."""
+        if type(values) is np.ndarray and (text := values.dtype.str) in _USUAL and values.ndim <= MOST_AXES:
+            return cls(text, values.shape, values.tobytes())
+        array = np.asarray(values)
+        try:
+            _dtype(array.dtype.str)
+        except ValueError:
+            raise ValueError(f"{name} is of the type {array.dtype}, which is none of numbers or characters") from None
+        if array.ndim > MOST_AXES:
+            raise ValueError(f"{name} of {array.ndim} axes; needed at most {MOST_AXES}")
+        native = array if array.dtype.isnative else array.astype(array.dtype.newbyteorder("="))
+        return cls(native.dtype.str, native.shape, native.tobytes())
+
+    def unpack(self) -> NDArray[Any]:
+        """Return the array, read-only, or raise a ValueError if type, shape and bytes do not fit each other."""
+        dtype = _dtype(self.dtype)
+        if min(self.shape, default=0) < 0 or math.prod(self.shape) * dtype.itemsize != len(self.data):
+            raise ValueError(f"{len(self.data)} bytes for an array of {dtype} and shape {self.shape}")
+        return np.ndarray(self.shape, dtype, self.data)
+
+
+@lru_cache(maxsize=256)
+def _dtype(text: str) -> np.dtype[Any]:
+    with suppress(TypeError):
+        if _DTYPE.fullmatch(text):
+            return np.dtype(text)
+    raise ValueError(f"an array of the unknown dtype {text[:20]!r}")
 
 
 class MessageError(Exception):
@@ -150,18 +196,18 @@ _load_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(
 
 
 def encode(messages: Sequence[Request | Solve] | Sequence[Reply]) -> bytes:
-    """Return messages as bytes."""
+    """Return messages as the bytes of a frame."""
     return _encoder.encode(messages)
 
 
-def encode_part(message: Request | Solve) -> bytes:
+def encode_one(message: Request | Solve) -> bytes:
     """Return one of the messages of a frame as bytes."""
     return _encoder.encode(message)
 
 
-def join(parts: Sequence[bytes]) -> bytes:
+def join(messages: Sequence[bytes]) -> bytes:
     """Return the frame of messages that are encoded."""
-    return _encoder.encode([*map(msgspec.Raw, parts)])
+    return _encoder.encode([*map(msgspec.Raw, messages)])
 
 
 def decode_requests(data: bytes) -> list[Request]:

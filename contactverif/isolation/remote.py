@@ -1,90 +1,62 @@
-"""A formulation in another process, with the methods of a plugin, and the subject that makes it.
+"""Formulations and engines in processes of their own, with the methods of those in this one.
 
-Rule: it answers as the same plugin does in this process, but for a process that dies or hangs. A formulation whose
-process ended is the same one in the next process.
+Rules: each answers as it does in this process, but for a process that dies or hangs. One whose process ended is the
+same in the next process. Nothing of a plugin is imported here, and what its process states is checked like an answer.
 """
 
 from __future__ import annotations
 
+import json
+import os
+import sys
 import weakref
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from stat import S_ISREG
+from typing import Any, TypeVar
 
+import msgspec
+import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, compressed_matrix
+from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
+from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError, MisuseError, PluginError
+from contactverif.contract.foreign_text import one_line
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
+from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, Prefetching, Subject
 from contactverif.contract.traits import Traits
-from contactverif.isolation.box import Box
-from contactverif.isolation.host import Host, answer_of, host_of
+from contactverif.isolation.child import FORKS
+from contactverif.isolation.host import Host, answer_of, host_of, raise_failure
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.mapped_code import list_libraries
-from contactverif.isolation.messages import Answer
-from contactverif.isolation.process import Question
-from contactverif.isolation.remote_engine import RemoteEngineSubject
+from contactverif.isolation.process import PluginProcess, Question, mapped_files
+from contactverif.isolation.wire import Answer, Load, Loaded, Reply, Unloaded, Wraps, encode
 
 _COMPRESSED = ("csr", "csc")
 _MOST_SECONDS = 1e9
+_MOST_ITERATIONS = 1 << 31
+_MOST_LIBRARIES = 500  # The number of files of compiled code that are read.
+_LARGEST_LIBRARY = 1 << 25  # Bytes. A compiler such as LLVM has more, which would take a third of a second.
+_DIGITS = 16
+_Traits = TypeVar("_Traits", Traits, EngineTraits)
 
 
-class RemoteSubject(Subject):
-    """A formulation that lives in a process of its own. It can be pickled."""
+@dataclass(frozen=True, slots=True)
+class Wrapper:
+    """A name that stands for no formulation by itself: it needs another one, a file, or a kind."""
 
-    def __init__(self, make: RemoteFactory) -> None:
-        super().__init__(make.name, make)
-        self._remote = make
-
-    @property
-    def host(self) -> Host:
-        """The host in this process of the judge."""
-        return self._remote.host
-
-    @property
-    def box(self) -> Box | None:
-        """The box of its process; None if there is none."""
-        return self._remote.limits.box
-
-    def restart(self) -> Subject:
-        """Return the same formulation in a second process."""
-        return RemoteSubject(replace(self._remote, second=True))
-
-
-def count_ends(subject: Subject) -> int:
-    """Return how often the process of a formulation has ended before it was told to; 0 if it has none of its own."""
-    return subject.host.n_ended if isinstance(subject, RemoteSubject | RemoteEngineSubject) else 0
-
-
-def code_files(subject: Subject) -> list[Path]:
-    """Return the files whose compiled code the process of a formulation has loaded; none if it has none of its own."""
-    return subject.host.code_files if isinstance(subject, RemoteSubject | RemoteEngineSubject) else []
-
-
-def note_code_files(subject: Subject, files: list[Path]) -> None:
-    """Keep what the process of a formulation has loaded that belongs to another process of the judge."""
-    if isinstance(subject, RemoteSubject | RemoteEngineSubject):
-        subject.host.code_files_there = files
-
-
-def places(subjects: Iterable[Subject]) -> dict[str, str]:
-    """Return {attribute of the report: value}: where formulations lived, what was open to them, and their libraries."""
-    facts: dict[str, set[str]] = {"isolation": set(), "opened": set(), "libraries": set()}
-    for subject in subjects:
-        remote = isinstance(subject, RemoteSubject | RemoteEngineSubject)
-        box = subject.box if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None
-        facts["libraries"] |= set(list_libraries(code_files(subject)))
-        inside = "process" if remote else "inline"
-        facts["isolation"].add(inside if box is None else box.kind)
-        facts["opened"] |= set(box.opened) if box is not None else set()
-    return {name: "; ".join(sorted(values)) for name, values in facts.items() if values}
+    name: str
+    summary: str  # The first line of the factory's docstring.
+    form: str  # What a user writes, `name/NAME`, `name:file=PATH` or `name:kind=KIND`.
 
 
 @dataclass(frozen=True)
@@ -106,6 +78,118 @@ class RemoteFactory:
     def __call__(self, *, penalty: float) -> RemoteFormulation:
         """Return the formulation with a penalty."""
         return RemoteFormulation(self, penalty)
+
+
+class RemoteSubject(Subject):
+    """A formulation that lives in a process of its own. It can be pickled."""
+
+    def __init__(self, make: RemoteFactory) -> None:
+        super().__init__(make.name, make)
+        self.remote = make
+
+    @property
+    def host(self) -> Host:
+        """The host in this process of the judge."""
+        return self.remote.host
+
+    def restart(self) -> Subject:
+        """Return the same formulation in a second process."""
+        return RemoteSubject(replace(self.remote, second=True))
+
+
+@dataclass(frozen=True)
+class RemoteEngine:
+    """An engine that a program, `command`, has made. It can be pickled."""
+
+    command: tuple[str, ...]
+    name: str
+    limits: Limits
+    traits: EngineTraits
+
+    @property
+    def host(self) -> Host:
+        """The host in this process of the judge."""
+        return host_of(self.command, self.name, self.limits)
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Return the answer of the engine, of which nothing is checked but its kind."""
+        reply = self.host.solve(scene.to_arrays())
+        iterations = reply.iterations if abs(reply.iterations) < _MOST_ITERATIONS else -1
+        try:
+            arrays: dict[str, Any] = {name: packed.unpack() for name, packed in reply.arrays.items()}
+            doubles = {name: array.astype(float) for name, array in arrays.items() if array.dtype == np.float64}
+            return EngineAnswer(
+                converged=reply.converged, iterations=iterations, message=one_line(reply.message), **(arrays | doubles)
+            )
+        except (ValueError, TypeError) as error:
+            raise ContractError(f"solve: {one_line(str(error))}") from None
+
+
+class RemoteEngineSubject(EngineSubject):
+    """An engine that lives in a process of its own. It can be pickled."""
+
+    def __init__(self, name: str, engine: RemoteEngine) -> None:
+        super().__init__(name, engine)
+        self.remote = engine
+
+    @property
+    def host(self) -> Host:
+        """The host in this process of the judge."""
+        return self.remote.host
+
+    def _call(self, scene: SceneArrays) -> EngineAnswer:
+        return self.remote.solve(scene)
+
+
+def count_ends(subject: Subject) -> int:
+    """Return how often the process of a subject has ended before it was told to; 0 if it has none of its own."""
+    return subject.host.n_ended if isinstance(subject, RemoteSubject | RemoteEngineSubject) else 0
+
+
+def code_files(subject: Subject) -> list[Path]:
+    """Return the files whose compiled code the process of a subject has loaded; none if it has none of its own."""
+    return subject.host.code_files if isinstance(subject, RemoteSubject | RemoteEngineSubject) else []
+
+
+def note_code_files(subject: Subject, files: list[Path]) -> None:
+    """Keep what the process of a subject has loaded that belongs to another process of the judge."""
+    if isinstance(subject, RemoteSubject | RemoteEngineSubject):
+        subject.host.code_files_there = files
+
+
+def places(subjects: Iterable[Subject]) -> dict[str, str]:
+    """Return {attribute of the report: value}: where formulations lived, what was open to them, and their libraries."""
+    facts: dict[str, set[str]] = {"isolation": set(), "opened": set(), "libraries": set()}
+    for subject in subjects:
+        remote = subject.remote if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None
+        box = None if remote is None else remote.limits.box
+        facts["libraries"] |= set(list_libraries(code_files(subject)))
+        facts["isolation"].add(box.kind if box is not None else "inline" if remote is None else "process")
+        facts["opened"] |= set(box.opened) if box is not None else set()
+    return {name: "; ".join(sorted(values)) for name, values in facts.items() if values}
+
+
+def list_libraries(files: Iterable[Path]) -> list[str]:
+    """Return name and digest of each of the files whose code this process does not run."""
+    paths = sorted({*files} - {*mapped_files("self")})
+    return [f"{one_line(path.name)} {_digest(path)}" for path in paths[:_MOST_LIBRARIES]]
+
+
+@cache
+def _digest(path: Path) -> str:
+    """Return the digest of a file, the size of a large one, or that it is gone."""
+    try:
+        # A plugin names the file. One that nobody writes to, such as a pipe, would not be read to its end.
+        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
+    except OSError:
+        return "which is gone"
+    with os.fdopen(number, "rb") as file:
+        facts = os.fstat(number)
+        if not S_ISREG(facts.st_mode):
+            return "which is no file"
+        if facts.st_size > _LARGEST_LIBRARY:
+            return f"of {facts.st_size} bytes"
+        return sha256(file.read(_LARGEST_LIBRARY)).hexdigest()[:_DIGITS]
 
 
 class RemoteFormulation(Prefetching):
@@ -305,3 +389,116 @@ def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
         return sparse.coo_array((data, (row, col)), shape=(size, size))
     except (ValueError, TypeError, IndexError) as error:
         raise ContractError(f"{verb}: returned a broken coo matrix: {error}") from None
+
+
+def python_program(file: str) -> tuple[str, ...]:
+    """Return the command that runs a file, with the folders of this process's modules as its arguments."""
+    return sys.executable, file, *filter(None, sys.path)
+
+
+def engine_program(entry: str, options: Mapping[str, Any], python: str | None = None) -> tuple[str, ...]:
+    """Return the command that makes an engine of an entry point, by default in the interpreter of this process.
+
+    An interpreter of its own finds its own modules first, and of this process's the harness and the engine alone.
+    """
+    worker = str(Path(__file__).with_name("engine_worker.py"))
+    places, folders = ({}, filter(None, sys.path)) if python is None else (_places_of(entry), ())
+    return python or sys.executable, worker, entry, json.dumps(options), json.dumps(places), *folders
+
+
+def _places_of(entry: str) -> dict[str, str]:
+    """Return {module: folder} of the harness, of what is installed together with an entry point, and of `landlockpy`.
+
+    The folder may be that of all packages of this interpreter, such as a numpy that another one cannot load.
+    """
+    import importlib.util
+    from importlib.metadata import packages_distributions
+
+    module, owners = entry.partition(":")[0].partition(".")[0], packages_distributions()
+    installed = set(owners.get(module, ()))
+    names = {"contactverif", module, "landlockpy", *(name for name in owners if installed & set(owners[name]))}
+    specs = ((name, importlib.util.find_spec(name)) for name in sorted(names))
+    return {
+        name: str(Path(spec.origin).parents[bool(spec.submodule_search_locations)])
+        for name, spec in specs
+        if spec and spec.origin
+    }
+
+
+def load_remote(command: tuple[str, ...], name: str, limits: Limits) -> Subject | NotLoaded:
+    """Load a formulation in a process of its own: a program that speaks the protocol and knows formulations by name.
+
+    A wrong name or option is a MisuseError.
+    """
+    try:
+        item = _read_reply(command, name, limits, host_of(command, name, limits).load())
+    except ContractError as error:
+        return _not_loaded(name, error)
+    assert not isinstance(item, Wrapper)
+    return item
+
+
+def load_remote_engine(command: tuple[str, ...], name: str, limits: Limits) -> EngineSubject | NotLoaded:
+    """Load an engine in a process of its own, and return it under a name, or why it does not load."""
+    try:
+        reply = host_of(command, name, limits).load()
+        if isinstance(reply, Unloaded):
+            return NotLoaded(name, one_line(reply.reason))
+        if not isinstance(reply, Loaded):
+            raise PluginError(f"import: a {type(reply).__name__} where an engine was needed", "channel")
+        traits = _convert_traits(reply.traits, EngineTraits)
+        return RemoteEngineSubject(name, RemoteEngine(command, name, limits, traits))
+    except ContractError as error:
+        return NotLoaded(name, str(error))
+
+
+def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> Iterator[Subject | Wrapper | NotLoaded]:
+    """Yield what is installed under each name.
+
+    One process loads no plugin, and a copy of it loads each one. Where processes are not copied, each name has a new
+    one. A process that ends is followed by another.
+    """
+    process: PluginProcess | None = None
+    for name in names:
+        question = Question(0, "import")
+        try:
+            process = process or PluginProcess(command, limits)
+            process.ask(encode([Load(0, name, survey=True)]), [question])
+            yield _read_reply(command, name, limits, raise_failure(question.result, loading=True))
+        except ContractError as error:
+            process = None if isinstance(error, PluginError) and error.ended else process
+            yield _not_loaded(name, error)
+        if process is not None and not FORKS:
+            process.end()
+            process = None
+    if process is not None:
+        process.end()
+
+
+def _not_loaded(name: str, error: ContractError) -> NotLoaded:
+    ended = isinstance(error, PluginError) and error.ended
+    return NotLoaded(name, f"{error.cause}: {error}" if ended else str(error))  # type: ignore[attr-defined]
+
+
+def _read_reply(command: tuple[str, ...], name: str, limits: Limits, reply: Reply) -> Subject | Wrapper | NotLoaded:
+    """Return what a process says that a name is."""
+    match reply:
+        case Unloaded(_, reason):
+            return NotLoaded(name, one_line(reason))
+        case Wraps(_, summary, form):
+            return Wrapper(name, one_line(summary), one_line(form))
+        case Loaded(_, traits, provides):
+            evidence = traits.get("evidence")
+            if isinstance(evidence, dict) and isinstance(evidence.get("source"), str):
+                evidence["source"] = one_line(evidence["source"])
+            stated = _convert_traits(traits, Traits)
+            return RemoteSubject(RemoteFactory(command, name, limits, stated, frozenset(provides)))
+    raise PluginError(f"import: a {type(reply).__name__} where a formulation was needed", "channel")
+
+
+def _convert_traits(words: dict[str, Any], kind: type[_Traits]) -> _Traits:
+    """Return the traits that the process of a plugin states, checked."""
+    try:
+        return msgspec.convert(words, kind)
+    except (msgspec.ValidationError, RecursionError, ValueError) as error:
+        raise ContractError(f"traits: {one_line(str(error))}") from None
