@@ -1,4 +1,4 @@
-"""What a process that may hold a plugin does to itself at its start, and the environment in which it finds how.
+"""The confinement that a process takes on itself before it holds a plugin, and the environment that says how.
 
 Rules: the standard library alone, since engines have interpreters of their own. A process confines itself before it
 loads a plugin, and nothing takes that back.

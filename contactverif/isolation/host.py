@@ -267,18 +267,18 @@ class Host:
         known = self._is_quick and all(question.verb in self._known_verbs for question in questions)
         most = MOST_QUESTIONS if known else 1
         frames: list[bytes] = []
-        asked: list[Question] = []
+        questions_sent: list[Question] = []
         size = 0
         for request, question in waiting:
             frame = encode_one(request)
-            is_full = question is not None and len(asked) >= most
+            is_full = question is not None and len(questions_sent) >= most
             if frames and (is_full or size + len(frame) > _TOGETHER):
-                self._ask(process, frames, asked)
-                frames, asked, size = [], [], 0
+                self._ask(process, frames, questions_sent)
+                frames, questions_sent, size = [], [], 0
             frames.append(frame)
             size += len(frame)
-            asked += [question] if question is not None else []
-        self._ask(process, frames, asked)
+            questions_sent += [question] if question is not None else []
+        self._ask(process, frames, questions_sent)
 
     def _ask(self, process: PluginProcess, frames: Sequence[bytes], questions: Sequence[Question]) -> None:
         """Ask the process; a first call may take longer, by as much as the same one took in an earlier process."""
