@@ -37,7 +37,7 @@ def test_cases_share_messages_and_their_outcomes_are_those_of_each_alone(message
         run([subject], questions, examples=20, seed=4, shrink="none").rows
         for subject in (load_formulation("nts-ar", LIMITS), load_formulation("nts-ar"))
     )
-    taken = perf_counter() - start
+    seconds = perf_counter() - start
     for row, other in zip(shared, alone, strict=True):
         assert row.verdict is other.verdict
         assert [(each.verdict, each.reason, repr(each.measurement)) for each in row.outcomes] == [
@@ -45,7 +45,7 @@ def test_cases_share_messages_and_their_outcomes_are_those_of_each_alone(message
         ]
     assert max(messages) > 10
     # Each case has its own share of the time in which all of them waited.
-    assert sum(row.seconds for row in shared) < taken
+    assert sum(row.seconds for row in shared) < seconds
 
 
 def test_a_process_that_ends_lets_each_case_be_judged_alone() -> None:
@@ -59,14 +59,14 @@ def test_a_process_that_ends_lets_each_case_be_judged_alone() -> None:
 
 
 @pytest.fixture
-def granted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+def grants(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     yield []
     lockstep._blocks = False
 
 
-def test_one_wish_of_several_calls_is_granted_once_and_an_error_comes_through(granted: list[int]) -> None:
+def test_one_wish_of_several_calls_is_granted_once_and_an_error_comes_through(grants: list[int]) -> None:
     def wish() -> bool:
-        granted.append(1)
+        grants.append(1)
         return True
 
     def call(number: int) -> int:
@@ -77,13 +77,13 @@ def test_one_wish_of_several_calls_is_granted_once_and_an_error_comes_through(gr
         return number
 
     assert [result for result, _ in in_lockstep([lambda n=n: call(n) for n in (1, 3, 2)]) or ()] == [1, 3, 2]
-    assert len(granted) == 3
+    assert len(grants) == 3
     with pytest.raises(ValueError, match="an error of the caller"):
         in_lockstep([lambda: call(4), lambda: call(1)])
     assert not wait_in_lockstep(wish)  # Here is no call in lockstep.
 
 
-def test_a_wish_that_fails_and_an_interrupt_end_all_calls(granted: list[int]) -> None:
+def test_a_wish_that_fails_and_an_interrupt_end_all_calls(grants: list[int]) -> None:
     ends: list[str] = []
 
     def call(wish: object) -> None:
@@ -101,13 +101,13 @@ def test_a_wish_that_fails_and_an_interrupt_end_all_calls(granted: list[int]) ->
     assert ends == 6 * ["end"]
 
 
-def test_calls_that_block_each_other_are_given_up(granted: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_calls_that_block_each_other_are_given_up(grants: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lockstep, "_LONGEST_STEP", 0.1)
     lock = threading.Lock()
 
     def call() -> None:
         with lock:
-            wait_in_lockstep(lambda: bool(granted.append(1)) or True)
+            wait_in_lockstep(lambda: bool(grants.append(1)) or True)
 
     assert in_lockstep([call, call]) is None
     assert not lock.locked()
