@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # A name that is imported as itself is one that the package exports.
     from contactverif.api.report import Report as Report
     from contactverif.api.verification import verify as verify
-    from contactverif.autodiff.jax_formulation import from_energy as from_energy
-    from contactverif.autodiff.jax_formulation import from_residual as from_residual
+    from contactverif.autodiff import from_energy as from_energy
+    from contactverif.autodiff import from_residual as from_residual
     from contactverif.contract.body import Body as Body
     from contactverif.contract.case import Case as Case
     from contactverif.contract.cases import Cases as Cases
@@ -77,7 +77,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "api.report": ("Report",),
     "api.verification": ("verify",),
-    "autodiff.jax_formulation": ("from_energy", "from_residual"),
+    "autodiff": ("from_energy", "from_residual"),
     "contract.body": ("Body",),
     "contract.case": ("Case",),
     "contract.cases": ("Cases",),

@@ -43,8 +43,8 @@ REPORTS = (
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
     "contract": Room((), ("numpy", "scipy.sparse"), QUIET),
-    "kernel_store": Room((), ("numba",)),
-    "geometry": Room(("contract", "kernel_store"), ("numpy", "numba", "scipy.sparse"), QUIET),
+    "compiler": Room(("contract",), ("numpy", "numba")),
+    "geometry": Room(("contract", "compiler"), ("numpy", "scipy.sparse"), QUIET),
     "autodiff": Room(("contract",), ("numpy", "scipy.sparse", "jax")),
     "oracle": Room(("contract",), ("numpy",), QUIET),
     # `plugins` holds the program of a plugin's process, which calls the worker here.
@@ -85,9 +85,9 @@ ROOMS = {
     # What a script imports from `contactverif` itself.
     "contactverif": Room((*BELOW_RUN, "autodiff", *RUN, "api")),
     # The three folders of extension points. The judge shares no code with the judged.
-    "contactverif_nts": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
-    "contactverif_mortar": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
-    "contactverif_surfaces": Room(("contract", "geometry"), ("numpy", "scipy", "numba"), QUIET),
+    "contactverif_nts": Room(("contract", "compiler", "geometry"), ("numpy", "scipy"), QUIET),
+    "contactverif_mortar": Room(("contract", "compiler", "geometry"), ("numpy", "scipy"), QUIET),
+    "contactverif_surfaces": Room(("contract", "compiler", "geometry"), ("numpy", "scipy"), QUIET),
     # An engine writes files and starts programs; its code is imported inside `solve`.
     "contactverif_engines": Room(
         ("contract",),
@@ -106,7 +106,7 @@ ROOMS = {
     ),
     # A library is a file, and a call of it needs ctypes.
     "contactverif_foreign": Room(
-        ("contract", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo", "ngsolve", "netgen")
+        ("contract", "compiler", "geometry"), ("numpy", "scipy", "ipctk", "openseespy", "fedoo", "ngsolve", "netgen")
     ),
     "properties": Room(
         ("contract", "oracle", "mechanics", "problems", "strategies"),

@@ -2,8 +2,9 @@
 
 A kernel lists the `Couplings` of the interface: which nodes feel which, by integers and booleans alone. `zero_matrix`
 makes the pattern, the union of all couplings. For each coupling and pair of nodes the kernel calls `add_block`; for a
-multiplier `add_row`, `add_column` and `add_entry`. They find the place by bisection. Nothing is allocated, nothing is
-sorted afterwards, and the sums have a fixed order.
+multiplier `add_row`, `add_column` and `add_entry`. They find the place by bisection. Or it fills a small dense matrix
+for each coupling, and `add_local_matrix` adds that as a whole. Nothing is allocated, nothing is sorted afterwards, and
+the sums have a fixed order.
 
 In the plane a node has two unknowns, 2 v and 2 v + 1. A multiplier stands behind the nodes: the number n_nodes + i in a
 coupling is the multiplier i, whose unknown is 2 n_nodes + i. In space a pattern has three unknowns for each node.
@@ -16,11 +17,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from contactverif.compiler import compile_inline, compile_kernel, compile_part
 from contactverif.contract.arrays import FloatArray, IntArray, compressed_matrix
-from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 
 NumberArray = NDArray[np.int32]
 AnyIntArray = NDArray[Any]  # int32 or int64
+Fields = tuple[Any, ...]  # The fields of a named tuple, as a plain tuple.
+Csr = tuple[AnyIntArray, AnyIntArray, FloatArray]  # The indptr, indices and data of compressed rows.
+MOST_NODES = 12  # A coupling with a local matrix has at most so many nodes, and behind them at most one multiplier.
+WIDTH = 2 * MOST_NODES + 1  # The rows and columns of a local matrix.
+NO_NODE = -1
+_SCANNED = 64  # A row with at most so many entries is scanned for a column; in a longer one the column is bisected for.
 _MOST = np.iinfo(np.int32).max  # The largest number of entries that scipy numbers by int32.
 
 
@@ -78,9 +85,10 @@ def _make_pattern(
     size, n_numbers = per_node * n_nodes + n_multipliers, n_nodes + n_multipliers
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
     members, ends = np.empty(len(couplings.nodes), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
-    _write_members(begins, member_starts, members, ends, *couplings)
+    of_columns = member_starts, members
+    _write_members(begins, ends, of_columns, tuple(couplings))
     columns = np.empty(begins[-1], dtype=np.int32)
-    n_entries = _write_columns(columns, ends, n_nodes, per_node, begins, member_starts, members, *couplings)
+    n_entries = _write_columns(columns, begins, ends, of_columns, tuple(couplings), n_nodes, per_node)
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
     _write_pattern(indptr, indices, n_nodes, per_node, begins, ends, columns)
@@ -88,19 +96,12 @@ def _make_pattern(
 
 
 @compile_kernel
-def _write_members(
-    begins: IntArray,
-    member_starts: IntArray,
-    members: NumberArray,
-    ends: IntArray,
-    nodes: NumberArray,
-    starts: IntArray,
-    first_row: IntArray,
-) -> None:
+def _write_members(begins: IntArray, ends: IntArray, of_columns: Fields, couplings: Fields) -> None:
     """Write the couplings of each column, members[member_starts[i]:member_starts[i + 1]], and room for rows' columns.
 
     The columns of row i get the room from begins[i] to begins[i + 1]; `ends` is room for this function.
     """
+    (member_starts, members), (nodes, starts, first_row) = of_columns, couplings
     for coupling in range(len(first_row)):
         start, stop = starts[coupling], starts[coupling + 1]
         for place in range(start, stop):
@@ -120,21 +121,19 @@ def _write_members(
 @compile_kernel
 def _write_columns(
     columns: NumberArray,
+    begins: IntArray,
     ends: IntArray,
+    of_columns: Fields,
+    couplings: Fields,
     n_nodes: int,
     per_node: int,
-    begins: IntArray,
-    member_starts: IntArray,
-    members: NumberArray,
-    nodes: NumberArray,
-    starts: IntArray,
-    first_row: IntArray,
 ) -> int:
     """Write the columns of each row, nodes and multipliers by number: columns[begins[row]:ends[row]], ascending.
 
     Return the number of entries. Columns are visited in ascending order, so they are sorted as they come, and one that
     comes twice was the last.
     """
+    (member_starts, members), (nodes, starts, first_row) = of_columns, couplings
     n_entries = 0
     for row in range(len(ends)):
         ends[row] = begins[row]
@@ -206,18 +205,9 @@ def find_entry(indices: AnyIntArray, first: int, last: int, column: int) -> int:
 
 
 @compile_inline
-def add_block(
-    indptr: IntArray,
-    indices: AnyIntArray,
-    data: FloatArray,
-    row: int,
-    column: int,
-    xx: float,
-    xy: float,
-    yx: float,
-    yy: float,
-) -> None:
+def add_block(csr: Csr, row: int, column: int, xx: float, xy: float, yx: float, yy: float) -> None:
     """Add the block ((xx, xy), (yx, yy)) to the rows of the node `row` and the columns of the node `column`."""
+    indptr, indices, data = csr
     first, second = indptr[2 * row], indptr[2 * row + 1]
     place = find_node(indices, first, second, 2 * column)
     data[place] += xx
@@ -228,20 +218,18 @@ def add_block(
 
 
 @compile_inline
-def add_row(
-    indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, unknown: int, column: int, x: float, y: float
-) -> None:
+def add_row(csr: Csr, unknown: int, column: int, x: float, y: float) -> None:
     """Add (x, y) to the row of the multiplier with this unknown and the columns of the node `column`."""
+    indptr, indices, data = csr
     place = find_node(indices, indptr[unknown], indptr[unknown + 1], 2 * column)
     data[place] += x
     data[place + 1] += y
 
 
 @compile_inline
-def add_column(
-    indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, unknown: int, x: float, y: float
-) -> None:
+def add_column(csr: Csr, row: int, unknown: int, x: float, y: float) -> None:
     """Add (x, y) to the rows of the node `row` and the column of the multiplier with this unknown."""
+    indptr, indices, data = csr
     first, second = indptr[2 * row], indptr[2 * row + 1]
     place = find_entry(indices, first, second, unknown)
     data[place] += x
@@ -249,6 +237,71 @@ def add_column(
 
 
 @compile_part
-def add_entry(indptr: AnyIntArray, indices: AnyIntArray, data: FloatArray, row: int, column: int, value: float) -> None:
+def add_entry(csr: Csr, row: int, column: int, value: float) -> None:
     """Add a number to one entry, whose row and column are unknowns."""
+    indptr, indices, data = csr
     data[find_entry(indices, indptr[row], indptr[row + 1], column)] += value
+
+
+@compile_inline
+def insert_node(listed: NumberArray, start: int, place: int, number: int) -> int:
+    """Insert a node into the ascending list listed[start:place] unless it is there; return the end of the list."""
+    at = place
+    while at > start and listed[at - 1] > number:
+        at -= 1
+    if at > start and listed[at - 1] == number:
+        return place
+    for later in range(place, at, -1):
+        listed[later] = listed[later - 1]
+    listed[at] = number
+    return place + 1
+
+
+@compile_inline
+def find_runs(runs: NumberArray, nodes: NumberArray, start: int, n_nodes: int) -> None:
+    """Write into runs[q] where the run of consecutive numbers ends that holds the node q of a coupling."""
+    end = n_nodes
+    for q in range(n_nodes - 1, -1, -1):
+        if q + 1 < n_nodes and nodes[start + q] + 1 != nodes[start + q + 1]:
+            end = q + 1
+        runs[q] = end
+
+
+@compile_inline
+def add_local_matrix(
+    csr: Csr,
+    nodes: NumberArray,
+    start: int,
+    n_nodes: int,
+    runs: NumberArray,
+    local: FloatArray,
+    owner: NumberArray,
+    part: int,
+) -> None:
+    """Add the matrix `local` of a coupling to the rows and columns of its nodes, nodes[start:start + n_nodes].
+
+    Node q of the coupling has the rows and columns 2 q and 2 q + 1 of `local`, a multiplier behind the nodes the last
+    one. Where numbers of nodes, which ascend, follow each other, so do their columns in each row. So a place in a row
+    is looked for once for each run of numbers; `runs` is what `find_runs` wrote. Only rows whose node has the owner
+    `part` are written: threads share a matrix, and no row.
+    """
+    indptr, indices, data = csr
+    for q in range(n_nodes):
+        row = nodes[np.uint64(start + q)]
+        if owner[row] != part:
+            continue
+        place, end = indptr[np.uint64(2 * row)], indptr[np.uint64(2 * row + 1)]
+        width, column = end - place, 0
+        while column < n_nodes:
+            unknown = 2 * nodes[np.uint64(start + column)]
+            if width > _SCANNED:
+                place = find_node(indices, place, end, unknown)
+            while indices[np.uint64(place)] != unknown:
+                place += 2
+            run_end = runs[column]
+            while column < run_end:
+                data[np.uint64(place)] += local[np.uint64(2 * q), np.uint64(2 * column)]
+                data[np.uint64(place + 1)] += local[np.uint64(2 * q), np.uint64(2 * column + 1)]
+                data[np.uint64(place + width)] += local[np.uint64(2 * q + 1), np.uint64(2 * column)]
+                data[np.uint64(place + width + 1)] += local[np.uint64(2 * q + 1), np.uint64(2 * column + 1)]
+                column, place = column + 1, place + 2

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from contactverif.compiler import compile_kernel
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import PointOnSegment, nearest_segment, node, search_tree
 from contactverif_foreign.element_pairs import walk_chains
 from contactverif_foreign.guarded_slot import Argument

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from contactverif.compiler import compile_kernel
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
-from contactverif.geometry.compiled import compile_kernel
 from contactverif.geometry.projection import (
     PointOnSegment,
     arm,

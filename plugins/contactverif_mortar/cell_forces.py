@@ -25,9 +25,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, IntArray
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C
 
 

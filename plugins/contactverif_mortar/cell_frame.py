@@ -26,9 +26,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.compiled import compile_inline
 from contactverif.geometry.projection import Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import NODE_1, NODE_2, A, B, SlaveView, facing_point, seen_from, slave_view
 from contactverif_mortar.integration_cells import Cells, Fields, Quadrature

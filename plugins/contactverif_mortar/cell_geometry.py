@@ -27,8 +27,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_part
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, between, cross, dot, frame, minus, node
 
 A, B, NODE_1, NODE_2, BEFORE, BEHIND = range(6)  # local nodes

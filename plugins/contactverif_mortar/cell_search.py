@@ -19,9 +19,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compile_inline, compile_maker, compile_part
 from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
 from contactverif_mortar.strip_search import Region, collect_segments, holds, make_region, make_strip

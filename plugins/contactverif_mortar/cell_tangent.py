@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import Couplings, NumberArray, add_block, zero_matrix
-from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     CellFrame,
@@ -147,4 +147,4 @@ def add_cell(forces: FloatArray, csr: Csr, rows: FloatArray, pushes: FloatArray,
             x, y = turn_row(rows, k, column, cell)
             xx, xy = n[0] * x - omega * tau[0] * n[0], n[0] * y - omega * tau[0] * n[1]
             yx, yy = n[1] * x - omega * tau[1] * n[0], n[1] * y - omega * tau[1] * n[1]
-            add_block(*csr, local[k], local[column], xx, xy, yx, yy)
+            add_block(csr, local[k], local[column], xx, xy, yx, yy)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from contactverif.compiler import TAKES_LONGDOUBLE
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE
 
 # The cases that show locking, for methods that lock.
 LOCKING_WITNESSES = {"stability.locking": "12 on 8, ε̂ = 1e8 E/h", "accuracy.wavy-curved": "upper slave, 100 E/h"}

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -21,7 +22,6 @@ from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, add_block
-from contactverif.geometry.compiled import compile_maker
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -136,7 +136,7 @@ def _add_springs(
             b_x, b_y = influence[2 * row], influence[2 * row + 1]
             for k in range(3):
                 p_x, p_y = d_pressure[i, k, 0], d_pressure[i, k, 1]
-                add_block(*csr, nodes[row], facing[i, k], b_x * p_x, b_x * p_y, b_y * p_x, b_y * p_y)
+                add_block(csr, nodes[row], facing[i, k], b_x * p_x, b_x * p_y, b_y * p_x, b_y * p_y)
 
 
 @compile_maker

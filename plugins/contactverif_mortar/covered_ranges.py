@@ -17,11 +17,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from contactverif.compiler import compile_maker, match_precision
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Pairing
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_maker, match_precision
 from contactverif.geometry.projection import frame, node
 from contactverif_mortar.cell_geometry import cut_gains, seen_from, slave_view, turn_of_ends
 from contactverif_mortar.integration_cells import (

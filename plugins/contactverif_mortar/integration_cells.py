@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_maker, compile_part, match_precision
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.pairing import Pairing
 from contactverif.geometry.block_rows import AnyIntArray, NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_maker, compile_part, match_precision
 from contactverif.geometry.projection import Vector, frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,

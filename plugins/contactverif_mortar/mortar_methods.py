@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import match_precision
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -23,7 +24,6 @@ from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
-from contactverif.geometry.compiled import match_precision
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.cell_tangent import ForcesAndTangent
 from contactverif_mortar.cell_traits import CELL_TRAITS

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar.integration_cells import Csr, Fields
 from contactverif_mortar.node_groups import RowGroups
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_maker, constant
 from contactverif.contract.arrays import BoolArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.geometry.block_rows import Couplings, NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_maker, constant
 
 LARGE_GROUP = 64  # Groups of more nodes count in the estimate of a product's size; smaller ones overlap too much.
 MOST_BYTES = 2**35  # 32 GiB: more than a workstation spares for one matrix.

@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
-from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     CellFrame,

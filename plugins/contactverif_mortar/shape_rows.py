@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import NumberArray, add_block
-from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Csr, Fields
@@ -147,7 +147,7 @@ def _write_block(csr: Csr, block: FloatArray, n_pushed: int, cell: NumberArray) 
         for column in range(len(cell)):
             xx, xy = block[k, 0, column, 0], block[k, 0, column, 1]
             yx, yy = block[k, 1, column, 0], block[k, 1, column, 1]
-            add_block(*csr, cell[k], cell[column], xx, xy, yx, yy)
+            add_block(csr, cell[k], cell[column], xx, xy, yx, yy)
     block[:] = 0.0
 
 

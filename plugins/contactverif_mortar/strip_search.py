@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from contactverif.compiler import compile_inline, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import Vector, minus
 from contactverif_mortar.cell_geometry import SlaveView
 

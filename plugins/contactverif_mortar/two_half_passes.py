@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -31,7 +32,6 @@ from contactverif.contract.option_checks import check_count, check_penalty, choo
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
-from contactverif.geometry.compiled import compile_maker
 from contactverif_mortar import cell_forces
 from contactverif_mortar.cell_contact_points import at_nodes
 from contactverif_mortar.cell_forces import Shapes, integrals

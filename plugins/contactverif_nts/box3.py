@@ -29,8 +29,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_kernel, compile_part
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel, compile_part
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, cross, dot, frame, minus, node
 from contactverif_nts.eq6 import Fields, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part

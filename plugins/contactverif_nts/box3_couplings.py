@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_kernel, constant
 from contactverif.contract.arrays import BoolArray, IntArray
-from contactverif.geometry.block_rows import NumberArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel, constant
-from contactverif.geometry.local_matrix import MOST_NODES, NO_NODE, insert_node
+from contactverif.geometry.block_rows import MOST_NODES, NO_NODE, NumberArray, insert_node
 from contactverif_nts.box3 import Area
 from contactverif_nts.eq6 import Fields
 from contactverif_nts.walk import NOT_CUT

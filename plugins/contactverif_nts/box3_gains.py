@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from contactverif.compiler import compile_inline
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, dot, frame, minus, node
 from contactverif_nts.box3 import Area, VirtualSlaveNode, across_parts, sum_of_parts
 from contactverif_nts.turned_force import ZERO, times

@@ -16,10 +16,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_kernel
 from contactverif.contract.arrays import FloatArray
-from contactverif.geometry.block_rows import NumberArray, add_column, add_entry, add_row
-from contactverif.geometry.compiled import compile_inline, compile_kernel
-from contactverif.geometry.local_matrix import MOST_NODES, NO_NODE, WIDTH, add_local_matrix, find_runs
+from contactverif.geometry.block_rows import (
+    MOST_NODES,
+    NO_NODE,
+    WIDTH,
+    NumberArray,
+    add_column,
+    add_entry,
+    add_local_matrix,
+    add_row,
+    find_runs,
+)
 from contactverif.geometry.projection import Vector, node
 from contactverif_nts.box3 import (
     BALANCED,
@@ -141,7 +150,7 @@ def _sweep(
                     _add_part_forces(local, push, point, pressure, part_j, slots[f], slots[m], free_ends)
                     j = neighbours[j, 1] if j != j_last else NO_NODE
         find_runs(runs, nodes, start, n_coupled)
-        add_local_matrix(*csr, nodes, start, n_coupled, runs, local, owner, part)
+        add_local_matrix(csr, nodes, start, n_coupled, runs, local, owner, part)
         _add_push(rows, nodes, start, n_coupled, push, owner, part)
         if has_multipliers:
             _add_multiplier(rows, csr, nodes, start, n_coupled, len(x), local, push, owner, part)
@@ -187,12 +196,12 @@ def _add_multiplier(
     for q in range(n_coupled):
         row = nodes[start + q]
         if owner[row] == part:
-            add_column(*csr, row, unknown, local[2 * q, width], local[2 * q + 1, width])
+            add_column(csr, row, unknown, local[2 * q, width], local[2 * q + 1, width])
         if is_mine:
-            add_row(*csr, unknown, row, local[width, 2 * q], local[width, 2 * q + 1])
+            add_row(csr, unknown, row, local[width, 2 * q], local[width, 2 * q + 1])
     if is_mine:
         rows[unknown] += push[width]
-        add_entry(*csr, unknown, unknown, local[width, width])
+        add_entry(csr, unknown, unknown, local[width, width])
 
 
 @compile_inline

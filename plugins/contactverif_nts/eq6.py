@@ -27,11 +27,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_kernel, compile_part
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray
-from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
-from contactverif.geometry.compiled import compile_kernel, compile_part
 from contactverif.geometry.projection import (
+    NO_PLACE,
     PointOnSegment,
     Tree,
     Vector,
@@ -40,7 +40,9 @@ from contactverif.geometry.projection import (
     dot,
     foot_on_surface,
     frame,
+    is_next,
     minus,
+    nearest_place_from,
     node,
 )
 

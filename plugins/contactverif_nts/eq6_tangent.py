@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.geometry.block_rows import NumberArray, add_column, add_entry, add_row
-from contactverif.geometry.compiled import compile_inline, compile_maker
 from contactverif.geometry.projection import Vector, frame, node
 from contactverif_nts.eq6 import CURRENT, NODAL, REFERENCE, Contact, Csr, Fields, area_length, contact_at
 from contactverif_nts.turned_force import ZERO, add_turned_force, plus, times
@@ -63,7 +63,7 @@ def add_tangent(
         if not active[i]:
             if has_multipliers:
                 area = 1.0 if area_from == NODAL else weight * area_length(reference, slave, s, other[i])
-                add_entry(*csr, unknown, unknown, area)
+                add_entry(csr, unknown, unknown, area)
             continue
         begin, first_row = _fill_nodes(nodes, slave, master, s, other[i], partner[i], places[slot[i]], area_from)
         v = contact_at(x, nodes[A], nodes[B], nodes[NODE_1], nodes[NODE_2], places[slot[i]])
@@ -110,10 +110,10 @@ def _add_constraint(
     for k in range(begin, N_LOCAL):
         d = _gains(k, v, force)
         d_row = times(-1.0, plus(times(force.area, d.g), times(v.g, d.area)))
-        add_row(*csr, unknown, nodes[k], d_row[0], d_row[1])
+        add_row(csr, unknown, nodes[k], d_row[0], d_row[1])
     for row in range(first_row, N_LOCAL):
         size = -force.area * _share(row, v)
-        add_column(*csr, nodes[row], unknown, size * v.normal[0], size * v.normal[1])
+        add_column(csr, nodes[row], unknown, size * v.normal[0], size * v.normal[1])
 
 
 @compile_inline

@@ -25,6 +25,7 @@ from functools import cache, partial
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import match_precision
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -32,11 +33,9 @@ from contactverif.contract.option_checks import check_count, check_penalty, chec
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, zero_matrix
-from contactverif.geometry.compiled import match_precision
-from contactverif.geometry.local_matrix import NO_NODE, share_couplings
+from contactverif.geometry.block_rows import NO_NODE, Couplings, zero_matrix
 from contactverif.geometry.projection import search_tree
-from contactverif.geometry.threads import run_in_threads, split_range
+from contactverif.geometry.threads import run_in_threads, share_couplings, split_range
 from contactverif_nts import box3, box3_tangent, walk
 from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.eq6 import AREAS, CURRENT, Fields

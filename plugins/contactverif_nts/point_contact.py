@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from contactverif.compiler import TAKES_LONGDOUBLE, match_precision
 from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
@@ -38,7 +39,6 @@ from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
-from contactverif.geometry.compiled import TAKES_LONGDOUBLE, match_precision
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import eq6, eq6_tangent, force_tables
 from contactverif_nts.eq6 import AREAS, Fields

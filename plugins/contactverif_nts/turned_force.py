@@ -5,8 +5,8 @@ Source: Zavarise & De Lorenzis (2009), Eqs. A1–A6.
 
 from __future__ import annotations
 
+from contactverif.compiler import compile_inline, compile_part
 from contactverif.geometry.block_rows import add_block
-from contactverif.geometry.compiled import compile_inline, compile_part
 from contactverif.geometry.projection import Vector
 from contactverif_nts.eq6 import Contact, Csr
 
@@ -36,4 +36,4 @@ def add_turned_force(csr: Csr, row: int, column: int, v: Contact, force: float, 
     xy = normal[0] * d_force[1] - force * t[0] * omega[1]
     yx = normal[1] * d_force[0] - force * t[1] * omega[0]
     yy = normal[1] * d_force[1] - force * t[1] * omega[1]
-    add_block(*csr, row, column, xx, xy, yx, yy)
+    add_block(csr, row, column, xx, xy, yx, yy)

@@ -31,10 +31,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_kernel
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
-from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif.geometry.projection import (
+    NO_PLACE,
     PointOnSegment,
     Tree,
     Vector,
@@ -43,7 +43,9 @@ from contactverif.geometry.projection import (
     dot,
     foot_on_surface,
     frame,
+    is_next,
     minus,
+    nearest_place_from,
     node,
 )
 from contactverif.geometry.threads import run_in_threads, split_range

@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_inline, compile_kernel, compile_part
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_inline, compile_kernel, compile_part
 from contactverif_surfaces.face_search import MOST_CORNERS, set_axes, view_face
 
 S, T, H, REST = 0, 1, 2, 3  # The columns of a master corner; the last one is 1 − s − t.

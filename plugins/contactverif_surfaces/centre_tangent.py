@@ -20,9 +20,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from contactverif.compiler import compile_inline, compile_kernel
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.geometry.block_rows import AnyIntArray, Couplings, NumberArray, find_entry, zero_matrix
-from contactverif.geometry.compiled import compile_inline, compile_kernel
 from contactverif_surfaces.centre_geometry import (
     CORNERS,
     FRAME,

@@ -25,9 +25,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactverif.compiler import compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.compiled import compile_maker, compile_part
 from contactverif_surfaces.face_tree import Tree, collect_boxes, grow_tree
 
 MOST_CORNERS = 9  # Two quadrilaterals overlap in eight corners at most, and the clip may count one twice.

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactverif.compiler import compile_kernel, compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
-from contactverif.geometry.compiled import compile_kernel, compile_maker, compile_part
 
 LEAF = 4  # The number of boxes in a leaf.
 BITS = 20  # The bits of a place along each axis; three such numbers are interleaved in 60 bits.

@@ -45,9 +45,9 @@ from scipy import sparse
 from contactverif import Interface, Subject, evaluate_both, load_formulation
 from contactverif.contract.state_vector import split_state
 from contactverif.geometry import block_rows
-from contactverif.geometry.block_rows import Couplings, zero_matrix
-from contactverif.geometry.local_matrix import NO_NODE, share_couplings
+from contactverif.geometry.block_rows import NO_NODE, Couplings, zero_matrix
 from contactverif.geometry.projection import search_tree
+from contactverif.geometry.threads import share_couplings
 from contactverif_nts.box3_couplings import list_couplings
 from contactverif_nts.box3_tangent import add_forces_and_tangent
 

@@ -36,13 +36,13 @@ def add_all(matrix: Any, dense: Any, couplings: Couplings, seed: int) -> None:
                 block = random.normal(size=dense[unknowns(row), unknowns(column)].shape)
                 dense[unknowns(row), unknowns(column)] += block
                 if row < N_NODES and column < N_NODES:
-                    add_block(*arrays, row, column, *block.ravel())
+                    add_block(arrays, row, column, *block.ravel())
                 elif column < N_NODES:
-                    add_row(*arrays, N_NODES + row, column, *block.ravel())
+                    add_row(arrays, N_NODES + row, column, *block.ravel())
                 elif row < N_NODES:
-                    add_column(*arrays, row, N_NODES + column, *block.ravel())
+                    add_column(arrays, row, N_NODES + column, *block.ravel())
                 else:
-                    add_entry(*arrays, N_NODES + row, N_NODES + column, block.item())
+                    add_entry(arrays, N_NODES + row, N_NODES + column, block.item())
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from contactverif import Interface
-from contactverif.geometry.chain_search import NO_PLACE, is_next, nearest_place_from
-from contactverif.geometry.projection import PointOnSegment, nearest_place, search_tree
+from contactverif.geometry.projection import (
+    NO_PLACE,
+    PointOnSegment,
+    is_next,
+    nearest_place,
+    nearest_place_from,
+    search_tree,
+)
 
 
 def spiral() -> Any:
@@ -65,9 +71,5 @@ def test_several_chains_with_one_node_in_the_same_place_as_another_of_the_slave(
 
 def test_a_search_goes_on_along_a_chain_only() -> None:
     slave = np.array([[0, 1], [1, 2], [5, 6]])
-    assert [is_next(slave, 0, 0), is_next(slave, 0, 1), is_next(slave, 1, 2), is_next(slave, 1, 0)] == [
-        True,
-        True,
-        False,
-        False,
-    ]
+    follows = [is_next(slave, *pair) for pair in ((0, 0), (0, 1), (1, 2), (1, 0))]
+    assert follows == [True, True, False, False]

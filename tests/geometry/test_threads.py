@@ -5,8 +5,7 @@ from threading import get_ident
 import numpy as np
 import pytest
 
-from contactverif.geometry.local_matrix import share_couplings
-from contactverif.geometry.threads import LEAST_PART, run_in_threads, split_range
+from contactverif.geometry.threads import LEAST_PART, run_in_threads, share_couplings, split_range
 
 
 def test_a_range_is_split_into_parts_that_are_worth_a_thread() -> None:

@@ -11,9 +11,9 @@ import skfem
 from subjects import Changed, load_subject
 
 from contactverif import Body, Case, Interface, MisuseError, Subject, Surface, body_from_mesh, oracle
+from contactverif.compiler import python_function
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.geometry import chain_search, projection
-from contactverif.geometry.compiled import python_function
+from contactverif.geometry import projection
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.bulk import assemble_stiffness
@@ -434,11 +434,9 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
     Counted inside the search itself: its own Python functions run, not compiled, with a counter for a distance.
     """
     distance = python_function(projection.distance_to_segment)
-    searches = [(chain_search, "nearest_place", python_function(projection.nearest_place))]
-    searches += [
-        (chain_search, name, getattr(chain_search, name)) for name in ("_look_at", "_look_at_leaf", "_look_below")
-    ]
-    searches += [(module, "nearest_place_from", chain_search.nearest_place_from) for module in (eq6, walk)]
+    searches = [(projection, "nearest_place", python_function(projection.nearest_place))]
+    searches += [(projection, name, getattr(projection, name)) for name in ("_look_at", "_look_at_leaf", "_look_below")]
+    searches += [(module, "nearest_place_from", projection.nearest_place_from) for module in (eq6, walk)]
     searches += [(module, "_pair_points", module._pair_points) for module in (eq6, walk)]
 
     def count(name: str, case: Case) -> Counts:
@@ -450,8 +448,7 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
 
         subject = load_subject(name)
         with monkeypatch.context() as patched:
-            for module in (projection, chain_search):
-                patched.setattr(module, "distance_to_segment", counting)
+            patched.setattr(projection, "distance_to_segment", counting)
             for module, function, compiled in searches:
                 patched.setattr(module, function, python_function(compiled))
             pairing = subject.for_case(case).pair(case.interface, case.z)

@@ -11,7 +11,7 @@ from subjects import load_subject
 from surfaces import make_bent
 
 from contactverif import Interface
-from contactverif.geometry.compiled import python_function
+from contactverif.compiler import python_function
 
 NAMES = (
     *FORMULATIONS,

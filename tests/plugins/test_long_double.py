@@ -11,7 +11,7 @@ import pytest
 from compute_uncompiled import PENALTY, RATIOS, bent_states, far_states
 from every_formulation import FORMULATIONS
 
-from contactverif.geometry import compiled
+from contactverif import compiler
 from contactverif.plugins.registry import load_formulation
 
 pytestmark = pytest.mark.skipif(
@@ -34,8 +34,8 @@ def in_long_double(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def test_compiled_kernels_promise_no_long_double() -> None:
-    assert compiled.ARE_KERNELS_COMPILED
-    assert not compiled.TAKES_LONGDOUBLE
+    assert compiler.ARE_KERNELS_COMPILED
+    assert not compiler.TAKES_LONGDOUBLE
     assert not load_formulation("mortar").traits.abilities.takes_longdouble
 
 

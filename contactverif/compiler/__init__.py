@@ -1,14 +1,19 @@
-"""The store of compiled kernels, beside their source or in the user's cache: damage in it never reaches a formulation.
+"""The one place that knows the compiler: a typed `numba.njit`, whose machine code is kept in files that are checked.
 
-A process that has another folder for what it compiles (NUMBA_CACHE_DIR) reads the usual stores, too, and leaves them as
-they are. So a plugin in a box, which may write to a folder of its own alone, compiles what nobody has compiled.
+Kernels are compiled at their first call and stored beside their source or in the user's cache. A kernel writes to
+arrays that Python made, and counts no references to them: so it has half the code, and a call inside it is free. Where
+the environment variable NUMBA_DISABLE_JIT is 1 nothing is compiled: kernels are hundreds of times slower, and take
+every type that numpy has. A formulation then computes in ``numpy.longdouble`` if its constants have the precision of
+its state, too (`match_precision`).
 
 numba trusts its files. A truncated one raises an error where a kernel is called, as if the plugin had failed, and a
 changed one may crash the process. Here each file ends with a digest. A file whose digest is wrong counts as absent: the
-kernel is compiled again and the file is replaced. A store that cannot be written is no error either.
+kernel is compiled again and the file is replaced. A store that cannot be written is no error either. numba compiles a
+kernel again if its own file has changed. The code of all that it calls is stored with it, and so are the numbers of
+modules that it reads; a change of these counts here, too.
 
-numba compiles a kernel again if its own file has changed. The code of all that it calls is stored with it, and so are
-the numbers of modules that it reads; a change of these counts here, too.
+A process that has another folder for what it compiles (NUMBA_CACHE_DIR) reads the usual stores, too, and leaves them as
+they are. So a plugin in a box, which may write to a folder of its own alone, compiles what nobody has compiled.
 
 Rule for the next editor: only this file knows the inside of numba's cache. Where a version of numba has another inside,
 kernels are stored as numba does it, unchecked.
@@ -22,25 +27,90 @@ from collections.abc import Callable
 from functools import cached_property
 from numbers import Number
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core import caching
 from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
+from contactverif.contract.arrays import Array, FloatArray
+
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_PART_OPTIONS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False}
 _DIGEST = 32  # Bytes at the end of a file.
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+ARE_KERNELS_COMPILED = not cast(Any, numba.config).DISABLE_JIT
+# Whether a formulation made of kernels can promise the trait `takes_longdouble` in this process.
+TAKES_LONGDOUBLE = not ARE_KERNELS_COMPILED and bool(np.finfo(np.longdouble).nmant > np.finfo(np.float64).nmant)
+
+
+def compile_kernel(function: Kernel) -> Kernel:
+    """Compile a function that Python calls and that makes no array; division by zero gives infinity or NaN."""
+    return cast(Kernel, compile_stored(function, nogil=True, _nrt=False, **_OPTIONS))
+
+
+def compile_maker(function: Kernel) -> Kernel:
+    """Compile a function that Python or another one calls, and that makes arrays."""
+    return cast(Kernel, compile_stored(function, nogil=True, _nrt=True, **_OPTIONS))
+
+
+def compile_part(function: Kernel) -> Kernel:
+    """Compile a function that kernels call, which makes no array; its code is stored with the kernel's."""
+    return cast(Kernel, _guard(numba.njit(**_PART_OPTIONS)(function)))
+
+
+def compile_inline(function: Kernel) -> Kernel:
+    """Compile a function as `compile_part` does, and put its code wherever a kernel calls it."""
+    return cast(Kernel, _guard(numba.njit(forceinline=True, **_PART_OPTIONS)(function)))
+
+
+class _Part(CPUDispatcher):
+    """A function without a wrapper for Python; numba would crash the process where Python calls one."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function through a kernel that is made for it at the first call."""
+        if not hasattr(self, "_entry"):
+            self._entry = numba.njit(**_OPTIONS)(lambda *values: self(*values))
+        return self._entry(*arguments)
+
+
+def _guard(part: Any) -> Any:
+    if isinstance(part, CPUDispatcher):  # not where nothing is compiled
+        part.__class__ = _Part
+    return part
+
+
+def constant(value: int) -> int:
+    """Return an integer for a constant of a module that numba takes for no literal.
+
+    A function that is called with a literal, and in a loop with other integers, is compiled for both.
+    """
+    return cast(int, np.int64(value))
+
+
+def python_function(function: Kernel) -> Kernel:
+    """Return the Python function behind a compiled one, for coverage and for tests; or the function if not compiled."""
+    return cast(Kernel, getattr(function, "py_func", function))
+
+
+def match_precision(z: Array, *constants: FloatArray) -> tuple[FloatArray, ...]:
+    """Return constants in the precision of a state, real, complex or longdouble, so that no kernel rounds them.
+
+    Compiled kernels know float64 and complex128 alone; they get the constants as they are.
+    """
+    if ARE_KERNELS_COMPILED:
+        return constants
+    return tuple(constant.astype(z.real.dtype, copy=False) for constant in constants)
 
 
 class CheckedFiles(IndexDataCacheFile):
-    """The files of one kernel: an index and a file for each signature, each with its digest at the end.
+    """The files of one kernel: an index and a file for each signature, each with its digest at the end."""
 
-    `function` is the Python function of the kernel. `usual` are the files in the stores that are read if a signature is
-    not in this one.
-    """
-
-    function: Callable[..., Any]
-    usual: tuple[CheckedFiles, ...] = ()
+    function: Callable[..., Any]  # The Python function of the kernel.
+    usual: tuple[CheckedFiles, ...] = ()  # The files in the stores that are read if a signature is not in this one.
 
     @cached_property
     def stamp(self) -> tuple[Any, ...]:

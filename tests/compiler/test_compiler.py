@@ -12,11 +12,11 @@ import numba
 import pytest
 from numba.core import caching
 
-from contactverif.geometry.compiled import ARE_KERNELS_COMPILED
+from contactverif.compiler import ARE_KERNELS_COMPILED
 
 pytestmark = pytest.mark.skipif(not ARE_KERNELS_COMPILED, reason="nothing is compiled")
 SOURCE = """
-from contactverif.kernel_store.checked_files import compile_stored
+from contactverif.compiler import compile_stored
 
 def add(a, b):
     return a + b
@@ -96,7 +96,7 @@ def test_a_file_of_numba_without_a_digest_counts_as_absent(tmp_path: Path) -> No
 
 
 CALLED = """
-from contactverif.geometry.compiled import compile_part
+from contactverif.compiler import compile_part
 
 @compile_part
 def double(a):
@@ -104,7 +104,7 @@ def double(a):
 """
 CALLING = """
 from called_kernel import double
-from contactverif.kernel_store.checked_files import compile_stored
+from contactverif.compiler import compile_stored
 from number_of_kernel import NUMBER
 
 def _take_back(a):
