@@ -33,13 +33,12 @@ from contactverif.contract.option_checks import check_count, check_penalty, chec
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import NO_NODE, Couplings, zero_matrix
+from contactverif.geometry.block_rows import NO_NODE, Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree
 from contactverif.geometry.threads import run_in_threads, share_couplings, split_range
-from contactverif_nts import box3, box3_tangent, walk
-from contactverif_nts.box3_couplings import list_couplings
-from contactverif_nts.eq6 import AREAS, CURRENT, Fields
-from contactverif_nts.point_contact import POINT_TRAITS, add_locking, place_points, surfaces_of
+from contactverif_nts import vts_ppt_force, vts_ppt_tangent, walk
+from contactverif_nts.nts_force import AREAS, CURRENT
+from contactverif_nts.point_contact import POINT_TRAITS, add_locking, place_points, surfaces_of, with_multipliers
 from contactverif_nts.walk import FREE_ENDS, Areas
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
@@ -78,7 +77,7 @@ class PatchTestPassing:
     # Distributed stiffness ε̂; with multipliers (trait `enforcement`) the scale c of the decision λ − c g ≥ 0.
     penalty: float
     n: int  # Number of virtual slave nodes on a slave segment.
-    transmission: int  # `box3.PRINTED` or `box3.BALANCED`.
+    transmission: int  # `vts_ppt_force.PRINTED` or `vts_ppt_force.BALANCED`.
     consistent: bool  # The tangent is exact; else it is that of VTS-ME.
     # Areas of competence are measured in the current configuration; else in the reference configuration.
     current_area: bool
@@ -93,18 +92,18 @@ class PatchTestPassing:
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the master segments under each area of competence, and decide which virtual slave nodes are active."""
-        x, multipliers = split_state(interface, z)
-        tree = search_tree(interface.master, x)
+        state = split_state(interface, z)
+        tree = search_tree(interface.master, state[0])
         surfaces = surfaces_of(interface, interface.nodes)
-        balanced = self.transmission == box3.BALANCED
+        balanced = self.transmission == vts_ppt_force.BALANCED
         search = self.n, self.free_end, self.tau, self.penalty, balanced
-        areas = walk.pair(x, multipliers, surfaces, tree, search, self.threads)
+        areas = walk.pair(state, surfaces, tree, search, self.threads)
         return Pairing(dict(zip(Areas._fields, areas, strict=True)))
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns) of Box 3 and, behind them, the constraints of multipliers."""
         x, multipliers = split_states(interface, z)
-        forces, rows = box3.residual(x, multipliers, *self._arguments(interface, pairing, z))
+        forces, rows = vts_ppt_force.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
@@ -123,18 +122,17 @@ class PatchTestPassing:
 
     def _sweep(self, interface: Interface, pairing: Pairing, z: FloatArray) -> tuple[FloatArray, sparse.csr_array]:
         """Compute the residual and its exact derivative."""
-        x, multipliers = split_state(interface, z)
-        surfaces, areas, options = self._arguments(interface, pairing, z)
-        n_nodes = interface.n_nodes
-        group, first_multiplier = (1, n_nodes) if len(multipliers) else (self.n, NO_NODE)
-        couplings = list_couplings(surfaces, areas, self.n, group, first_multiplier)
-        matrix = zero_matrix(n_nodes, len(multipliers), Couplings(couplings[0], couplings[1], couplings[1][:-1]))
+        state, arguments = split_state(interface, z), self._arguments(interface, pairing, z)
+        n_nodes, n_multipliers = interface.n_nodes, len(state[1])
+        group, first_multiplier = (1, n_nodes) if n_multipliers else (self.n, NO_NODE)
+        couplings = vts_ppt_tangent.list_couplings(*arguments[:2], self.n, group, first_multiplier)
+        matrix = zero_matrix(n_nodes, n_multipliers, Couplings(couplings[0], couplings[1], couplings[1][:-1]))
         rows, csr = np.zeros(z.size), (matrix.indptr, matrix.indices, matrix.data)
-        parts = split_range(len(couplings[2]), self.threads)
-        shares = share_couplings(n_nodes + len(multipliers), couplings[0], couplings[1], parts)
-        arguments = rows, csr, x, multipliers, surfaces, areas, options, couplings
-        sweep = box3_tangent.add_forces_and_tangent
-        run_in_threads([partial(sweep, *arguments, tuple(share)) for share in shares])
+        shares = share_couplings(
+            n_nodes + n_multipliers, couplings[0], couplings[1], split_range(len(couplings[2]), self.threads)
+        )
+        sweep = partial(vts_ppt_tangent.add_forces_and_tangent, rows, csr, state, arguments, couplings)
+        run_in_threads([partial(sweep, tuple(share)) for share in shares])
         return rows, matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
@@ -146,7 +144,7 @@ class PatchTestPassing:
         slave, master = interface.slave.segments, interface.master.segments
         ends = np.array(
             [
-                box3.area_of_competence(x, slave, master, self.n, point, *cut)
+                vts_ppt_force.area_of_competence(x, slave, master, self.n, point, *cut)
                 for point, cut in enumerate(zip(pairing["frame"], pairing["cut_p"], pairing["cut_q"], strict=True))
             ]
         )  # (n_points, 2): P and Q
@@ -192,7 +190,7 @@ def vts_ppt(
         traits=_promises_as_printed(rule, check_count(n)),
         penalty=check_penalty(penalty),
         n=check_count(n),
-        transmission=box3.PRINTED,
+        transmission=vts_ppt_force.PRINTED,
         consistent=True,
         current_area=True,
         free_end=rule,
@@ -238,10 +236,35 @@ def vts_ppt_balanced(
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
     return replace(
         consistent,
-        transmission=box3.BALANCED,
+        transmission=vts_ppt_force.BALANCED,
         current_area=current,
         traits=_balanced_promises(consistent.free_end, n, current),
     )
+
+
+def vts_ppt_lm(
+    *,
+    penalty: float,
+    n: int = 2,
+    transmission: str = "printed",
+    free_end: str = "",
+    tau: float = 1e-2,
+    threads: int = 1,
+) -> PatchTestPassing:
+    """VTS-PPT with a multiplier, a pressure, at each virtual slave node.
+
+    It passes the flat patch test, as `vts_ppt` does. Box 3 spreads its forces and Eq. 6 measures its gaps, so its
+    tangent is unsymmetric. With n ≥ 2 its multipliers are not unique (case A1). With a fine slave the saddle point is
+    singular in the positions too, and Newton's method may find no solution though there is an exact one (case C with
+    each segment divided by two). With n = 1 neither happens.
+
+    References
+    ----------
+    Zavarise & De Lorenzis (2009), Sections 6 and 7.1; rows and tangent: here.
+    """
+    make = choose("transmission", transmission, {"printed": vts_ppt, "balanced": vts_ppt_balanced})
+    springs = make(penalty=penalty, n=n, tau=tau, threads=threads, **({"free_end": free_end} if free_end else {}))
+    return replace(springs, traits=with_multipliers(springs.traits, n))
 
 
 # No promise depends on the penalty, and a formulation is made for the penalty of each case. So promises are kept.

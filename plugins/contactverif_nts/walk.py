@@ -33,6 +33,7 @@ import numpy as np
 
 from contactverif.compiler import compile_inline, compile_kernel
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.geometry.block_rows import Fields
 from contactverif.geometry.projection import (
     NO_PLACE,
     PointOnSegment,
@@ -49,7 +50,7 @@ from contactverif.geometry.projection import (
     node,
 )
 from contactverif.geometry.threads import run_in_threads, split_range
-from contactverif_nts.eq6 import Fields, is_pressed
+from contactverif_nts.nts_force import is_pressed
 
 TRUNCATE, EXTEND, COVER = 0, 1, 2  # What happens to an area of competence that overhangs a free end.
 FREE_ENDS = {"truncate": TRUNCATE, "extend": EXTEND, "cover": COVER}  # The words of the option `free_end`.
@@ -79,25 +80,20 @@ def middle_of_part(i: int, n: int, unity: float) -> float:
     return (2 * (i % n) + 1) * unity / n - 1
 
 
-class Search(NamedTuple):
-    """The options of the pairing, in this order."""
+def pair(state: Fields, surfaces: Fields, tree: Tree, options: Fields, threads: int) -> Fields:
+    """Return the fields of `Areas` for all virtual slave nodes, at x (n_nodes, 2) and multipliers.
 
-    n: int  # virtual slave nodes on a slave segment
-    free_end: int  # TRUNCATE, EXTEND or COVER
-    tau: float  # the part of a master segment by which a foot may lie past its free end
-    penalty: float
-    balanced: bool
-
-
-def pair(x: FloatArray, multipliers: FloatArray, surfaces: Fields, tree: Tree, options: Fields, threads: int) -> Fields:
-    """Return the fields of `Areas` for the virtual slave nodes, at x (n_nodes, 2); `options` are `Search`."""
+    `options` are, in this order: n, the number of virtual slave nodes on a slave segment; `free_end`, TRUNCATE, EXTEND
+    or COVER; τ, the part of a master segment by which a foot may lie past its free end; the penalty; and whether the
+    transmission is balanced.
+    """
     n, n_segments = options[0], len(surfaces[1])
     integers = np.full((8, n_segments * n), NOT_CUT, dtype=np.int64)
     active = np.zeros(n_segments * n, dtype=np.bool_)
     areas = *integers, active
     run_in_threads(
         [
-            partial(_pair_points, begin * n, end * n, areas, x, multipliers, surfaces, tree, options)
+            partial(_pair_points, begin * n, end * n, areas, state, surfaces, tree, options)
             for begin, end in split_range(n_segments, threads)
         ]
     )
@@ -106,20 +102,14 @@ def pair(x: FloatArray, multipliers: FloatArray, surfaces: Fields, tree: Tree, o
 
 @compile_kernel
 def _pair_points(
-    begin: int,
-    end: int,
-    areas: Fields,
-    x: FloatArray,
-    multipliers: FloatArray,
-    surfaces: Fields,
-    tree: Tree,
-    options: Fields,
+    begin: int, end: int, areas: Fields, state: Fields, surfaces: Fields, tree: Tree, options: Fields
 ) -> None:
     """Write the entries of the virtual slave nodes from begin to end.
 
     A virtual slave node is active where `is_pressed` says so, its foot is on the surface and s(P) < s(Q). A balanced
     walk does not begin where the whole area lies past one end of V's segment.
     """
+    x, multipliers = state
     _, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     order, boxes = tree

@@ -48,8 +48,7 @@ from contactverif.geometry import block_rows
 from contactverif.geometry.block_rows import NO_NODE, Couplings, zero_matrix
 from contactverif.geometry.projection import search_tree
 from contactverif.geometry.threads import share_couplings
-from contactverif_nts.box3_couplings import list_couplings
-from contactverif_nts.box3_tangent import add_forces_and_tangent
+from contactverif_nts.vts_ppt_tangent import add_forces_and_tangent, list_couplings
 
 OURS = ("vts-ppt", "vts-ppt, same pairing", "vts-ppt-balanced", "nts-ar", "sts", "mortar")
 ON_FACES = ("vts-cell-3d", "vts-cell-3d, same pairing")
@@ -285,21 +284,21 @@ def time_steps(n_slave: int, turns: int) -> dict[str, float]:
     plugin, z, stream = subject.with_penalty(10.0).plugin, interface.nodes.ravel(), np.ones(STREAM_BYTES // 8)
     n_nodes, table = interface.n_nodes, []
     for _ in range(turns + 1):  # The first turn compiles.
-        x, multipliers = split_state(interface, z)
+        state = split_state(interface, z)
         clock = [process_time()]
-        search_tree(interface.master, x)
+        search_tree(interface.master, state[0])
         clock.append(process_time())
         pairing = plugin.pair(interface, z)
         clock.append(process_time())
-        surfaces, areas, options = plugin._arguments(interface, pairing, z)
-        couplings = list_couplings(surfaces, areas, plugin.n, plugin.n, NO_NODE)
+        arguments = plugin._arguments(interface, pairing, z)
+        couplings = list_couplings(*arguments[:2], plugin.n, plugin.n, NO_NODE)
         clock.append(process_time())
         block_rows._latest.clear()
         tangent = zero_matrix(n_nodes, 0, Couplings(couplings[0], couplings[1], couplings[1][:-1]))
         clock.append(process_time())
         rows, csr = np.zeros(z.size), (tangent.indptr, tangent.indices, tangent.data)
         (share,) = share_couplings(n_nodes, couplings[0], couplings[1], [(0, len(couplings[2]))])
-        sweep = rows, csr, x, multipliers, surfaces, areas, options, couplings, tuple(share)
+        sweep = rows, csr, state, arguments, couplings, tuple(share)
         add_forces_and_tangent(*sweep)
         clock.append(process_time())
         add_forces_and_tangent(*sweep)

@@ -22,7 +22,7 @@ from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigi
 from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, two_blocks
-from contactverif_nts import eq6, walk
+from contactverif_nts import nts_force, walk
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
@@ -436,8 +436,8 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
     distance = python_function(projection.distance_to_segment)
     searches = [(projection, "nearest_place", python_function(projection.nearest_place))]
     searches += [(projection, name, getattr(projection, name)) for name in ("_look_at", "_look_at_leaf", "_look_below")]
-    searches += [(module, "nearest_place_from", projection.nearest_place_from) for module in (eq6, walk)]
-    searches += [(module, "_pair_points", module._pair_points) for module in (eq6, walk)]
+    searches += [(module, "nearest_place_from", projection.nearest_place_from) for module in (nts_force, walk)]
+    searches += [(module, "_pair_points", module._pair_points) for module in (nts_force, walk)]
 
     def count(name: str, case: Case) -> Counts:
         evaluated: list[bool] = []

@@ -22,20 +22,7 @@ from contactverif import Pairing
 
 PACKAGE = "contactverif_nts"
 # The modules of the copy, in the order in which they import each other.
-MODULES = (
-    "force_tables",
-    "eq6",
-    "turned_force",
-    "eq6_tangent",
-    "walk",
-    "box3",
-    "box3_couplings",
-    "box3_gains",
-    "box3_tangent",
-    "point_contact",
-    "patch_test_passing",
-    "nts_multipliers",
-)
+MODULES = ("nts_force", "walk", "vts_ppt_force", "vts_ppt_tangent", "point_contact", "patch_test_passing")
 
 _numbers = itertools.count()
 

@@ -94,7 +94,7 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str) -> None:
 
 def test_a_mutant_whose_line_is_gone_says_so() -> None:
     with pytest.raises(AssertionError, match="no line 'no such line'"):
-        changed_line("box3", "no such line", "", factory="vts_ppt")
+        changed_line("vts_ppt_force", "no such line", "", factory="vts_ppt")
 
 
 def test_the_matrix_marks_what_was_meant_and_what_survives() -> None:

@@ -55,7 +55,7 @@ def _stiffens(factor: float) -> Any:
     return make
 
 
-def _line(name: str, caught_by: str, old: str, new: str, factory: str, module: str = "eq6") -> Mutant:
+def _line(name: str, caught_by: str, old: str, new: str, factory: str, module: str = "nts_force") -> Mutant:
     return Mutant(name, caught_by, changed_line(module, old, new, factory=factory))
 
 

@@ -9,8 +9,8 @@ from surfaces import make_bent
 import contactverif_nts
 from contactverif import Interface, MisuseError
 from contactverif.geometry import threads
-from contactverif_nts.box3_couplings import WHOLE, list_couplings
 from contactverif_nts.patch_test_passing import PatchTestPassing
+from contactverif_nts.vts_ppt_tangent import WHOLE, list_couplings
 
 METHODS = [("vts_ppt", {}), ("vts_ppt", {"n": 3}), ("vts_ppt_balanced", {}), ("vts_ppt_lm", {})]
 IDS = [f"{name}{options or ''}" for name, options in METHODS]

@@ -24,7 +24,7 @@ from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
-from contactverif_nts import force_tables
+from contactverif_nts.point_contact import FORCE_TABLES
 from contactverif_properties.exact_forces import (
     directions,
     exact_slave_forces,
@@ -259,7 +259,7 @@ def _quarters(nodes: list[Fraction]) -> list[tuple[Fraction, Fraction]]:
 
 @pytest.mark.parametrize(
     ("table", "rule"),
-    [(force_tables.NTS, _units), (force_tables.NTS_AR, _areas), (force_tables.VTS_ME, _quarters)],
+    [(FORCE_TABLES["nts"], _units), (FORCE_TABLES["nts-ar"], _areas), (FORCE_TABLES["vts-me"], _quarters)],
     ids=["NTS", "NTS-AR", "VTS-ME"],
 )
 def test_the_tables_are_what_the_lever_rule_gives_by_hand(table: Any, rule: Any) -> None:

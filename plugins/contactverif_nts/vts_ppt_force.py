@@ -1,4 +1,4 @@
-"""Box 3, the residual of VTS-PPT: the force of a virtual slave node V, spread over all master segments under its area.
+"""The residual of VTS-PPT (Box 3): the force of a virtual slave node V, spread over all master segments under its area.
 
 One segment: Eq. 6. Otherwise segment j with nodes f, m and projected length L_j carries the part [a, b] of itself:
 
@@ -17,8 +17,9 @@ Rules for the next editor:
 
 1. All decisions are in the pairing (`walk.Areas`). Nothing here compares real numbers.
 2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
-3. A kernel gets the fields of `Surfaces`, `Areas` and `Options` as plain tuples and unpacks them first; `eq6` says why.
-4. `box3_tangent` differentiates this file line by line. Change both.
+3. A kernel gets the fields of `Surfaces`, `Areas` and `Options` as plain tuples and unpacks them first; `nts_force`
+   says why.
+4. `vts_ppt_tangent` differentiates this file line by line. Change both.
 
 Source: Zavarise & De Lorenzis (2009), Box 3, Eqs. 6, 8, 9.
 """
@@ -31,8 +32,9 @@ import numpy as np
 
 from contactverif.compiler import compile_kernel, compile_part
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.geometry.block_rows import Fields
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, cross, dot, frame, minus, node
-from contactverif_nts.eq6 import Fields, push
+from contactverif_nts.nts_force import push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
 
 PRINTED, BALANCED = 0, 1  # How the master side gets its share.
@@ -91,7 +93,6 @@ def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, opti
 def _add_residual(
     forces: Array, rows: Array, x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields
 ) -> None:
-    """Add forces and constraint rows to arrays of zeros."""
     reference, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     n, transmission, current_area, penalty = options
