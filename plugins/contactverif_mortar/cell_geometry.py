@@ -146,7 +146,7 @@ def _average_turn(
 
 
 @compile_part
-def cut_gains(
+def variation_of_cut(
     d_c: FloatArray, c: float, cutting: int, x_e: Vector, view: SlaveView, d_omega_a: FloatArray, d_omega_b: FloatArray
 ) -> None:
     """Write Δ of the c from which local node `cutting`, at x_e, is seen, into d_c (n_local, 2).
@@ -173,10 +173,16 @@ def cut_gains(
 
 
 @compile_part
-def point_gains(
-    gains: FloatArray, c: float, view: SlaveView, x_1: Vector, x_2: Vector, d_omega_a: FloatArray, d_omega_b: FloatArray
+def variation_of_point(
+    variation: FloatArray,
+    c: float,
+    view: SlaveView,
+    x_1: Vector,
+    x_2: Vector,
+    d_omega_a: FloatArray,
+    d_omega_b: FloatArray,
 ) -> None:
-    """Write Δξ, Δg and ω at c into `gains` (5, n_local, 2), which holds Δc already.
+    """Write Δξ, Δg and ω at c into `variation` (5, n_local, 2), which holds Δc already.
 
         (x_2 − x_1)·τ Δξ = τ·(Δx_s − (1−ξ)Δx_1 − ξΔx_2) − g ω
         Δg = n·((1−ξ)Δx_1 + ξΔx_2 − Δx_s) + n·(x_2 − x_1) Δξ
@@ -195,9 +201,9 @@ def point_gains(
     bend = -dot(minus(n_b, n_a), tau) / 2 / size
     along_tau, along_n = dot(ab, tau) / 2, dot(ab, n) / 2
     shape = ((1 - c) / 2, (1 + c) / 2, -(1 - xi), -xi)
-    for k in range(gains.shape[1]):
+    for k in range(variation.shape[1]):
         for i in range(2):
-            d_c = gains[D_C, k, i]
+            d_c = variation[D_C, k, i]
             omega = part_a * d_omega_a[k, i] + part_b * d_omega_b[k, i] + bend * d_c
             d_xi = along_tau * d_c - gap * omega
             d_gap = -along_n * d_c
@@ -205,6 +211,6 @@ def point_gains(
                 d_xi += shape[k] * tau[i]
                 d_gap -= shape[k] * n[i]
             d_xi /= length
-            gains[OMEGA, k, i] = omega
-            gains[D_XI, k, i] = d_xi
-            gains[D_GAP, k, i] = d_gap + lean * d_xi
+            variation[OMEGA, k, i] = omega
+            variation[D_XI, k, i] = d_xi
+            variation[D_GAP, k, i] = d_gap + lean * d_xi

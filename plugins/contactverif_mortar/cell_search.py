@@ -9,27 +9,34 @@ A slave segment and a master segment make a cell where
 4. the gap there is at most 2 (h_s + h_m) either way, h the longest segment of the chain. A deeper penetration is no
    contact, and neither is a floor far below an overhang (our choice; a penetration of two segments is well within it).
 
-Candidates come from the tree of `search_tree` through `strip_search`, at a cost of O(log n) for each slave segment and
-each candidate. What lies behind a surface that hides it is not looked at, so dense turns of a spiral cost no more.
+Candidates come from the tree of `search_tree`, at a cost of O(log n) for each slave segment and each candidate: the
+segments that may lie in a `Strip` over the slave segment. It holds all that the segment sees within a distance `reach`,
+on either side. A box is opened if it may meet the strip. What lies behind a surface that hides it is not looked at, so
+dense turns of a spiral cost no more.
 
-Rule for the next editor: this file makes decisions. It returns integers and booleans, never a real number.
+Rules for the next editor:
+
+1. `find_cells` makes decisions. It returns integers and booleans, never a real number.
+2. A doubt of some roundings keeps a box. No segment in the strip may be lost.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from contactverif.compiler import compile_inline, compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif.geometry.projection import Tree, Vector, dot, frame, minus, node
+from contactverif.geometry.projection import LEAF, Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
-from contactverif_mortar.strip_search import Region, collect_segments, holds, make_region, make_strip
 
 # The longest overlap, in c ∈ [−1, 1], that counts as none: roundoff could not tell its points apart.
 ROUNDOFF = 4 * UNIT_ROUNDOFF
 # The columns of the table of candidates: ends of the overlap, |gap| in its middle, and the largest |gap| on it.
 LOW, HIGH, GAP, DEPTH, N_COLUMNS = range(5)
+AHEAD = 8  # A region reaches so many strips ahead.
 
 
 def longest_of_chain(surface: Surface, x: FloatArray) -> FloatArray:
@@ -106,7 +113,7 @@ def find_cells(
             strip = make_strip(view, reach)
             if not holds(region, strip):
                 region = make_region(strip, tree[1])
-            count = collect_segments(strip, region.box, tree[0], tree[1], waiting, members)
+            count = collect_segments(strip, region.box, tree, waiting, members)
             count = _find_candidates(x, master, view, count, slave_longest[s], master_longest, members, table)
             if reach >= farthest or _hides(table, count, reach / 2):
                 break
@@ -246,3 +253,136 @@ def overlap(view: SlaveView, x_1: Vector, x_2: Vector) -> tuple[float, float]:
     if dot(minus(x_1, x_b), tau_b) < 0:
         high = min(seen_from(x_1, view), 1.0)
     return low, high
+
+
+class Strip(NamedTuple):
+    """The strip over a slave segment a b, with directions n_a and n_b at its ends."""
+
+    a: Vector
+    b: Vector
+    n_a: Vector
+    n_b: Vector
+    reach: float
+    low: Vector  # The box around the strip, measured from a.
+    high: Vector
+    straight: bool  # n_a and n_b are the normal of the segment.
+
+
+@compile_part
+def make_strip(view: SlaveView, reach: float) -> Strip:
+    """Return the strip over all that a slave segment sees within a reach."""
+    a, b, n_a, n_b, straight = view
+    d = minus(b, a)
+    wide = (reach, reach)
+    if straight:
+        wide = (reach * abs(n_a[0]), reach * abs(n_a[1]))
+    doubt = 16 * UNIT_ROUNDOFF * (reach + abs(d[0]) + abs(d[1]))
+    low = (min(d[0], 0.0) - wide[0] - doubt, min(d[1], 0.0) - wide[1] - doubt)
+    high = (max(d[0], 0.0) + wide[0] + doubt, max(d[1], 0.0) + wide[1] + doubt)
+    return Strip(a, b, n_a, n_b, reach, low, high, straight)
+
+
+class Region(NamedTuple):
+    """A rectangle, and the smallest box of the tree that holds all segments which meet it.
+
+    The strips of slave segments that follow each other lie in one region, so that a search for them begins there and
+    not with the box of all segments.
+    """
+
+    origin: Vector  # A node nearby.
+    low: Vector  # Corners of the rectangle, measured from the origin.
+    high: Vector
+    box: int
+
+
+@compile_inline
+def holds(region: Region, strip: Strip) -> bool:
+    """Return whether a strip lies in a region, by more than roundoff."""
+    d = minus(strip.a, region.origin)
+    doubt = 16 * UNIT_ROUNDOFF * (abs(d[0]) + abs(d[1]) + strip.reach)
+    for axis in range(2):
+        if (
+            d[axis] + strip.low[axis] - doubt < region.low[axis]
+            or d[axis] + strip.high[axis] + doubt > region.high[axis]
+        ):
+            return False
+    return True
+
+
+@compile_part
+def make_region(strip: Strip, boxes: FloatArray) -> Region:
+    """Return the region that is `AHEAD` times as large as the box around a strip, on each side of it.
+
+    One goes down the tree as long as one half of the box alone meets the rectangle.
+    """
+    around = AHEAD * max(strip.high[0] - strip.low[0], strip.high[1] - strip.low[1])
+    low = (strip.low[0] - around, strip.low[1] - around)
+    high = (strip.high[0] + around, strip.high[1] + around)
+    box, n_leaves = 1, len(boxes) // 2
+    while box < n_leaves:
+        near = _in_rectangle(strip.a, low, high, boxes[2 * box])
+        far = _in_rectangle(strip.a, low, high, boxes[2 * box + 1])
+        if near == far:
+            break
+        box = 2 * box if near else 2 * box + 1
+    return Region(strip.a, low, high, box)
+
+
+@compile_inline
+def _in_rectangle(origin: Vector, low: Vector, high: Vector, box: FloatArray) -> bool:
+    """Return whether a box meets a rectangle; `holds` leaves room for the roundoff of both."""
+    for axis in range(2):
+        if box[axis] - origin[axis] > high[axis] or box[2 + axis] - origin[axis] < low[axis]:
+            return False
+    return True
+
+
+@compile_inline
+def collect_segments(strip: Strip, begin: int, tree: Tree, waiting: IntArray, members: IntArray) -> int:
+    """Write the segments below the box `begin` that may meet the strip, and some more, and return how many there are.
+
+    `waiting` (64,) is room for the boxes still to open, and `members` has room for all segments. They come in the
+    reverse order of their chains, which is that of the slave.
+    """
+    order, boxes = tree
+    n_leaves = len(boxes) // 2
+    count, n_waiting = 0, 1
+    waiting[0] = begin
+    while n_waiting > 0:
+        n_waiting -= 1
+        box = waiting[n_waiting]
+        if not _meets(strip, boxes[box, 0], boxes[box, 1], boxes[box, 2], boxes[box, 3]):
+            continue
+        if box < n_leaves:
+            waiting[n_waiting], waiting[n_waiting + 1] = 2 * box, 2 * box + 1
+            n_waiting += 2
+            continue
+        start = (box - n_leaves) * LEAF
+        for place in range(min(start + LEAF, len(order)) - 1, start - 1, -1):
+            if order[place] >= 0:  # no padding
+                members[count] = order[place]
+                count += 1
+    return count
+
+
+@compile_part
+def _meets(strip: Strip, low_x: float, low_y: float, high_x: float, high_y: float) -> bool:
+    """Return whether a box may meet the strip. An empty box, from infinity to minus infinity, meets nothing."""
+    a, b, n_a, n_b, reach, low, high, straight = strip
+    a_low, a_high = minus((low_x, low_y), a), minus((high_x, high_y), a)
+    if a_low[0] > high[0] or a_low[1] > high[1] or a_high[0] < low[0] or a_high[1] < low[1]:
+        return False
+    b_low, b_high = minus((low_x, low_y), b), minus((high_x, high_y), b)
+    size = max(abs(a_low[0]), abs(a_low[1]), abs(a_high[0]), abs(a_high[1]))
+    size = max(reach, size, abs(b_low[0]), abs(b_low[1]), abs(b_high[0]), abs(b_high[1]))
+    doubt = 16 * UNIT_ROUNDOFF * size
+    # n × d, d from a or b to a corner: the largest is negative behind a, the smallest positive before b.
+    if max(n_a[0] * a_low[1], n_a[0] * a_high[1]) + max(-n_a[1] * a_low[0], -n_a[1] * a_high[0]) < -doubt:
+        return False
+    if min(n_b[0] * b_low[1], n_b[0] * b_high[1]) + min(-n_b[1] * b_low[0], -n_b[1] * b_high[0]) > doubt:
+        return False
+    if not straight:
+        return True
+    lowest = min(n_a[0] * a_low[0], n_a[0] * a_high[0]) + min(n_a[1] * a_low[1], n_a[1] * a_high[1])
+    highest = max(n_a[0] * a_low[0], n_a[0] * a_high[0]) + max(n_a[1] * a_low[1], n_a[1] * a_high[1])
+    return lowest <= reach + doubt and highest >= -reach - doubt

@@ -21,7 +21,7 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, check_tau, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, NumberArray, add_block
+from contactverif.geometry.block_rows import Couplings, Csr, NumberArray, add_block
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -34,12 +34,9 @@ from contactverif.geometry.projection import (
     node,
     search_tree,
 )
-from contactverif_mortar import cell_forces
-from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_tangent import ForcesAndTangent
-from contactverif_mortar.cell_traits import CELL_TRAITS
-from contactverif_mortar.integration_cells import AREAS, C, Cells, Csr, Quadrature
-from contactverif_mortar.node_groups import group_nodes
+from contactverif_mortar.cell_frame import ForcesAndTangent
+from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, C, Cells, Quadrature, forces, report_points
+from contactverif_mortar.node_factors import group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 
 N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure × a shape function has degree 2.
@@ -62,18 +59,18 @@ class ChenHisada:
             x, interface.n_slave_nodes, master.segments, master.neighbours, search_tree(master, x), self.tau
         )
         cells = Cells.find(interface, x, averaged=False)
-        return Pairing({**cells.as_arrays(), "nearest": nearest, "active": active})
+        return Pairing({**cells._asdict(), "nearest": nearest, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         x = np.array(z).reshape(-1, interface.n_nodes, 2)
         cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
-        ends = interface.slave.segments[np.repeat(cells.slave, len(self.quadrature))]
+        ends = interface.slave.segments[cells.carriers(len(self.quadrature))]
         points = self.quadrature.points(interface, cells, x)
         pressure = self._node_pressures(interface, pairing, x)[:, ends]  # (n_states, n_points, 2)
         c = points[..., C]
         at_points = (1 - c) / 2 * pressure[..., 0] + (1 + c) / 2 * pressure[..., 1]
-        return cell_forces.forces(points, at_points, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
+        return forces(points, at_points, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse: Σ p_i ΔB_i + B Δp."""
@@ -90,7 +87,7 @@ class ChenHisada:
         pattern = _couple(interface, cells, np.where(active[:, None], facing[:, 1:], facing[:, :1]))
         zeros, ones = np.zeros(len(active)), np.ones(len(active))
         state = NodeState(self._node_pressures(interface, pairing, x[None])[0], ones, zeros, ones)
-        shapes = weigh(interface, cells, self.quadrature, x, dual=False).shapes
+        _, _, shapes = weigh(interface, cells, self.quadrature, x, dual=False)
         rows = node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         csr = rows.rest.indptr, rows.rest.indices, rows.rest.data
         d_pressure = -self.penalty * _node_gap_rows(x, interface.master.segments, nearest)
@@ -102,11 +99,11 @@ class ChenHisada:
         cells = Cells.from_pairing(pairing)
         x = np.array(z).reshape(1, -1, 2)
         points = self.quadrature.points(interface, cells, x)[0]
-        ends = interface.slave.segments[np.repeat(cells.slave, len(self.quadrature))]
+        ends = interface.slave.segments[cells.carriers(len(self.quadrature))]
         nodal = self._node_pressures(interface, pairing, x)[0][ends]
         pressure = (1 - points[:, C]) / 2 * nodal[:, 0] + (1 + points[:, C]) / 2 * nodal[:, 1]
         active = np.logical_or.reduce(pairing["active"][ends], axis=1)
-        return at_points(interface, cells, points, z, pressure, active)
+        return report_points(interface, cells, points, z, pressure, active)
 
     def _node_pressures(self, interface: Interface, pairing: Pairing, x: Array) -> Array:
         """Return pressures (n_states, n_slave_nodes) at positions x (n_states, n_nodes, 2)."""

@@ -1,7 +1,13 @@
-"""The cells of a pairing, and the quadrature points on them with their Δ.
+"""The cells of a pairing, the quadrature points on them with their variations, and the forces of pressures there.
 
-`Cells` are decisions: they come from `cell_search` and are stored in a pairing. `Quadrature` puts points on them and
-computes every real number from the positions: `points` of many states, real or complex, `gains` of one real state.
+`Cells` are decisions: they come from `cell_search` and are stored in a pairing. `Quadrature` puts points on them, or on
+other parts of slave segments, and computes every real number from the positions: `points` of many states, real or
+complex, `variations` of one real state. With F = w p, w the weight (a length) of a point, p its pressure and n out of
+the slave:
+
+    R_A = (1−c)/2 F n    R_B = (1+c)/2 F n    R_1 = −(1−ξ) F n    R_2 = −ξ F n
+
+Forces and moments balance point by point, whatever the pressures are, because x_m − x_s is along n.
 
 A kernel gets the fields of a class of arrays as a plain tuple and unpacks them first: numba reads that in half
 the time.
@@ -9,17 +15,19 @@ the time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from contactverif.compiler import compile_inline, compile_maker, compile_part, match_precision
+from contactverif.compiler import TAKES_LONGDOUBLE, compile_inline, compile_maker, compile_part, match_precision
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.pairing import Pairing
-from contactverif.geometry.block_rows import AnyIntArray, NumberArray
-from contactverif.geometry.projection import Vector, frame, node, search_tree
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif.geometry.block_rows import Fields, NumberArray
+from contactverif.geometry.projection import frame, node, search_tree
 from contactverif_mortar.cell_geometry import (
     D_C,
     D_WEIGHT,
@@ -28,20 +36,40 @@ from contactverif_mortar.cell_geometry import (
     A,
     B,
     SlaveView,
-    cut_gains,
     facing_point,
-    point_gains,
     seen_from,
     slave_view,
     turn_of_ends,
+    variation_of_cut,
+    variation_of_point,
 )
 from contactverif_mortar.cell_search import averaging, find_cells, longest_of_chain
 
 C, XI, GAP, WEIGHT, NORMAL_X, NORMAL_Y = range(6)  # The numbers of a point, in this order.
 AREAS = {"current": True, "reference": False}  # The words of the option `area`.
-
-Fields = tuple[Any, ...]  # The fields of a class of arrays, as a plain tuple.
-Csr = tuple[AnyIntArray, AnyIntArray, FloatArray]  # The indptr, indices and data of compressed rows.
+# The cases that show locking, for methods that lock.
+LOCKING_WITNESSES = {"stability.locking": "12 on 8, ε̂ = 1e8 E/h", "accuracy.wavy-curved": "upper slave, 100 E/h"}
+# The promises that the methods on cells have in common; each method says what it changes.
+CELL_TRAITS = Traits(
+    promises=Promises(
+        patch=PatchPromises(flat=True, normal=True, single=True, kinked=True, overhang=True),
+        converges=True,
+        locks=False,
+        tangent="exact",
+        symmetric=False,
+        conserves_force=True,
+        conserves_moment=True,
+        continuity="C0",
+        integrates_linear_gap=True,
+        local=True,
+        nodes_push=True,
+        unbiased=False,
+        translation_stable=True,
+    ),
+    rules=Rules(gap="cells", force_along="slave normal", penalty="distributed"),
+    abilities=Abilities(batched=True, takes_complex=True, takes_longdouble=TAKES_LONGDOUBLE),
+    evidence=Evidence(witnesses={"symmetric": "offset-c", "swap": "tilted"}),
+)
 
 
 class Sides(NamedTuple):
@@ -57,16 +85,31 @@ class Sides(NamedTuple):
         return len(self.nodes)
 
 
-class Segments(NamedTuple):
-    """The arrays of an interface that the kernels read."""
+class Parts(Protocol):
+    """Parts of slave segments, each with a master segment and some or all points of a rule: `Cells`, for example."""
 
-    reference_length: FloatArray  # (n_slave_segments,)
-    slave: IntArray  # (n_slave_segments, 2), nodes
-    master: IntArray  # (n_master_segments, 2), nodes
+    @property
+    def slave(self) -> IntArray:
+        """The slave segment of each part (n_parts,), ascending."""
+
+    def select(self, selection: Any, /) -> Parts:
+        """Return some of the parts, selected by mask or range."""
+
+    def carriers(self, n_q: int) -> IntArray:
+        """Return the slave segment of each point (n_points,) of a rule with n_q points."""
+
+    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
+        """Return the local nodes of each part; A, B, 1, 2 come first."""
+
+    def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
+        """Return the arrays that kernels unpack, n_local, and the local nodes that cut the lower and the upper end.
+
+        The arrays are slave and master segment of each part, the nodes that cut its ends (−1 for none), the segments
+        with which normals are averaged, and the one point of the rule that each part has; none where it has all.
+        """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cells:
+class Cells(NamedTuple):
     """Pairs of a slave and a master segment, in the order of the slave segments."""
 
     slave: IntArray  # (n_cells,) The segments.
@@ -78,9 +121,9 @@ class Cells:
     behind: IntArray
 
     @classmethod
-    def find(cls, interface: Interface | Sides, x: FloatArray, averaged: bool) -> Cells:
+    def find(cls, sides: Interface | Sides, x: FloatArray, averaged: bool) -> Cells:
         """Find the cells at the positions x (n_nodes, 2)."""
-        slave, master = interface.slave, interface.master
+        slave, master = sides.slave, sides.master
         before = behind = np.full(len(slave), -1)
         if averaged:
             before, behind = averaging(x, slave.segments, slave.neighbours)
@@ -91,11 +134,7 @@ class Cells:
     @classmethod
     def from_pairing(cls, pairing: Pairing, prefix: str = "") -> Cells:
         """Return the cells of a pairing, whose names begin with a prefix."""
-        return cls(*(pairing[prefix + entry.name] for entry in fields(cls)))
-
-    def as_arrays(self, prefix: str = "") -> dict[str, IntArray | BoolArray]:
-        """Return the arrays by name, for a pairing."""
-        return {prefix + entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return cls(*(pairing[prefix + name] for name in cls._fields))
 
     def select(self, selection: BoolArray | IntArray | slice) -> Cells:
         """Return some of the cells, selected by mask, number or range."""
@@ -107,10 +146,21 @@ class Cells:
         carrying = any_end(nodes, interface.slave.segments, self.slave)
         return self if carrying.all() else self.select(carrying)
 
-    def local_nodes(self, interface: Interface | Sides) -> NumberArray:
+    def carriers(self, n_q: int) -> IntArray:
+        """Return the slave segment of each point (n_cells × n_q,)."""
+        return np.repeat(self.slave, n_q)
+
+    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
         """Return the nodes (n_cells, n_local): A, B, 1, 2, and with averaged normals those before A and behind B."""
-        arrays = (self.slave, self.master, self.before, self.behind)
-        return _local_nodes(interface.slave.segments, interface.master.segments, *arrays, self.averaged)
+        arrays = tuple(map(read_only, (self.slave, self.master, self.before, self.behind)))
+        return _local_nodes(sides.slave.segments, sides.master.segments, arrays, self.averaged)
+
+    def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
+        """Return what `Parts.cuts` says."""
+        ends = sides.master.segments[self.master]
+        low, high = np.where(self.cut_low, ends[:, 1], -1), np.where(self.cut_high, ends[:, 0], -1)
+        arrays = self.slave, self.master, low, high, self.before, self.behind, np.empty(0, np.int64)
+        return tuple(map(read_only, arrays)), (6 if self.averaged else 4, NODE_2, NODE_1)
 
     @property
     def averaged(self) -> bool:
@@ -120,7 +170,7 @@ class Cells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadrature:
-    """A quadrature rule for each cell."""
+    """A quadrature rule for each part of a slave segment."""
 
     places: FloatArray  # (n_q,) Places on [−1, 1], and weights that add up to 1.
     weights: FloatArray
@@ -135,49 +185,41 @@ class Quadrature:
     def __len__(self) -> int:
         return len(self.places)
 
-    def points(self, interface: Interface | Sides, cells: Cells, x: Array) -> Array:
-        """Compute the points (n_states, n_cells × n_q, 6) at real or complex x (n_states, n_nodes, 2).
+    def points(self, sides: Interface | Sides, parts: Parts, x: Array) -> Array:
+        """Compute the points (n_states, n_points, 6) at real or complex x (n_states, n_nodes, 2).
 
         Their numbers are c, ξ, gap (negative in penetration), weight (a length), and the normal out of the slave.
         """
-        return _points(x, *self._arguments(interface, cells, x))
+        reference, places, weights = match_precision(x, sides.nodes, self.places, self.weights)
+        segments = sides.slave.lengths(reference), sides.slave.segments, sides.master.segments
+        return _points(x, segments, parts.cuts(sides)[0], (places, weights, self.current))
 
-    def gains(self, interface: Interface, cells: Cells, x: FloatArray) -> FloatArray:
-        """Compute Δ of c, ξ, gap, weight, and the turn ω of the normal: (n_cells × n_q, 5, n_local, 2)."""
-        n_local = 6 if cells.averaged else 4
-        return _gains(x, n_local, *self._arguments(interface, cells, x))
+    def variations(self, sides: Interface | Sides, parts: Parts, x: FloatArray) -> FloatArray:
+        """Compute Δ of c, ξ, gap, weight, and the turn ω of the normal: (n_points, 5, n_local, 2)."""
+        segments = sides.slave.lengths(sides.nodes), sides.slave.segments, sides.master.segments
+        return _variations(x, segments, *parts.cuts(sides), (self.places, self.weights, self.current))
 
-    def _arguments(self, interface: Interface | Sides, cells: Cells, x: Array) -> tuple[Fields, Fields, Fields]:
-        """Return the fields of `Segments`, `Cells` and `Quadrature`."""
-        reference, places, weights = match_precision(x, interface.nodes, self.places, self.weights)
-        return (
-            (interface.slave.lengths(reference), interface.slave.segments, interface.master.segments),
-            (cells.slave, cells.master, cells.cut_low, cells.cut_high, cells.before, cells.behind),
-            (places, weights, self.current),
-        )
+
+def read_only(array: Any) -> Any:
+    """Return a view of an array that nobody writes to: a kernel is compiled once for all of them."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 @compile_maker
-def any_end(nodes: BoolArray, slave: IntArray, cell_slave: IntArray) -> BoolArray:
-    """Return for each cell whether one of the ends of its slave segment is among some nodes, given by mask."""
-    selection = np.empty(len(cell_slave), dtype=np.bool_)
-    for cell in range(len(cell_slave)):
-        s = cell_slave[cell]
-        selection[cell] = nodes[slave[s, 0]] or nodes[slave[s, 1]]
+def any_end(nodes: BoolArray, slave: IntArray, carrier: IntArray) -> BoolArray:
+    """Return for each carrying slave segment whether one of its ends is among some nodes, given by mask."""
+    selection = np.empty(len(carrier), dtype=np.bool_)
+    for i in range(len(carrier)):
+        selection[i] = nodes[slave[carrier[i], 0]] or nodes[slave[carrier[i], 1]]
     return selection
 
 
 @compile_maker
-def _local_nodes(
-    slave: IntArray,
-    master: IntArray,
-    cell_slave: IntArray,
-    cell_master: IntArray,
-    before: IntArray,
-    behind: IntArray,
-    averaged: bool,
-) -> NumberArray:
+def _local_nodes(slave: IntArray, master: IntArray, cells: Fields, averaged: bool) -> NumberArray:
     """Return the local nodes of each cell; where a segment to average with is missing, A stands for it."""
+    cell_slave, cell_master, before, behind = cells
     nodes = np.empty((len(cell_slave), 6 if averaged else 4), dtype=np.int32)
     for cell in range(len(cell_slave)):
         s, m = cell_slave[cell], cell_master[cell]
@@ -190,115 +232,192 @@ def _local_nodes(
 
 
 @compile_part
-def ends_of_part(view: SlaveView, x_low: Vector, x_high: Vector, cut_low: bool, cut_high: bool) -> tuple[float, float]:
-    """Return the lower and the upper end of a part of a slave segment, as c, cut by master nodes or not."""
+def ends_of_part(view: SlaveView, x: Array, low: int, high: int) -> tuple[float, float]:
+    """Return the lower and the upper end of a part of a slave segment, as c, cut by master nodes or not (−1)."""
     zero = 0 * view.x_a[0]  # has the type of the positions
-    low, high = zero - 1, zero + 1
-    if cut_low:
-        low = seen_from(x_low, view)
-    if cut_high:
-        high = seen_from(x_high, view)
-    return low, high
+    c_low, c_high = zero - 1, zero + 1
+    if low >= 0:
+        c_low = seen_from(node(x, low), view)
+    if high >= 0:
+        c_high = seen_from(node(x, high), view)
+    return c_low, c_high
 
 
 @compile_inline
-def write_point(
-    point: Array,
-    view: SlaveView,
-    x_1: Vector,
-    x_2: Vector,
-    low: float,
-    high: float,
-    place: float,
-    weight: float,
-    length: float,
-) -> None:
-    """Write the six numbers of the point at a place of the rule on the part [low, high] of a slave segment."""
-    c = (low + high) / 2 + (high - low) / 2 * place
-    xi, gap, n = facing_point(view, x_1, x_2, c)
-    point[C], point[XI], point[GAP] = c, xi, gap
-    point[WEIGHT] = weight * (high - low) / 2 * length
-    point[NORMAL_X], point[NORMAL_Y] = n
+def _points_of_part(slot: IntArray, part: int, n_q: int) -> tuple[int, int]:
+    """Return the first and the end of the points of the rule that a part has."""
+    return (slot[part], slot[part] + 1) if len(slot) > 0 else (0, n_q)
 
 
 @compile_maker
-def _points(x: Array, segments: Fields, cells: Fields, rule: Fields) -> Array:
+def _points(x: Array, segments: Fields, parts: Fields, rule: Fields) -> Array:
     """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
     reference_length, slave, master = segments
-    cell_slave, cell_master, cut_low, cut_high, before, behind = cells
+    carrier, partner, low_node, high_node, before, behind, slot = parts
     places, weights, current = rule
-    n_q = len(places)
-    points = np.empty((x.shape[0], len(cell_slave) * n_q, 6), dtype=x.dtype)
+    points = np.empty((x.shape[0], len(carrier) * (1 if len(slot) > 0 else len(places)), 6), dtype=x.dtype)
     for state in range(x.shape[0]):
-        now = x[state]
-        for cell in range(len(cell_slave)):
-            s, m = cell_slave[cell], cell_master[cell]
+        now, number = x[state], 0
+        for part in range(len(carrier)):
+            s, m = carrier[part], partner[part]
             view = slave_view(now, slave, s, before[s], behind[s])
             x_1, x_2 = node(now, master[m, 0]), node(now, master[m, 1])
-            low, high = ends_of_part(view, x_2, x_1, cut_low[cell], cut_high[cell])
+            low, high = ends_of_part(view, now, low_node[part], high_node[part])
             length, _, _ = frame(view.x_a, view.x_b)
             if not current:
                 length = 0 * length + reference_length[s]
-            for q in range(n_q):
-                write_point(points[state, cell * n_q + q], view, x_1, x_2, low, high, places[q], weights[q], length)
+            first, end = _points_of_part(slot, part, len(places))
+            for q in range(first, end):
+                point = points[state, number]
+                c = (low + high) / 2 + (high - low) / 2 * places[q]
+                xi, gap, n = facing_point(view, x_1, x_2, c)
+                point[C], point[XI], point[GAP] = c, xi, gap
+                point[WEIGHT] = weights[q] * (high - low) / 2 * length
+                point[NORMAL_X], point[NORMAL_Y] = n
+                number += 1
     return points
 
 
 @compile_maker
-def _gains(x: FloatArray, n_local: int, segments: Fields, cells: Fields, rule: Fields) -> FloatArray:
+def _variations(
+    x: FloatArray, segments: Fields, parts: Fields, local: tuple[int, int, int], rule: Fields
+) -> FloatArray:
     """Compute the Δ (n_points, 5, n_local, 2) of the points at positions x (n_nodes, 2)."""
     reference_length, slave, master = segments
-    cell_slave, cell_master, cut_low, cut_high, before, behind = cells
+    carrier, partner, low_node, high_node, before, behind, slot = parts
+    n_local, cutting_low, cutting_high = local
     places, weights, current = rule
-    n_q = len(places)
-    gains = np.zeros((len(cell_slave) * n_q, 5, n_local, 2))
+    variations = np.zeros((len(carrier) * (1 if len(slot) > 0 else len(places)), 5, n_local, 2))
     d_omega_a, d_omega_b, d_low, d_high = np.zeros((4, n_local, 2))
-    for cell in range(len(cell_slave)):
-        s, m = cell_slave[cell], cell_master[cell]
+    number = 0
+    for part in range(len(carrier)):
+        s, m, a, b = carrier[part], partner[part], low_node[part], high_node[part]
         view = slave_view(x, slave, s, before[s], behind[s])
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
-        low, high = ends_of_part(view, x_2, x_1, cut_low[cell], cut_high[cell])
+        low, high = ends_of_part(view, x, a, b)
         turn_of_ends(x, slave, s, before[s], behind[s], d_omega_a, d_omega_b)
         d_low[:], d_high[:] = 0.0, 0.0
-        if cut_low[cell]:
-            cut_gains(d_low, low, NODE_2, x_2, view, d_omega_a, d_omega_b)
-        if cut_high[cell]:
-            cut_gains(d_high, high, NODE_1, x_1, view, d_omega_a, d_omega_b)
-        length = -1.0 if current else reference_length[s]
-        ends, d_ends, d_omega = (low, high), (d_low, d_high), (d_omega_a, d_omega_b)
-        for q in range(n_q):
-            write_gains(gains[cell * n_q + q], view, x_1, x_2, ends, d_ends, d_omega, places[q], weights[q], length)
-    return gains
+        if a >= 0:
+            variation_of_cut(d_low, low, cutting_low, node(x, a), view, d_omega_a, d_omega_b)
+        if b >= 0:
+            variation_of_cut(d_high, high, cutting_high, node(x, b), view, d_omega_a, d_omega_b)
+        l_ab, t_ab, _ = frame(view.x_a, view.x_b)
+        measured = l_ab if current else reference_length[s]
+        first, end = _points_of_part(slot, part, len(places))
+        for q in range(first, end):
+            d, place, weight = variations[number], places[q], weights[q]
+            for k in range(n_local):
+                for i in range(2):
+                    spread = d_high[k, i] - d_low[k, i]
+                    d[D_C, k, i] = (d_low[k, i] + d_high[k, i]) / 2 + spread / 2 * place
+                    d[D_WEIGHT, k, i] = weight * spread / 2 * measured
+            if current:  # Δl_AB = t_AB·(Δx_B − Δx_A)
+                share = weight * (high - low) / 2
+                for i in range(2):
+                    d[D_WEIGHT, A, i] -= share * t_ab[i]
+                    d[D_WEIGHT, B, i] += share * t_ab[i]
+            c = (low + high) / 2 + (high - low) / 2 * place
+            variation_of_point(d, c, view, x_1, x_2, d_omega_a, d_omega_b)
+            number += 1
+    return variations
 
 
-@compile_part
-def write_gains(
-    d: FloatArray,
-    view: SlaveView,
-    x_1: Vector,
-    x_2: Vector,
-    ends: tuple[float, float],
-    d_ends: Fields,
-    d_omega: Fields,
-    place: float,
-    weight: float,
-    length: float,
-) -> None:
-    """Write the Δ (5, n_local, 2) of the point at a place of the rule between two ends on a slave segment.
+@compile_maker
+def forces(points: Array, pressure: Array, nodes: NumberArray, n_nodes: int) -> Array:
+    """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_points), positive where the surfaces press.
 
-    `d_ends` are Δ of the ends, `d_omega` those of the directions of A and B. A length of −1 stands for the current one.
+    The `points` (n_states, n_points, 6) of a part follow each other; of its `nodes` (n_parts, n_local) A, B, 1, 2 come
+    first.
     """
-    (low, high), (d_low, d_high) = ends, d_ends
-    l_ab, t_ab, _ = frame(view.x_a, view.x_b)
-    measured = l_ab if length < 0 else length
-    for k in range(d.shape[1]):
-        for i in range(2):
-            spread = d_high[k, i] - d_low[k, i]
-            d[D_C, k, i] = (d_low[k, i] + d_high[k, i]) / 2 + spread / 2 * place
-            d[D_WEIGHT, k, i] = weight * spread / 2 * measured
-    if length < 0:  # Δl_AB = t_AB·(Δx_B − Δx_A)
-        share = weight * (high - low) / 2
-        for i in range(2):
-            d[D_WEIGHT, A, i] -= share * t_ab[i]
-            d[D_WEIGHT, B, i] += share * t_ab[i]
-    point_gains(d, (low + high) / 2 + (high - low) / 2 * place, view, x_1, x_2, *d_omega)
+    totals = np.zeros((points.shape[0], n_nodes, 2), dtype=points.dtype)
+    n_q = points.shape[1] // max(len(nodes), 1)
+    for state in range(points.shape[0]):
+        for number in range(points.shape[1]):
+            if pressure[state, number] == 0:
+                continue
+            point, local = points[state, number], nodes[number // n_q]
+            f = point[WEIGHT] * pressure[state, number]
+            c, xi = point[C], point[XI]
+            for k, shape in enumerate(((1 - c) / 2, (1 + c) / 2, xi - 1, -xi)):
+                totals[state, local[k], 0] += shape * f * point[NORMAL_X]
+                totals[state, local[k], 1] += shape * f * point[NORMAL_Y]
+    return totals
+
+
+def report_points(
+    interface: Interface, cells: Cells, points: FloatArray, z: FloatArray, pressure: FloatArray, active: BoolArray
+) -> ContactPoints:
+    """Return the quadrature points (n_points, 6) of the cells as contact points of the state z.
+
+    The ends of areas of competence are NaN: cells end at nodes by construction, and no decision depends on that.
+    """
+    n_q = len(points) // max(len(cells.slave), 1)
+    segment, c = cells.carriers(n_q), points[:, C, None]
+    ends = z[: interface.n_unknowns].reshape(-1, 2)[interface.slave.segments[segment]]  # (n_points, 2, dim)
+    undefined = np.full(len(points), np.nan)
+    return ContactPoints(
+        slave_segment=segment,
+        c=points[:, C],
+        master_segment=np.repeat(cells.master, n_q),
+        xi=points[:, XI],
+        position=(1 - c) / 2 * ends[:, 0] + (1 + c) / 2 * ends[:, 1],
+        normal=-points[:, NORMAL_X:],
+        gap=points[:, GAP],
+        pressure=pressure,
+        weight=points[:, WEIGHT],
+        active=active,
+        area_from=undefined,
+        area_to=undefined,
+    )
+
+
+def report_nodes(
+    sides: Interface | Sides,
+    cells: Cells,
+    x: FloatArray,
+    areas: FloatArray,
+    gaps: FloatArray,
+    pressure: FloatArray,
+    active: BoolArray,
+) -> ContactPoints:
+    """Return the slave nodes as contact points, with ∫N_j, weighted gap and nodal pressure (n_slave_nodes,).
+
+    A node has the master segment that it sees itself. Where two cells meet there, that is the one behind it along the
+    slave. A node that overhangs sees none (−1): it has the normal at the near end of the cell that begins beside it,
+    and a node without such a cell has NaN.
+    """
+    n_nodes = sides.n_slave_nodes
+    carrier, place = np.full(n_nodes, -1), np.full(n_nodes, np.nan)
+    for end in (1, 0):
+        numbers = sides.slave.segments[:, end]
+        carrier[numbers], place[numbers] = np.arange(len(numbers)), 2.0 * end - 1
+    master, xi, normal = np.full(n_nodes, -1), np.full(n_nodes, np.nan), np.full((n_nodes, 2), np.nan)
+    for facing in (False, True):
+        for end, c in ((1, 1.0), (0, -1.0)):
+            at_end = Quadrature(np.array([c]), np.ones(1), current=True)
+            first = np.diff(cells.slave, prepend=-1) != 0  # Cells are in the order in which one meets them.
+            outermost = np.append(first[1:], True)[: len(first)] if end else first
+            cut = cells.cut_high if end else cells.cut_low
+            here = np.flatnonzero(~cut if facing else outermost)
+            number = sides.slave.segments[cells.slave[here], end]
+            carrier[number], place[number] = cells.slave[here], c
+            ends = at_end.points(sides, cells.select(here), x[None])[0]
+            normal[number] = -ends[:, NORMAL_X:]
+            if facing:
+                master[number], xi[number] = cells.master[here], ends[:, XI]
+    undefined = np.full(n_nodes, np.nan)
+    return ContactPoints(
+        slave_segment=carrier,
+        c=place,
+        master_segment=master,
+        xi=xi,
+        position=x[:n_nodes],
+        normal=normal,
+        gap=gaps,
+        pressure=pressure,
+        weight=areas,
+        active=active,
+        area_from=undefined,
+        area_to=undefined,
+        weighted=np.ones(n_nodes, dtype=np.bool_),
+    )

@@ -11,33 +11,141 @@ Source: Puso & Laursen (2004); dual shapes: Popp, Gitterle, Gee & Wall (2010).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from contactverif.compiler import match_precision
-from contactverif.contract.arrays import Array, FloatArray
+from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.state_vector import join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
-from contactverif_mortar.cell_contact_points import at_nodes
-from contactverif_mortar.cell_tangent import ForcesAndTangent
-from contactverif_mortar.cell_traits import CELL_TRAITS
-from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature
-from contactverif_mortar.node_factors import Factors
-from contactverif_mortar.node_rows import NodeState
-from contactverif_mortar.weighted_gaps import Carried, Weighting, own_lengths
+from contactverif.geometry.block_rows import Couplings, zero_matrix
+from contactverif_mortar.cell_frame import ForcesAndTangent
+from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Quadrature, report_nodes
+from contactverif_mortar.node_factors import Factors, NodeRows, RowGroups, check_product, group_nodes
+from contactverif_mortar.node_rows import NodeState, node_rows, weigh
+from contactverif_mortar.shape_rows import (
+    ShapedPoints,
+    Weighted,
+    add_shaped_rows,
+    divide_covered,
+    own_lengths,
+    weigh_points,
+)
 
+# ∫φ_j and ∫φ_j g (n_slave_nodes,) at one state, and the shapes: their numbers, or at points.
+StateWeights = tuple[FloatArray, FloatArray, FloatArray | ShapedPoints]
 NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
 _SOURCES = {
     False: "Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629",
     True: "Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465",
 }
+
+
+class Carried(NamedTuple):
+    """The cells that carry pressures at one state, and what a method makes of them."""
+
+    cells: Cells
+    active: BoolArray  # (n_slave_nodes,)
+    weights: StateWeights  # The integrals, and the shapes: their numbers, or at points.
+    x: FloatArray  # (n_nodes, 2)
+    state: NodeState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighting:
+    """A way to weight gaps and to interpolate pressures, and what all methods do with it.
+
+    A method decides which pressures the slave nodes have. It does not know how gaps are weighted over the slave nodes'
+    shapes, how nodal pressures spread over the cells, and what the variations of both are.
+    """
+
+    averaged: bool  # Normals are averaged at the slave nodes; else they are those of the segments.
+    dual: bool  # Shapes are biorthogonal; else they are standard.
+    quadrature: Quadrature  # The points on a cell, and the configuration in which lengths are measured.
+
+    def carrying(self, interface: Interface, pairing: Pairing, x: Array) -> Weighted:
+        """Compute points, shapes and weighted gaps at the positions x (n_states, n_nodes, 2).
+
+        They lie on the cells whose slave segment has an active node; the others carry no pressure.
+        """
+        cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
+        return weigh_points(interface, cells, self.quadrature, x, self.dual)
+
+    def weigh(self, interface: Interface, cells: Cells, x: FloatArray) -> StateWeights:
+        """Compute the integrals of the shapes on some cells at one state, x (n_nodes, 2)."""
+        if not self.averaged:
+            return weigh(interface, cells, self.quadrature, x, self.dual)
+        weighted = weigh_points(interface, cells, self.quadrature, x[None], self.dual)
+        return weighted.areas[0], weighted.with_gap[0], weighted.linearize(self.quadrature, x)
+
+    def gaps(self, interface: Interface, cells: Cells, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ∫N_j and G_j (n_slave_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
+        areas, with_gap, _ = self.weigh(interface, cells, x)
+        return divide_covered(
+            areas, with_gap, own_lengths(interface, x if self.quadrature.current else interface.nodes)
+        )
+
+    def pairing(self, interface: Interface, x: FloatArray, penalty: float, multipliers: FloatArray | float) -> Pairing:
+        """Find the cells, and the active slave nodes: those that are covered and have λ_j − ε̂ G_j ≥ 0."""
+        cells = Cells.find(interface, x, self.averaged)
+        _, gaps = self.gaps(interface, cells, x)
+        return Pairing({**cells._asdict(), "active": multipliers - penalty * gaps >= 0})  # false where the gap is NaN
+
+    def tangent(self, interface: Interface, carried: Carried) -> NodeRows:
+        """Compute forces and the assembled tangent, which is the `rest` of the result."""
+        n_nodes = len(carried.active)
+
+        def choose_pattern(groups: RowGroups) -> Couplings:
+            check_product(groups.starts[: n_nodes + 1])
+            return groups.pattern(0, n_nodes)
+
+        rows = self._rows(interface, carried, choose_pattern)
+        rows.multiply(carried.state.weights, 0, len(rows.groups.starts) - 1)
+        return rows
+
+    def factors(self, interface: Interface, carried: Carried) -> Factors:
+        """Compute the tangent in factors at a state of the slave nodes."""
+        return self._rows(interface, carried, RowGroups.pattern_of_cells).factors(carried.state.weights)
+
+    def saddle(
+        self, interface: Interface, cells: Cells, active: BoolArray, x: FloatArray, multipliers: FloatArray
+    ) -> Factors:
+        """Compute Σ λ_j ΔB_j, B and Δ∫φ_j g: the `rest`, and `left` and `right` of the slave nodes alone."""
+        zeros, ones, n_nodes = np.zeros(len(active)), np.ones(len(active)), len(active)
+        state, weights = NodeState(multipliers, ones, zeros, ones), self.weigh(interface, cells, x)
+
+        def choose_pattern(groups: RowGroups) -> Couplings:
+            if self.dual:
+                return groups.pattern(n_nodes, len(groups.starts) - 1)
+            return groups.pattern_of_cells()
+
+        rows = self._rows(interface, Carried(cells, active, weights, x, state), choose_pattern)
+        rows.multiply(ones, n_nodes, len(rows.groups.starts) - 1)
+        rest, left, _, right = rows.factors(ones)
+        return Factors(rest, left[:n_nodes], ones, right[:n_nodes])
+
+    def _rows(
+        self, interface: Interface, carried: Carried, choose_pattern: Callable[[RowGroups], Couplings]
+    ) -> NodeRows:
+        """Compute forces and factors, with a pattern for the rest that depends on the groups of the rows."""
+        cells, active, weights, x, state = carried
+        groups = group_nodes(
+            interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, self.dual
+        )
+        pattern, shapes = choose_pattern(groups), weights[2]
+        if not isinstance(shapes, ShapedPoints):
+            return node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
+        total, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
+        return add_shaped_rows(shapes, groups, state, 4, total, rest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +166,7 @@ class Mortar:
         weighted, active = self.weighting.carrying(interface, pairing, x), pairing["active"]
         pressure = np.zeros_like(weighted.areas)
         pressure[:, active] = -self.penalty * weighted.with_gap[:, active] / weighted.areas[:, active]
-        return weighted.forces(pressure, interface.n_nodes).reshape(z.shape)
+        return weighted.forces(pressure).reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse: Σ p_j ΔB_j + B Δp."""
@@ -82,8 +190,8 @@ class Mortar:
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         cells = Cells.from_pairing(pairing).near(active, interface)
         integrals = self.weighting.weigh(interface, cells, x)
-        areas = np.where(active, integrals.areas, 1.0)
-        gaps = np.where(active, integrals.with_gap / areas, 0.0)
+        areas = np.where(active, integrals[0], 1.0)
+        gaps = np.where(active, integrals[1] / areas, 0.0)
         weights = np.where(active, -self.penalty, 0.0)
         return Carried(cells, active, integrals, x, NodeState(weights * gaps, weights, gaps, areas))
 
@@ -92,7 +200,7 @@ class Mortar:
         x, cells, active = np.array(z).reshape(-1, 2), Cells.from_pairing(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
         pressure = np.where(active, -self.penalty * gaps, 0.0)
-        return at_nodes(interface, cells, x, areas, gaps, pressure, active)
+        return report_nodes(interface, cells, x, areas, gaps, pressure, active)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +227,7 @@ class MortarMultipliers:
         """
         x, multipliers = split_states(interface, z)
         weighted, active = self.weighting.carrying(interface, pairing, x), pairing["active"]
-        forces = weighted.forces(np.where(active, multipliers, 0.0), interface.n_nodes)
+        forces = weighted.forces(np.where(active, multipliers, 0.0))
         (reference,) = match_precision(z, interface.nodes)
         rows = np.where(active, -weighted.with_gap, multipliers * own_lengths(interface, reference))
         return join_rows(forces, rows, z)
@@ -141,7 +249,7 @@ class MortarMultipliers:
         x, multipliers = split_state(interface, z)
         cells, active = Cells.from_pairing(pairing), pairing["active"]
         areas, gaps = self.weighting.gaps(interface, cells, x)
-        return at_nodes(interface, cells, x, areas, gaps, np.where(active, multipliers, 0.0), active)
+        return report_nodes(interface, cells, x, areas, gaps, np.where(active, multipliers, 0.0), active)
 
 
 def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:

@@ -4,8 +4,8 @@ With the shapes φ_A, φ_B of the slave nodes and p = Σ p_j φ_j at fixed p_j, 
 
     B_j = Σ w φ_j (N_A, N_B, ξ−1, −ξ) n        D_j = Σ [w φ_j Δg + (g − G_j) Δ(w φ_j)] / divisor_j
 
-Standard shapes are φ_B = (1 + c)/2. A dual shape φ_B = (1 + c̄)/2 + κ (c − c̄) depends on the mean c̄ and the variance v
-of c on what is covered of its segment, too: κ = (1 − c̄²)/2v. So each slave segment has two rows more. They hold in
+Standard shapes are φ_B = (1 + c)/2. A dual shape φ_B = (1 + c̄)/2 + κ (c − c̄) depends on the mean c̄ and the variance
+v of c on what is covered of its segment, too: κ = (1 − c̄²)/2v. So each slave segment has two rows more. They hold in
 `right` the Δ of c̄ and of v, and in `left` the forces of a unit of each. D_j gains from both by the chain rule:
 
     ∫1 Δc̄ = Σ (c − c̄) Δw + w Δc        ∫1 Δv = Σ ((c − c̄)² − v) Δw + 2 w (c − c̄) Δc
@@ -23,35 +23,29 @@ import numpy as np
 from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
+from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, zero_matrix
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     CellFrame,
     CellPoint,
+    add_cell,
     add_to_row,
     cell_arguments,
     cell_at,
     finish_rows,
     place_point,
+    push_point,
     turn_row,
 )
 from contactverif_mortar.cell_geometry import A, B
-from contactverif_mortar.cell_tangent import add_cell, push_point
-from contactverif_mortar.integration_cells import Cells, Csr, Fields, Quadrature
-from contactverif_mortar.node_factors import NodeRows
-from contactverif_mortar.node_groups import RowGroups, find_member
+from contactverif_mortar.integration_cells import Cells, Quadrature
+from contactverif_mortar.node_factors import NodeRows, RowGroups, find_member
 
 # What is known of the shapes on a slave segment: a place c_0 on it, c̄ − c_0, κ, v and ∫1.
 ORIGIN, MEAN, KAPPA, VARIANCE, EXTENT, N_SHAPE = range(6)
 
 
-class Weights(NamedTuple):
-    """The integrals of the shapes of the slave nodes at one state, and the numbers of the shapes."""
-
-    areas: FloatArray  # (n_slave_nodes,) ∫φ_j and ∫φ_j g.
-    with_gap: FloatArray
-    # (n_slave_segments, 5) The numbers of the shapes on each segment; undefined where it has no cell.
-    shapes: FloatArray
+Weights = tuple[FloatArray, FloatArray, FloatArray]  # ∫φ_j and ∫φ_j g (n_slave_nodes,), and the numbers of the shapes.
 
 
 class NodeState(NamedTuple):
@@ -64,24 +58,20 @@ class NodeState(NamedTuple):
 
 
 def weigh(interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, dual: bool) -> Weights:
-    """Compute the integrals of the shapes on some cells, at the positions x (n_nodes, 2)."""
+    """Compute the integrals of the shapes on some cells, at the positions x (n_nodes, 2).
+
+    The numbers of the shapes (n_slave_segments, 5) are undefined where a segment has no cell.
+    """
     areas, with_gap = np.zeros((2, interface.n_slave_nodes))
     shapes = np.empty((len(interface.slave), N_SHAPE))
-    _weigh(x, *cell_arguments(interface, cells, rule), dual, areas, with_gap, shapes)
-    return Weights(areas, with_gap, shapes)
+    _weigh((areas, with_gap, shapes), x, *cell_arguments(interface, cells, rule), dual)
+    return areas, with_gap, shapes
 
 
 @compile_maker
-def _weigh(
-    x: FloatArray,
-    segments_and_cells: Fields,
-    rule: Fields,
-    dual: bool,
-    areas: FloatArray,
-    with_gap: FloatArray,
-    shapes: FloatArray,
-) -> None:
+def _weigh(written: Weights, x: FloatArray, segments_and_cells: Fields, rule: Fields, dual: bool) -> None:
     """Add ∫φ_j and ∫φ_j g of all slave segments, and write what is known of their shapes."""
+    areas, with_gap, shapes = written
     slave, cell_slave = segments_and_cells[1], segments_and_cells[3]
     places, weights = rule
     points = np.empty((16, 3))  # c, gap and weight of the points of a segment
@@ -101,7 +91,7 @@ def _weigh(
                 count += 1
         _write_shape(shapes, s, points, count, dual)
         for i in range(count):
-            first, second = shapes_at(shapes, s, points[i, 0])
+            first, second = _shapes_at(shapes, s, points[i, 0])
             a, b, gap, w = slave[s, A], slave[s, B], points[i, 1], points[i, 2]
             areas[a] += w * first
             areas[b] += w * second
@@ -134,8 +124,7 @@ def _write_shape(shapes: FloatArray, s: int, points: FloatArray, count: int, dua
 
 
 @compile_inline
-def shapes_at(shapes: FloatArray, s: int, c: float) -> tuple[float, float]:
-    """Return φ_A and φ_B at c on segment s."""
+def _shapes_at(shapes: FloatArray, s: int, c: float) -> tuple[float, float]:
     mean = shapes[s, ORIGIN] + shapes[s, MEAN]
     bent = shapes[s, KAPPA] * ((c - shapes[s, ORIGIN]) - shapes[s, MEAN])
     return (1 - mean) / 2 - bent, (1 + mean) / 2 + bent
@@ -154,17 +143,15 @@ def node_rows(
     """Compute forces and factors on cells with no averaged normals, with `shapes` of `weigh` at the same state."""
     matrix = zero_matrix(interface.n_nodes, 0, pattern)
     forces, left, right = np.zeros(interface.n_unknowns), *np.zeros((2, 2 * len(groups.nodes)))
-    csr, at_nodes = (matrix.indptr, matrix.indices, matrix.data), (state.pressure, state.gaps, state.divisor)
-    factors = groups.nodes, groups.starts, left, right
-    _add_rows(forces, csr, factors, x, *cell_arguments(interface, cells, rule), shapes, at_nodes)
+    written = forces, (matrix.indptr, matrix.indices, matrix.data), (groups.nodes, groups.starts, left, right)
+    at_nodes = state.pressure, state.gaps, state.divisor
+    _add_rows(written, x, *cell_arguments(interface, cells, rule), shapes, at_nodes)
     return NodeRows(forces, matrix, groups, left, right)
 
 
 @compile_maker
 def _add_rows(
-    forces: FloatArray,
-    csr: Csr,
-    factors: Fields,
+    written: tuple[FloatArray, Csr, Fields],
     x: FloatArray,
     segments_and_cells: Fields,
     rule: Fields,
@@ -172,6 +159,7 @@ def _add_rows(
     at_nodes: Fields,
 ) -> None:
     """Add what all cells give to the forces, to compressed rows, and to the rows of the factors."""
+    forces, csr, factors = written
     slave, cell_slave = segments_and_cells[1], segments_and_cells[3]
     places, weights = rule
     pressure, gaps, divisor = at_nodes
@@ -187,7 +175,7 @@ def _add_rows(
         rows[:], pushes[:], units[:] = 0.0, 0.0, 0.0
         for q in range(len(places)):
             point = place_point(cell, places[q], weights[q])
-            first, second = shapes_at(shapes, s, point.c)
+            first, second = _shapes_at(shapes, s, point.c)
             kappa, difference = shapes[s, KAPPA], pressure[b] - pressure[a]
             p = pressure[a] * first + pressure[b] * second
             push_point(rows, pushes, cell, point, p, difference * kappa, 0.0)
@@ -208,7 +196,6 @@ def _add_rows(
 
 @compile_inline
 def _add_unit(units: FloatArray, row: int, point: CellPoint, pressure: float) -> None:
-    """Add the forces of a pressure at a point to a row of `units` (n_rows, 4)."""
     f = point.weight * pressure
     for k, shape in enumerate(((1 - point.c) / 2, (1 + point.c) / 2, point.xi - 1, -point.xi)):
         units[row, k] += shape * f

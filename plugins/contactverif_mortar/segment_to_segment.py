@@ -13,17 +13,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, BoolArray, FloatArray
+from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif_mortar import cell_forces
-from contactverif_mortar.cell_contact_points import at_points
-from contactverif_mortar.cell_tangent import ForcesAndTangent, springs_at_points, touching_points
-from contactverif_mortar.cell_traits import CELL_TRAITS, LOCKING_WITNESSES
-from contactverif_mortar.integration_cells import AREAS, GAP, Cells, Quadrature
+from contactverif_mortar.cell_frame import ForcesAndTangent, cell_arguments, springs_at_points, touching_points
+from contactverif_mortar.integration_cells import (
+    AREAS,
+    CELL_TRAITS,
+    GAP,
+    LOCKING_WITNESSES,
+    Cells,
+    Quadrature,
+    forces,
+    report_points,
+)
 
 N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure × a shape function has degree 2.
 
@@ -40,15 +46,19 @@ class SegmentToSegment:
         """Find the cells, and which of their points are in contact (n_cells × 3, flat)."""
         x = np.array(z).reshape(-1, 2)
         cells = Cells.find(interface, x, averaged=False)
-        return Pairing({**cells.as_arrays(), "active": touching_points(interface, cells, self.quadrature, x)})
+        return Pairing(
+            {**cells._asdict(), "active": touching_points(x, *cell_arguments(interface, cells, self.quadrature))}
+        )
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
-        cells, active = _in_contact(pairing, len(self.quadrature))
+        active = pairing["active"].reshape(-1, len(self.quadrature))
+        mask = np.logical_or.reduce(active, axis=1)  # The cells that have a point in contact.
+        cells = Cells.from_pairing(pairing).select(mask)
         x = np.array(z).reshape(-1, interface.n_nodes, 2)
         points = self.quadrature.points(interface, cells, x)
-        pressure = np.where(active, -self.penalty * points[..., GAP], 0.0)
-        return cell_forces.forces(points, pressure, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
+        pressure = np.where(active[mask].reshape(-1), -self.penalty * points[..., GAP], 0.0)
+        return forces(points, pressure, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
@@ -64,14 +74,7 @@ class SegmentToSegment:
         cells = Cells.from_pairing(pairing)
         points = self.quadrature.points(interface, cells, np.array(z).reshape(1, -1, 2))[0]
         pressure = np.where(pairing["active"], -self.penalty * points[:, GAP], 0.0)
-        return at_points(interface, cells, points, z, pressure, pairing["active"])
-
-
-def _in_contact(pairing: Pairing, n_q: int) -> tuple[Cells, BoolArray]:
-    """Return the cells that have a point in contact, and which of their points are in contact."""
-    active = pairing["active"].reshape(-1, n_q)
-    mask = np.logical_or.reduce(active, axis=1)
-    return Cells.from_pairing(pairing).select(mask), active[mask].reshape(-1)
+        return report_points(interface, cells, points, z, pressure, pairing["active"])
 
 
 def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:

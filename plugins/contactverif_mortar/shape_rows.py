@@ -1,11 +1,24 @@
-"""The forces of a mortar method and the rows of its tangent's factors, for directions that turn and for half passes.
+"""The shapes of the slave nodes at points, weighted gaps, and the tangent for directions that turn and for half passes.
 
-The formulas are those of `node_rows`; the Δ of the points come from `cell_geometry`, in the global frame and for up to
-six local nodes. With F = w p and ω the turn of the normal, the rows N_k of the local nodes that are pushed have
+Pressures of slave nodes are interpolated along the slave, and gaps weighted, with the same shapes. Standard shapes:
+N_A = (1−c)/2, N_B = (1+c)/2. Dual shapes: ψ_A, ψ_B with ∫ψ_j N_k = δ_jk ∫N_j over the covered part of each slave
+segment. With c̄ the mean of c over that part and v its variance these are
+
+    ψ_A, ψ_B = N_A(c̄) − κ (c − c̄), N_B(c̄) + κ (c − c̄)        κ = (1 − c̄²) / 2v
+
+(∫ψ_B = ∫N_B gives the constant, ∫ψ_B c = ∫N_B the slope.) No matrix is inverted, so a sliver is as good as a whole
+segment; in the middle of a segment κ grows there like 1/length, as biorthogonality wants. The weighted gap of a node is
+G_j = ∫φ_j g / ∫φ_j over all that is covered, φ = N or ψ, and ∫φ_j = ∫N_j in both cases.
+
+The rows of the factors are those of `node_rows`; the Δ of the points come from `cell_geometry`, in the global frame and
+for up to six local nodes. With F = w p and ω the turn of the normal, the rows N_k of the local nodes that are pushed
+have
 
     R_k = Σ N_k F n        ΔR_k = Σ (N_k ΔF + F ΔN_k) n − N_k F ω τ        ΔF = p Δw + w p_c Δc
 
-Rule for the next editor: Δ of points are large, so they are made for `PIECE` points at a time, and dropped.
+Rule for the next editor: variations of points are large, so they are made for `PIECE` points at a time, and dropped.
+
+Source: Puso & Laursen (2004); dual shapes: Wohlmuth (2000), on the covered part: Popp, Gitterle, Gee & Wall (2010).
 """
 
 from __future__ import annotations
@@ -17,17 +30,108 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.compiler import compile_inline, compile_maker
-from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.geometry.block_rows import NumberArray, add_block
-from contactverif_mortar.cell_forces import Shapes
+from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, IntArray
+from contactverif.contract.interface import Interface
+from contactverif.geometry.block_rows import Csr, Fields, NumberArray, add_block
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
-from contactverif_mortar.integration_cells import GAP, NORMAL_X, NORMAL_Y, WEIGHT, XI, C, Csr, Fields
-from contactverif_mortar.node_factors import NodeRows
-from contactverif_mortar.node_groups import RowGroups, find_member
+from contactverif_mortar.integration_cells import (
+    GAP,
+    NORMAL_X,
+    NORMAL_Y,
+    WEIGHT,
+    XI,
+    C,
+    Parts,
+    Quadrature,
+    Sides,
+    forces,
+)
+from contactverif_mortar.node_factors import NodeRows, RowGroups, find_member
 from contactverif_mortar.node_rows import NodeState, add_chains
 
 PIECE = 4096  # Points.
-MakeGains = Callable[[int, int], FloatArray]  # From the first and the last of some cells: their Δ.
+# The smallest covered share of a node's own length that counts. Below it the node would carry less than the roundoff of
+# its neighbour's force, and the row of its multiplier would vanish.
+UNCOVERED = 64 * UNIT_ROUNDOFF
+
+
+class Shapes(NamedTuple):
+    """The values of shapes at points of some states, and how they change."""
+
+    # (n_states, n_points, 2) Values of the shapes of A and B, the nodes of the slave segment that carries the point.
+    values: Array
+    slope: Array  # (n_states, n_points) Δ of the second shape for each unit of c; Δ of the first is the opposite.
+    # (n_states, n_points) Δ of the second shape for each unit of c̄ and of v of the segment; zero for standard shapes.
+    by_mean: Array
+    by_variance: Array
+    centred: Array  # (n_states, n_points) c − c̄, and ∫1 of the segment; zero for standard shapes.
+    extent: Array
+    variance: Array  # (n_states, n_points) The variance v of the segment; zero for standard shapes.
+
+    @classmethod
+    def standard(cls, points: Array) -> Shapes:
+        """Return the standard shapes at points (n_states, n_points, 6)."""
+        c, nothing = points[..., C], np.zeros_like(points[..., C])
+        return cls(np.stack([(1 - c) / 2, (1 + c) / 2], axis=-1), nothing + 0.5, *[nothing] * 5)
+
+    @classmethod
+    def dual(cls, points: Array, segment: IntArray, n_segments: int) -> Shapes:
+        """Return the dual shapes on what the points cover; `segment` (n_points,) is the slave segment of each."""
+        c, w = points[..., C], points[..., WEIGHT]
+        begins = np.r_[True, segment[1:] != segment[:-1]] if len(segment) else np.zeros(0, bool)
+        first = np.maximum.accumulate(np.where(begins, np.arange(len(segment)), 0))  # The first point of each segment.
+        rough = c[..., first]  # a place in the covered part: so c − c̄ is as exact as c, however short the part
+        extent = _sum_by_node(w, segment, n_segments)[..., segment]
+        mean = _sum_by_node(w * (c - rough), segment, n_segments)[..., segment] / extent
+        centred = (c - rough) - mean
+        mean = rough + mean
+        variance = _sum_by_node(w * centred * centred, segment, n_segments)[..., segment] / extent
+        kappa = (1 - mean) * (1 + mean) / (2 * variance)
+        second = (1 + mean) / 2 + kappa * centred
+        first_value = (1 - mean) / 2 - kappa * centred
+        values, by_mean = np.stack([first_value, second], axis=-1), 0.5 - kappa - mean / variance * centred
+        return cls(values, kappa, by_mean, -kappa / variance * centred, centred, extent, variance)
+
+    def interpolate(self, node_values: Array, ends: IntArray) -> Array:
+        """Interpolate values (n_states, n_nodes) of the nodes to the points, each between its nodes `ends`."""
+        interpolated: Array = (self.values * node_values[..., ends]).sum(axis=-1)
+        return interpolated
+
+
+@compile_maker
+def _sum_by_node(values: Array, numbers: IntArray, n_numbers: int) -> Array:
+    """Return sums (n_states, n_numbers) of the values (n_states, n) that belong to the same of the numbers (n,)."""
+    sums = np.zeros((values.shape[0], n_numbers), dtype=values.dtype)
+    for state in range(values.shape[0]):
+        for i in range(len(numbers)):
+            sums[state, numbers[i]] += values[state, i]
+    return sums
+
+
+class Weighted(NamedTuple):
+    """The points of some parts of slave segments at some states, the slave nodes' shapes there, and weighted gaps."""
+
+    sides: Interface | Sides
+    parts: Parts
+    points: Array  # (n_states, n_points, 6) The points of `Quadrature.points`.
+    shapes: Shapes
+    ends: IntArray  # (n_points, 2) The slave nodes of each point.
+    segment: IntArray  # (n_points,) The slave segment of each point.
+    areas: Array  # (n_states, n_slave_nodes) ∫φ_j and ∫φ_j g.
+    with_gap: Array
+
+    def forces(self, pressure: Array) -> Array:
+        """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_slave_nodes) of the slave nodes."""
+        at_points, nodes = self.shapes.interpolate(pressure, self.ends), self.parts.local_nodes(self.sides)
+        return forces(self.points, at_points, nodes, len(self.sides.nodes))
+
+    def linearize(self, rule: Quadrature, x: FloatArray) -> ShapedPoints:
+        """Return the points of the first state, which is x (n_nodes, 2), with their variations."""
+
+        def variations(begin: int, end: int) -> FloatArray:
+            return rule.variations(self.sides, self.parts.select(slice(begin, end)), x)
+
+        return ShapedPoints(self.points[0], self.shapes, self.segment, self.sides.slave.segments, variations)
 
 
 class ShapedPoints(NamedTuple):
@@ -37,13 +141,40 @@ class ShapedPoints(NamedTuple):
     shapes: Shapes  # The shapes, of one state.
     segment: IntArray  # (n_points,) The slave segment of each point.
     slave: IntArray  # (n_slave_segments, 2) The slave nodes of each segment.
-    make_gains: MakeGains  # The Δ of the points of some cells, (n, 5, n_local, 2).
+    linearize: Callable[[int, int], FloatArray]  # From the first and the last of some parts: Δ of their points.
+
+
+def weigh_points(sides: Interface | Sides, parts: Parts, rule: Quadrature, x: Array, dual: bool) -> Weighted:
+    """Compute points, shapes and weighted gaps on some parts of slave segments, at x (n_states, n_nodes, 2)."""
+    points, segment, n_nodes = rule.points(sides, parts, x), parts.carriers(len(rule)), sides.n_slave_nodes
+    ends = sides.slave.segments[segment]
+    shapes = Shapes.dual(points, segment, len(sides.slave)) if dual else Shapes.standard(points)
+    weighted = shapes.values * points[..., WEIGHT, None]
+    with_gap = weighted * points[..., GAP, None]
+    areas = _sum_by_node(weighted.reshape(len(points), -1), ends.ravel(), n_nodes)
+    gaps = _sum_by_node(with_gap.reshape(len(points), -1), ends.ravel(), n_nodes)
+    return Weighted(sides, parts, points, shapes, ends, segment, areas, gaps)
+
+
+def own_lengths(sides: Interface | Sides, x: FloatArray) -> FloatArray:
+    """Return half of the length of the segments at each slave node (n_slave_nodes,), at x (n_nodes, 2)."""
+    halves = np.repeat(sides.slave.lengths(x) / 2, 2)
+    lengths: FloatArray = _sum_by_node(halves[None], sides.slave.segments.ravel(), sides.n_slave_nodes)[0]
+    return lengths
+
+
+def divide_covered(areas: FloatArray, with_gap: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ∫N_j and G_j (n_slave_nodes,) of nodes with own `lengths`; zero and NaN where nothing is covered."""
+    covered = areas > UNCOVERED * lengths
+    gaps = np.full(len(covered), np.nan)
+    gaps[covered] = with_gap[covered] / areas[covered]
+    return np.where(covered, areas, 0.0), gaps
 
 
 def add_shaped_rows(
-    shaped: ShapedPoints, groups: RowGroups, state: NodeState, n_pushed: int, forces: FloatArray, rest: sparse.csr_array
+    shaped: ShapedPoints, groups: RowGroups, state: NodeState, n_pushed: int, total: FloatArray, rest: sparse.csr_array
 ) -> NodeRows:
-    """Add forces and their derivative at fixed pressures to `forces` and `rest`, and return them with the factors.
+    """Add forces and their derivative at fixed pressures to `total` and `rest`, and return them with the factors.
 
     Forces act on the first `n_pushed` local nodes: 4, or 2 where they act on the slave alone. `rest` has the places
     of all pushed nodes and local nodes of each cell.
@@ -53,34 +184,32 @@ def add_shaped_rows(
     dual = len(groups.starts) - 1 > len(state.pressure)
     chain = np.zeros((len(shaped.slave) if dual else 0, 2, 2))
     n_q = len(shaped.points) // max(n_cells, 1)
-    places, at_points = (shaped.points, shaped.segment, shaped.slave, groups.local), shapes.fields_of_first_state()
+    places, at_points = (shaped.points, shaped.segment, shaped.slave, groups.local), tuple(each[0] for each in shapes)
     at_nodes, factors = (state.pressure, state.gaps, state.divisor), (groups.nodes, groups.starts, left, right)
-    csr = rest.indptr, rest.indices, rest.data
+    written = total, (rest.indptr, rest.indices, rest.data), factors, chain
     size = max(PIECE // max(n_q, 1), 1)
     for begin in range(0, n_cells, size):
         end = min(begin + size, n_cells)
-        gains = shaped.make_gains(begin, end)
-        _add_points(forces, csr, factors, chain, begin * n_q, n_q, n_pushed, places, at_points, gains, at_nodes)
+        variations = shaped.linearize(begin, end)
+        _add_points(written, begin * n_q, n_q, n_pushed, places, at_points, variations, at_nodes)
     if dual:
         add_chains(shaped.slave, chain, state.divisor, groups.nodes, groups.starts, right)
-    return NodeRows(forces, rest, groups, left, right)
+    return NodeRows(total, rest, groups, left, right)
 
 
 @compile_maker
 def _add_points(
-    forces: FloatArray,
-    csr: Csr,
-    factors: Fields,
-    chain: FloatArray,
+    written: tuple[FloatArray, Csr, Fields, FloatArray],
     first_point: int,
     n_q: int,
     n_pushed: int,
     places: Fields,
     shapes: Fields,
-    gains: FloatArray,
+    variations: FloatArray,
     at_nodes: Fields,
 ) -> None:
     """Add what the points from `first_point` on give, one for each of their Δ."""
+    total, csr, factors, chain = written
     points, segment, slave, local = places
     values, slope, by_mean, by_variance, centred, extent, variance = shapes
     pressure, gaps, divisor = at_nodes
@@ -88,17 +217,17 @@ def _add_points(
     n_local = local.shape[1]
     block = np.zeros((4, 2, n_local, 2))
     row = np.empty((n_local, 2))
-    for i in range(len(gains)):
+    for i in range(len(variations)):
         number = first_point + i
-        point, d, cell, s = points[number], gains[i], local[number // n_q], segment[number]
+        point, d, cell, s = points[number], variations[i], local[number // n_q], segment[number]
         a, b, w = slave[s, 0], slave[s, 1], point[WEIGHT]
         difference = pressure[b] - pressure[a]
         p = pressure[a] * values[number, 0] + pressure[b] * values[number, 1]
         _add_block_of_point(block, n_pushed, point, d, p, difference * slope[number])
         transmit = ((1 - point[C]) / 2, (1 + point[C]) / 2, point[XI] - 1, -point[XI])
         for k in range(n_pushed):
-            forces[2 * cell[k]] += transmit[k] * w * p * point[NORMAL_X]
-            forces[2 * cell[k] + 1] += transmit[k] * w * p * point[NORMAL_Y]
+            total[2 * cell[k]] += transmit[k] * w * p * point[NORMAL_X]
+            total[2 * cell[k] + 1] += transmit[k] * w * p * point[NORMAL_Y]
         for end, sign in enumerate((-1.0, 1.0)):
             j = slave[s, end]
             shape, above = values[number, end], point[GAP] - gaps[j]
@@ -142,7 +271,6 @@ def _add_block_of_point(
 
 @compile_inline
 def _write_block(csr: Csr, block: FloatArray, n_pushed: int, cell: NumberArray) -> None:
-    """Add a block to compressed rows, and clear it."""
     for k in range(n_pushed):
         for column in range(len(cell)):
             xx, xy = block[k, 0, column, 0], block[k, 0, column, 1]
@@ -163,7 +291,7 @@ def _add_moments(
     n_pushed: int,
     point: FloatArray,
 ) -> None:
-    """Add what a point gives to the rows of c̄ and v; `spread` is c − c̄, ∫1 and v, `by_moment` the pressure by each."""
+    """Add what a point gives to the rows of c̄ and v; `spread` is c − c̄, ∫1 and v, `by_moment` the pressure by both."""
     off, extent, variance = spread
     for moment, (by_weight, by_c) in enumerate(((off, 1.0), (off * off - variance, 2 * off))):
         for k in range(len(cell)):

@@ -9,6 +9,11 @@ The other half pass does the same with the roles exchanged. No force is handed t
 integrated over the meshes of both, and a uniform pressure comes out exactly without cutting one mesh at the nodes of
 the other. The price: forces balance only as well as both surfaces see the same gap.
 
+Cells that follow each other on a slave segment, and meet at one master node, make a range: the slave looks at one
+unbroken surface. A range ends at an end of the segment, or where the slave sees an end of that surface. Gauss points
+are spread over the range as a whole. So a gap that is smooth is integrated well, and one with a bend inside is not
+integrated exactly.
+
 Our choices: gaps and forces along the normal of a half pass's own segment; one cut where the covered part ends; and a
 segment that is seen at more than 60° counts as unseen. Else roundoff would let a side face of a body, at 90° to the
 other, look along it, and spoil the weighted gap at its corner.
@@ -31,34 +36,75 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_count, check_penalty, choose
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
-from contactverif_mortar import cell_forces
-from contactverif_mortar.cell_contact_points import at_nodes
-from contactverif_mortar.cell_forces import Shapes, integrals
-from contactverif_mortar.cell_tangent import ForcesAndTangent
-from contactverif_mortar.cell_traits import CELL_TRAITS, LOCKING_WITNESSES
-from contactverif_mortar.covered_ranges import Ranges
-from contactverif_mortar.integration_cells import AREAS, Cells, Quadrature, Sides
-from contactverif_mortar.node_groups import RowGroups, group_nodes
+from contactverif.geometry.block_rows import Couplings, Fields, NumberArray, zero_matrix
+from contactverif.geometry.projection import node
+from contactverif_mortar.cell_frame import ForcesAndTangent
+from contactverif_mortar.cell_geometry import seen_from, slave_view
+from contactverif_mortar.integration_cells import (
+    AREAS,
+    CELL_TRAITS,
+    LOCKING_WITNESSES,
+    Cells,
+    Quadrature,
+    Sides,
+    any_end,
+    ends_of_part,
+    read_only,
+    report_nodes,
+)
+from contactverif_mortar.node_factors import RowGroups, group_nodes
 from contactverif_mortar.node_rows import NodeState
-from contactverif_mortar.shape_rows import ShapedPoints, add_shaped_rows
-from contactverif_mortar.weighted_gaps import divide_covered, own_lengths
+from contactverif_mortar.shape_rows import Weighted, add_shaped_rows, divide_covered, own_lengths, weigh_points
 
 STEEPEST = -0.5  # The cosine between two segments that see each other; −1 where they are parallel.
 PREFIXES = ("slave.", "master.")  # The surface that is pushed in each half pass.
 _SOURCE = "Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179"
 
 
-class _HalfPass(NamedTuple):
-    """The points of a half pass at some states, with ∫N_j and ∫N_j g of all nodes; zero off the surface it pushes."""
+class Ranges(NamedTuple):
+    """The Gauss points of all covered ranges, in the order of the slave segments."""
 
-    sides: Sides
-    ranges: Ranges
-    points: Array  # (n_states, n_points, 6)
-    shapes: Shapes
-    ends: IntArray  # (n_points, 2)
-    areas: Array  # (n_states, n_nodes)
-    with_gap: Array  # (n_states, n_nodes)
+    slave: IntArray  # (n_points,) The segment that carries the point, and the one that it sees.
+    master: IntArray
+    slot: IntArray  # (n_points,) The number of the point in the quadrature rule.
+    # (n_points,) The master nodes that cut the lower and the upper end of its range, −1 where the segment ends there.
+    low: IntArray
+    high: IntArray
+
+    @classmethod
+    def find(cls, sides: Interface | Sides, x: FloatArray, cells: Cells, rule: Quadrature) -> Ranges:
+        """Return the points of the ranges that the cells make at the positions x (n_nodes, 2)."""
+        return cls(*_find_ranges(x, sides.slave.segments, sides.master.segments, cells[:4], rule.places))
+
+    @classmethod
+    def from_pairing(cls, pairing: Pairing, prefix: str) -> Ranges:
+        """Return the points of a pairing, whose names begin with a prefix."""
+        return cls(*(pairing[prefix + name] for name in cls._fields))
+
+    def near(self, nodes: BoolArray, sides: Interface | Sides) -> Ranges:
+        """Return the points whose slave segment has one of some slave nodes, given by mask (n_slave_nodes,)."""
+        carrying = any_end(nodes, sides.slave.segments, self.slave)
+        return self if carrying.all() else self.select(carrying)
+
+    def select(self, selection: BoolArray | slice) -> Ranges:
+        """Return some of the points, selected by mask or range."""
+        return Ranges(*(array[selection] for array in self))
+
+    def carriers(self, n_q: int) -> IntArray:
+        """Return the slave segment of each point: each has one point of the rule."""
+        return self.slave
+
+    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
+        """Return the nodes (n_points, 6): A, B, 1, 2, and those that cut the range (any node where none does)."""
+        ends = sides.slave.segments[self.slave]
+        cuts = [np.where(cut >= 0, cut, ends[:, 0]) for cut in (self.low, self.high)]  # Their Δ is zero.
+        return np.column_stack([ends, sides.master.segments[self.master], *cuts]).astype(np.int32)
+
+    def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
+        """Return what `Parts.cuts` says: behind A, B, 1 and 2 the nodes 4 and 5 cut a range."""
+        not_averaged = np.full(len(sides.slave), -1)
+        arrays = self.slave, self.master, self.low, self.high, not_averaged, not_averaged, self.slot
+        return tuple(map(read_only, arrays)), (6, 4, 5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +124,8 @@ class TwoHalfPasses:
             ranges = Ranges.find(sides, x, cells, self.rule)
             _, gaps = self._gaps(sides, ranges, x)
             active |= gaps <= 0  # false where NaN
-            arrays.update({**cells.as_arrays(f"{prefix}cells."), **ranges.as_arrays(prefix)})
+            arrays.update({f"{prefix}cells.{name}": array for name, array in cells._asdict().items()})
+            arrays.update({prefix + name: array for name, array in ranges._asdict().items()})
         return Pairing({**arrays, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
@@ -89,11 +136,8 @@ class TwoHalfPasses:
             pressure = np.zeros_like(half_pass.areas)
             own = active & (half_pass.areas != 0).any(axis=0)
             pressure[:, own] = -self.penalty * half_pass.with_gap[:, own] / half_pass.areas[:, own]
-            at_points = half_pass.shapes.at(pressure, half_pass.ends)
-            nodes = half_pass.ranges.local_nodes(half_pass.sides)
-            forces = cell_forces.forces(half_pass.points, at_points, nodes, interface.n_nodes)
             pushed = half_pass.sides.slave.nodes  # A half pass pushes its own surface alone.
-            total[:, pushed] += forces[:, pushed]
+            total[:, pushed] += half_pass.forces(pressure)[:, pushed]
         return total.reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
@@ -105,9 +149,9 @@ class TwoHalfPasses:
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         half_passes = self._carrying(interface, pairing, x[None])
         groups = [
-            group_nodes(interface.n_nodes, each.sides.slave.segments, each.ranges.slave, local, active, dual=False)
+            group_nodes(interface.n_nodes, each.sides.slave.segments, each.parts.slave, local, active, dual=False)
             for each in half_passes
-            for local in [each.ranges.local_nodes(each.sides)]
+            for local in [each.parts.local_nodes(each.sides)]
         ]
         matrix = zero_matrix(interface.n_nodes, 0, _couple(active, half_passes, groups))
         forces: FloatArray = np.zeros(interface.n_unknowns)
@@ -116,7 +160,7 @@ class TwoHalfPasses:
             gaps = each.with_gap[0] / areas
             weights = np.where(active, -self.penalty, 0.0)
             state = NodeState(weights * gaps, weights, gaps, areas)
-            rows = add_shaped_rows(self._shape_points(each, x), of_rows, state, 2, forces, matrix)
+            rows = add_shaped_rows(each.linearize(self.rule, x), of_rows, state, 2, forces, matrix)
             rows.multiply(weights, 0, interface.n_nodes)
         return forces, matrix
 
@@ -128,7 +172,7 @@ class TwoHalfPasses:
             active, numbers = pairing["active"], sides.slave.nodes
             pressure = np.where(active, -self.penalty * gaps, 0.0)
             cells = Cells.from_pairing(pairing, f"{prefix}cells.")
-            points = at_nodes(sides, cells, x, areas, gaps, pressure, active)
+            points = report_nodes(sides, cells, x, areas, gaps, pressure, active)
             on_master = np.full(interface.n_nodes, prefix == PREFIXES[1])
             half_passes.append((replace(points, on_master=on_master), numbers))
         names = [entry.name for entry in fields(ContactPoints)]
@@ -136,32 +180,17 @@ class TwoHalfPasses:
             **{name: np.concatenate([getattr(each, name)[numbers] for each, numbers in half_passes]) for name in names}
         )
 
-    def _carrying(self, interface: Interface, pairing: Pairing, x: Array) -> list[_HalfPass]:
+    def _carrying(self, interface: Interface, pairing: Pairing, x: Array) -> list[Weighted]:
         """Compute the points on the segments with an active node; the others carry no pressure."""
         active = pairing["active"]
         return [
-            self._at(sides, Ranges.from_pairing(pairing, prefix).near(active, sides), x)
+            weigh_points(sides, Ranges.from_pairing(pairing, prefix).near(active, sides), self.rule, x, dual=False)
             for prefix, sides in _both_sides(interface)
         ]
 
-    def _at(self, sides: Sides, ranges: Ranges, x: Array) -> _HalfPass:
-        """Compute points, shapes and weighted gaps at the positions x (n_states, n_nodes, 2)."""
-        points, ends = ranges.points(sides, x, self.rule), sides.slave.segments[ranges.slave]
-        shapes = Shapes.standard(points)
-        return _HalfPass(sides, ranges, points, shapes, ends, *integrals(shapes, points, ends, x.shape[1]))
-
-    def _shape_points(self, half_pass: _HalfPass, x: FloatArray) -> ShapedPoints:
-        """Return the points of one state, with their Δ at x (n_nodes, 2)."""
-        sides, ranges = half_pass.sides, half_pass.ranges
-
-        def make_gains(begin: int, end: int) -> FloatArray:
-            return ranges.select(slice(begin, end)).gains(sides, x, self.rule)
-
-        return ShapedPoints(half_pass.points[0], half_pass.shapes, ranges.slave, sides.slave.segments, make_gains)
-
     def _gaps(self, sides: Sides, ranges: Ranges, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫N_j and G_j (n_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
-        half_pass = self._at(sides, ranges, x[None])
+        half_pass = weigh_points(sides, ranges, self.rule, x[None], dual=False)
         lengths = own_lengths(sides, x if self.rule.current else sides.nodes)
         return divide_covered(half_pass.areas[0], half_pass.with_gap[0], lengths)
 
@@ -181,7 +210,7 @@ def _find_cells(sides: Sides, x: FloatArray) -> Cells:
     return cells.select((slave * master).sum(axis=1) <= STEEPEST * sizes)
 
 
-def _couple(active: BoolArray, half_passes: list[_HalfPass], groups: list[RowGroups]) -> Couplings:
+def _couple(active: BoolArray, half_passes: list[Weighted], groups: list[RowGroups]) -> Couplings:
     """Return the couplings of both half passes: around an active node, the nodes of its segments feel its group."""
     parts = [
         _couple_half_pass(active, each.sides.slave.segments, of_rows.nodes, of_rows.starts)
@@ -191,6 +220,38 @@ def _couple(active: BoolArray, half_passes: list[_HalfPass], groups: list[RowGro
     shift = len(parts[0][0])
     starts = np.concatenate([parts[0][1][:-1], parts[1][1] + shift])
     return Couplings(nodes, starts, np.concatenate([parts[0][2], parts[1][2] + shift]))
+
+
+@compile_maker
+def _find_ranges(
+    x: FloatArray, slave: IntArray, master: IntArray, cells: Fields, places: FloatArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
+    """Return the arrays of `Ranges`. A point between two cells belongs to the first that reaches it."""
+    cell_slave, cell_master, cut_low, cut_high = cells
+    rows = [(0, 0, 0, 0, 0) for _ in range(0)]
+    begin = 0
+    while begin < len(cell_slave):
+        s, end = cell_slave[begin], begin + 1
+        while end < len(cell_slave) and cell_slave[end] == s and cut_high[end - 1] and cut_low[end]:
+            if master[cell_master[end - 1], 0] != master[cell_master[end], 1]:
+                break
+            end += 1
+        low = master[cell_master[begin], 1] if cut_low[begin] else -1
+        high = master[cell_master[end - 1], 0] if cut_high[end - 1] else -1
+        view = slave_view(x, slave, s, -1, -1)
+        bottom, top = ends_of_part(view, x, low, high)
+        cell = begin
+        for q in range(len(places)):
+            c = (bottom + top) / 2 + (top - bottom) / 2 * places[q]
+            while cell < end - 1 and seen_from(node(x, master[cell_master[cell], 0]), view) < c:
+                cell += 1
+            rows.append((s, cell_master[cell], q, low, high))
+        begin = end
+    table = np.empty((5, len(rows)), dtype=np.int64)
+    for number in range(len(rows)):
+        s, m, q, low, high = rows[number]
+        table[0, number], table[1, number], table[2, number], table[3, number], table[4, number] = s, m, q, low, high
+    return table[0], table[1], table[2], table[3], table[4]
 
 
 @compile_maker

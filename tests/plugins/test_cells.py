@@ -11,9 +11,8 @@ from contactverif import Interface, Surface
 from contactverif.geometry.projection import search_tree
 from contactverif_mortar import sts
 from contactverif_mortar.cell_geometry import SlaveView
-from contactverif_mortar.cell_search import overlap
+from contactverif_mortar.cell_search import collect_segments, make_strip, overlap
 from contactverif_mortar.integration_cells import GAP, WEIGHT, C, Cells, Quadrature
-from contactverif_mortar.strip_search import collect_segments, make_strip
 
 MIDPOINT = Quadrature.gauss(1, current=True)
 
@@ -87,7 +86,7 @@ def test_the_strip_holds_all_segments_that_have_a_node_in_it() -> None:
         n_a, n_b = (turn @ [t[1], -t[0]] for turn in turns)
         strip = make_strip(SlaveView(tuple(a), tuple(b), tuple(n_a), tuple(n_b), straight=False), 1.5)
         computed = np.empty(len(interface.master), dtype=np.int64)
-        count = collect_segments(strip, 1, *search_tree(interface.master, x), np.empty(64, dtype=np.int64), computed)
+        count = collect_segments(strip, 1, search_tree(interface.master, x), np.empty(64, dtype=np.int64), computed)
         p = x[interface.master.segments]  # (n_segments, 2, 2)
         near = np.linalg.norm(p - a - np.clip((p - a) @ t, 0, np.linalg.norm(b - a))[..., None] * t, axis=2) < 1.5
         inside = near & ((p - a) @ [-n_a[1], n_a[0]] > 0) & ((p - b) @ [-n_b[1], n_b[0]] < 0)

@@ -10,9 +10,8 @@ from surfaces import DEPTH, contact_forces, make_bent, make_flat
 from contactverif import Interface
 from contactverif.oracle import uniform_pressure_weights
 from contactverif_mortar import mortar, mortar_dual, mortar_dual_lm, mortar_lm
-from contactverif_mortar.cell_forces import Shapes
 from contactverif_mortar.integration_cells import WEIGHT, C, Cells, Quadrature
-from contactverif_mortar.weighted_gaps import UNCOVERED
+from contactverif_mortar.shape_rows import UNCOVERED, Shapes
 
 TWO = Quadrature.gauss(2, current=True)
 

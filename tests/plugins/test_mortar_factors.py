@@ -10,7 +10,7 @@ import contactverif_mortar
 from contactverif import Interface, MisuseError
 from contactverif_mortar.cell_search import find_cells, longest_of_chain
 from contactverif_mortar.integration_cells import Cells
-from contactverif_mortar.node_groups import check_product
+from contactverif_mortar.node_factors import check_product
 
 PENALTY = 8.0
 ROUNDINGS = 256 * 2.0**-53  # Some hundred sums and products, each rounded once.

@@ -8,10 +8,11 @@ from surfaces import DEPTH, make_bent, make_flat
 
 from contactverif import Interface, Surface
 from contactverif.oracle import uniform_pressure_weights
-from contactverif_mortar import cell_forces, mortar, mortar_two_half_pass
-from contactverif_mortar.cell_forces import Shapes
-from contactverif_mortar.covered_ranges import Ranges
+from contactverif_mortar import integration_cells as cells_module
+from contactverif_mortar import mortar, mortar_two_half_pass
 from contactverif_mortar.integration_cells import WEIGHT, Cells, Quadrature
+from contactverif_mortar.shape_rows import Shapes
+from contactverif_mortar.two_half_passes import Ranges
 
 CASE_C = [2.0, 2.0, 4.0, 4.0], [3.0, 3.0, 3.0, 3.0]
 TWO, FIVE = (Quadrature.gauss(n, current=True) for n in (2, 5))
@@ -27,9 +28,9 @@ def classical_forces(interface: Interface, z: Any, rule: Quadrature) -> Any:
     """Return the forces (n_nodes, 2) of one classical pass at the points of covered ranges, for a pressure DEPTH."""
     x = z.reshape(1, -1, 2)
     ranges = Ranges.find(interface, x[0], Cells.find(interface, x[0], averaged=False), rule)
-    points = ranges.points(interface, x, rule)
+    points = rule.points(interface, ranges, x)
     pressure = Shapes.standard(points).values.sum(axis=-1) * DEPTH
-    return cell_forces.forces(points, pressure, ranges.local_nodes(interface), interface.n_nodes)[0]
+    return cells_module.forces(points, pressure, ranges.local_nodes(interface), interface.n_nodes)[0]
 
 
 def forces(formulation: Any, interface: Interface, z: Any) -> Any:
@@ -75,7 +76,7 @@ def test_points_of_a_range_cover_what_its_cells_cover() -> None:
         ranges = Ranges.find(interface, x, cells, TWO)
         segments, n_segments = np.repeat(cells.slave, 2), len(interface.slave)
         of_cells = np.bincount(segments, TWO.points(interface, cells, x[None])[0, :, WEIGHT], n_segments)
-        of_ranges = np.bincount(ranges.slave, ranges.points(interface, x[None], TWO)[0, :, WEIGHT], n_segments)
+        of_ranges = np.bincount(ranges.slave, TWO.points(interface, ranges, x[None])[0, :, WEIGHT], n_segments)
         assert of_ranges == pytest.approx(of_cells, abs=1e-13)
 
 
@@ -86,4 +87,4 @@ def test_a_hole_in_the_master_parts_a_segment_into_two_ranges() -> None:
     x[:2, 1] -= DEPTH
     ranges = Ranges.find(interface, x, Cells.find(interface, x, averaged=False), TWO)
     assert len(ranges.slave) == 4
-    assert ranges.points(interface, x[None], TWO)[0, :, WEIGHT].sum() == pytest.approx(4.0)
+    assert TWO.points(interface, ranges, x[None])[0, :, WEIGHT].sum() == pytest.approx(4.0)
