@@ -1,19 +1,35 @@
-"""The points of a cell: where they lie on both faces, what they weigh, and their gaps along the slave's normal.
+"""The cells of an interface and their points: where these lie on both faces, what they weigh, and their gaps.
 
 Every number is a smooth function of the positions of the cell's nodes, real or complex, on the integers of
 `face_search`. Points and gaps are made of differences from the slave's first corner, so a far translation rounds no
-more than the positions.
+more than the positions. Gaps are along the slave's normal.
+
+A cell has a dozen or two of coordinates. One complex step in each of them, for all cells at once, gives the derivatives
+of what it computes without truncation (`differentiate`): f(x + ih) = f(x) + ih f′(x) + O(h²), and h² is lost in
+roundoff for h = 2^-200.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
-from contactverif.contract.arrays import Array, IntArray
-from contactverif_surfaces.plane_shapes import TRIANGLE, cross_plane, evaluate_shapes
+from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif_surfaces.face_search import find_cells, longest_edges
 
+STEP = 2.0**-200
+CHUNK = 500  # The number of cells that are differentiated together, so that memory stays small.
+TRIANGLE = 3
+# A foot past the border of a face by this share of it still counts, since one on an edge between two faces must stand
+# on one of them. Shape functions are rounded by 2⁻⁵³ × how slender a face is: enough for faces of 1 : 10⁶.
+PAST_BORDER = 2.0**-30
 # Rules of Gauss points on a triangle, in its three corner coordinates, with weights that add up to 1. Three points are
 # exact for degree 2, which a gap × a shape function has; six for degree 4.
 _A, _B = 0.445948490915965, 0.091576213509771
@@ -21,6 +37,124 @@ _THREE = np.array([[4.0, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
 _SIX = np.array([[1 - 2 * c if i == j else c for j in range(3)] for c in (_A, _B) for i in range(3)])
 _SIX_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 GAUSS = {3: (_THREE, np.full(3, 1 / 3)), 6: (_SIX, _SIX_WEIGHTS / _SIX_WEIGHTS.sum())}
+# The promises that the methods on cells have in common; each method says what it changes.
+SURFACE_TRAITS = Traits(
+    promises=Promises(
+        patch=PatchPromises(flat=True),
+        tangent="exact",
+        symmetric=False,
+        conserves_force=True,
+        conserves_moment=True,
+        unbiased=False,
+        nodes_push=True,
+        translation_stable=True,
+    ),
+    rules=Rules(gap="cells", force_along="slave normal", penalty="distributed", area="current"),
+    abilities=Abilities(dimensions=(3,), faces=(3,), batched=True, takes_complex=True),
+    evidence=Evidence(witnesses={"symmetric": "tilted-faces", "swap": "tilted-faces"}),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FacePairs:
+    """The cells of an interface: pairs of a slave and a master face, and the codes of the corners of their overlap."""
+
+    slave_face: IntArray  # (n_cells,)
+    master_face: IntArray  # (n_cells,)
+    codes: IntArray  # (n_cells, most_corners, 2) See `face_search`.
+    slave_nodes: IntArray  # (n_cells, n_slave_corners) The nodes of the slave face of each cell.
+    master_nodes: IntArray  # (n_cells, n_master_corners)
+
+    @classmethod
+    def find(cls, interface: Interface, z: FloatArray) -> FacePairs:
+        """Return the cells of an interface at a state z (n_unknowns,)."""
+        x, slave, master = np.array(z).reshape(-1, 3), interface.slave, interface.master
+        faces, codes = find_cells(x, slave.faces, master.faces, longest_edges(slave, x), longest_edges(master, x))
+        return cls.of_arrays(interface, faces[:, 0], faces[:, 1], codes)
+
+    @classmethod
+    def of_arrays(cls, interface: Interface, slave: IntArray, master: IntArray, codes: IntArray) -> FacePairs:
+        """Return the cells of faces (n_cells,) of both sides."""
+        return cls(slave, master, codes, interface.slave.faces[slave], interface.master.faces[master])
+
+    @classmethod
+    def from_pairing(cls, interface: Interface, pairing: Pairing) -> FacePairs:
+        """Return the cells that a pairing holds."""
+        return cls.of_arrays(interface, pairing["slave_face"], pairing["master_face"], pairing["corners"])
+
+    def as_arrays(self) -> dict[str, IntArray]:
+        """Return the integers of a pairing."""
+        return {"slave_face": self.slave_face, "master_face": self.master_face, "corners": self.codes}
+
+    @property
+    def nodes(self) -> IntArray:
+        """The nodes (n_cells, n_corners) of both faces of each cell, slave first."""
+        return np.concatenate([self.slave_nodes, self.master_nodes], axis=1)
+
+    @property
+    def n_slave_corners(self) -> int:
+        """The number of corners of a slave face."""
+        return int(self.slave_nodes.shape[1])
+
+    def corners_at(self, z: Array) -> Array:
+        """Return the positions (..., n_cells, n_corners, 3) of these nodes at states z (..., n_unknowns)."""
+        return positions_of(z, self.nodes)
+
+
+def first_faces(faces: IntArray, nodes: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the first of the faces at each node (n,), and the shape functions of its corners there (n, n_corners)."""
+    holds = faces[None] == nodes[:, None, None]  # (n_nodes, n_faces, n_corners)
+    first = holds.any(axis=2).argmax(axis=1)
+    return first, holds[np.arange(len(nodes)), first].astype(np.float64)
+
+
+def positions_of(z: Array, nodes: IntArray) -> Array:
+    """Return the positions (..., n, k, 3) of nodes (n, k) at states z (..., n_unknowns)."""
+    positions: Array = z.reshape(*z.shape[:-1], -1, 3)[..., nodes, :]
+    return positions
+
+
+def cross_plane(first: Array, second: Array) -> Array:
+    """Return the cross products (...,) of plane vectors (..., 2)."""
+    product: Array = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return product
+
+
+def evaluate_shapes(corners: Array, points: Array) -> Array:
+    """Return the shape functions (..., n_points, n_corners) of faces (..., n_corners, 2).
+
+    The points are (..., n_points, 2).
+    """
+    arm = points - corners[..., :1, :]
+    if corners.shape[-2] == TRIANGLE:
+        first, second = corners[..., 1:2, :] - corners[..., :1, :], corners[..., 2:, :] - corners[..., :1, :]
+        area = cross_plane(first, second)
+        s, t = cross_plane(arm, second) / area, cross_plane(first, arm) / area
+        return np.stack([1 - s - t, s, t], axis=-1)
+    s, t = _find_place(corners, arm)
+    return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
+
+
+def _find_place(corners: Array, arm: Array) -> tuple[Array, Array]:
+    """Return the place (s, t) of points at an arm (..., n_points, 2) from corner 0 of quadrilaterals (..., 4, 2).
+
+    With edges a and b at corner 0 and the twist w, a point is at p = s a + t b + s t w. Its cross product with b + s w
+    leaves s alone, that with a + t w leaves t. The root of the discriminant of both is the Jacobian at the point. It
+    has the sign of the face's area, and so has what it is added to: nothing cancels where the twist is small, or 0.
+    """
+    first, second, third, last = (corners[..., i : i + 1, :] for i in range(4))
+    a, b, w = second - first, last - first, (first - second) + (third - last)
+    area, turn = cross_plane(a, b), cross_plane(arm, w)
+    by_s, by_t = cross_plane(arm, b), cross_plane(a, arm)
+    jacobian_s = _root((area - turn) ** 2 + 4 * cross_plane(a, w) * by_s, area)
+    jacobian_t = _root((area + turn) ** 2 + 4 * cross_plane(w, b) * by_t, area)
+    return 2 * by_s / (area - turn + jacobian_s), 2 * by_t / (area + turn + jacobian_t)
+
+
+def _root(square: Array, sign: Array) -> Array:
+    """Return the root with a sign; 0 for a negative number, since far outside of a face a point has no place."""
+    root = np.sqrt(np.where(square.real > 0, square, 0.0))
+    return np.where(sign.real < 0, -root, root)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +270,6 @@ def _middle(corners: Array, following: Array) -> Array:
 
 
 def _areas(triangles: Array) -> Array:
-    """Return the areas (...,) of triangles (..., 3, 2), positive if their corners run counter-clockwise."""
     first = triangles[..., 0, :]
     return cross_plane(triangles[..., 1, :] - first, triangles[..., 2, :] - first) / 2
 
@@ -152,3 +285,61 @@ def _take(corners: Array, numbers: IntArray) -> Array:
     cells = np.arange(len(numbers))[:, None]
     selection: Array = corners[..., cells, numbers, :]
     return selection
+
+
+def report_points(
+    pairs: FacePairs, points: CellPoints, corners: FloatArray, pressure: FloatArray, active: BoolArray
+) -> ContactPoints:
+    """Return points of cells as contact points, with pressures and activity (n_cells, n_points)."""
+    n_points = points.gap.shape[1]
+    place = np.einsum("cqk,cki->cqi", points.slave_shape, corners[:, : pairs.n_slave_corners])
+    return ContactPoints.on_faces(
+        slave_segment=np.repeat(pairs.slave_face, n_points),
+        slave_shape=points.slave_shape.reshape(-1, points.slave_shape.shape[-1]),
+        master_segment=np.repeat(pairs.master_face, n_points),
+        master_shape=points.master_shape.reshape(-1, points.master_shape.shape[-1]),
+        position=place.reshape(-1, 3),
+        normal=np.repeat(-points.normal, n_points, axis=0),
+        gap=points.gap.reshape(-1),
+        pressure=pressure.reshape(-1),
+        weight=points.weight.reshape(-1),
+        active=active.reshape(-1),
+    )
+
+
+def differentiate(function: Callable[..., Array], corners: FloatArray, *others: Array) -> FloatArray:
+    """Return the derivatives (n_cells, …, n_corners · 3) of a function of each cell's corners (n_cells, n_corners, 3).
+
+    The function takes corners (..., n_cells, n_corners, 3) and other arrays (n_cells, …), such as codes of corners, and
+    returns an array (..., n_cells, …).
+    """
+    n_cells, n_corners, _ = corners.shape
+    directions = 1j * STEP * np.eye(3 * n_corners).reshape(3 * n_corners, 1, n_corners, 3)
+    parts = []
+    for first in range(0, max(n_cells, 1), CHUNK):
+        chunk = slice(first, first + CHUNK)
+        moved = function(corners[chunk] + directions, *(values[chunk] for values in others))
+        parts.append(np.moveaxis(moved.imag / STEP, 0, -1))
+    return np.concatenate(parts)
+
+
+def unknowns_of(nodes: IntArray) -> IntArray:
+    """Return the unknowns (n_cells, n_corners · 3) of nodes (n_cells, n_corners)."""
+    unknowns: IntArray = (3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), 3 * nodes.shape[1])
+    return unknowns
+
+
+def add_blocks(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> sparse.csr_array:
+    """Return the sum of blocks (n_cells, a, b) at rows (n_cells, a) and columns (n_cells, b) of a matrix."""
+    places = (
+        np.broadcast_to(rows[:, :, None], blocks.shape).reshape(-1),
+        np.broadcast_to(columns[:, None, :], blocks.shape).reshape(-1),
+    )
+    return sparse.coo_array((blocks.reshape(-1), places), shape=shape).tocsr()
+
+
+def add_rows(values: Array, rows: IntArray, count: int) -> Array:
+    """Return the sums (..., count) of values (..., n_cells, a) at rows (n_cells, a)."""
+    sums = np.zeros((count, *values.shape[:-2]), values.dtype)
+    np.add.at(sums, rows, np.moveaxis(values, (-2, -1), (0, 1)))
+    return np.moveaxis(sums, 0, -1)

@@ -20,12 +20,23 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif_surfaces.cell_points import CellPoints, SlaveView, flatten_pushes, gauss_points
-from contactverif_surfaces.face_pairs import positions_of
+from contactverif_surfaces.cell_points import (
+    PAST_BORDER,
+    SURFACE_TRAITS,
+    TRIANGLE,
+    CellPoints,
+    SlaveView,
+    add_blocks,
+    add_rows,
+    cross_plane,
+    differentiate,
+    evaluate_shapes,
+    flatten_pushes,
+    gauss_points,
+    positions_of,
+    unknowns_of,
+)
 from contactverif_surfaces.face_search import find_cells, longest_edges
-from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
-from contactverif_surfaces.plane_shapes import PAST_BORDER, TRIANGLE, cross_plane, evaluate_shapes
-from contactverif_surfaces.surface_traits import SURFACE_TRAITS
 
 N_PARTS = 4
 N_POINTS = {3: 3, 4: 6}  # Gauss points on each triangle of a cell, by the number of corners of a master face.

@@ -16,19 +16,24 @@ Two edges cross only if both ends lie off the other edge by more than `TIE` × s
 place of a crossing would be a quotient of two roundoffs: meshes that share an edge have many such pairs. For the same
 reason there is no cell that is thinner than `TIE` × size: its centroid could be anywhere.
 
-Candidates come from a tree of boxes (`face_tree`), at a cost of O(log n) for each slave face.
+Candidates come from a tree of boxes, at a cost of O(log n) for each slave face. Boxes are sorted along a curve that
+fills space (Morton's), so that neighbours in the list are neighbours in space. Of this list `LEAF` boxes at a time are
+a leaf, and a parent is the box around its two halves. A question is a box along any three axes, seen from an origin
+near it, so that a far translation rounds nothing more. The tree leaves out what is clearly apart, and decides nothing
+else.
 
 Rule for the next editor: this file makes decisions. It returns integers, never a real number.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from contactverif.compiler import compile_maker, compile_part
+from contactverif.compiler import compile_kernel, compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.interface import Surface
-from contactverif_surfaces.face_tree import Tree, collect_boxes, grow_tree
 
 MOST_CORNERS = 9  # Two quadrilaterals overlap in eight corners at most, and the clip may count one twice.
 TIE = 32 * UNIT_ROUNDOFF  # The share of the size that counts as a distance from an edge.
@@ -36,6 +41,10 @@ REACH = 2.0  # The largest gap over the sum of the longest edges of both sides.
 # The columns of the table of the cells on one slave face: the middle of the cell, and the plane of the master face,
 # whose height is H + X x + Y y.
 MIDDLE_X, MIDDLE_Y, HEIGHT, SLOPE_X, SLOPE_Y, N_COLUMNS = range(6)
+LEAF = 4  # The number of boxes in a leaf.
+BITS = 20  # The bits of a place along each axis; three such numbers are interleaved in 60 bits.
+# A box that is farther off than this share of all lengths in the comparison is apart, whatever was rounded.
+MARGIN = 64 * UNIT_ROUNDOFF
 
 
 def find_cells(
@@ -46,7 +55,8 @@ def find_cells(
     Positions x are (n_nodes, 3). The last corner of a cell is repeated as often as the fullest cell has more corners.
     The edges are those of `longest_edges`.
     """
-    faces, corners = find_face_cells(x, slave, master, slave_edge, master_edge, *tree_of_faces(x, master))
+    order, boxes = tree_of_faces(x, master)
+    faces, corners = find_face_cells(x, slave, master, slave_edge, master_edge, (order, boxes))
     return faces, np.ascontiguousarray(corners)
 
 
@@ -94,8 +104,7 @@ def find_face_cells(
     master: IntArray,
     slave_edge: FloatArray,
     master_edge: FloatArray,
-    order: IntArray,
-    boxes: FloatArray,
+    tree: tuple[IntArray, FloatArray],
 ) -> tuple[IntArray, IntArray]:
     """Return what `find_cells` does, from a tree of the master faces."""
     room, count, most_corners, longest = 4 * (len(slave) + len(master)), 0, 1, 0.0
@@ -111,7 +120,7 @@ def find_face_cells(
         origin = x[slave[s, 0]]
         view_face(on_slave, x, slave[s], origin, axes, False)
         set_question(question, on_slave, REACH * (slave_edge[s] + longest) + longest)
-        n_facing = collect_facing(members, on_master, x, master, origin, axes, question, order, boxes)
+        n_facing = collect_facing(members, on_master, x, master, origin, axes, question, tree)
         if count + n_facing > room:
             room = 2 * (count + n_facing)
             faces, corners = lengthen(faces, corners, room)
@@ -154,12 +163,11 @@ def collect_facing(
     origin: FloatArray,
     axes: FloatArray,
     question: FloatArray,
-    order: IntArray,
-    boxes: FloatArray,
+    tree: tuple[IntArray, FloatArray],
 ) -> int:
     """Write the master faces that may overlap a slave face, in ascending order, and return how many."""
     n_facing = 0
-    for place in range(collect_boxes(order, boxes, origin, axes, question[0], question[1], members)):
+    for place in range(collect_boxes(members, tree, origin, axes, question)):
         m = members[place]
         view_face(on_master, x, master[m], origin, axes, True)
         if may_overlap(question, on_master):
@@ -407,3 +415,113 @@ def holds_place(face: FloatArray, x: float, y: float) -> bool:
         if along * (y - face[j, 1]) - across * (x - face[j, 0]) <= 0:
             return False
     return True
+
+
+class Tree(NamedTuple):
+    """A tree: box 1 holds everything, and box i is halved into 2i and 2i + 1. The second half are the leaves."""
+
+    order: IntArray  # (n,) The numbers of the boxes along the curve.
+    boxes: FloatArray  # (2 n_leaves, 2, 3) The lower and the upper corner of each box.
+
+
+def grow_tree(boxes: FloatArray) -> Tree:
+    """Return the tree of boxes (n, 2, 3), lower and upper corner each."""
+    middle = boxes.mean(axis=1)
+    size = float((middle.max(axis=0) - middle.min(axis=0)).max())
+    scale = (2**BITS - 1) / size if size > 0 else 0.0
+    keys = np.empty(len(boxes), np.int64)
+    _write_keys(keys, ((middle - middle.min(axis=0)) * scale).astype(np.int64))
+    order = np.argsort(keys, kind="stable")
+    tree = Tree(order, np.empty((2 << max(0, (len(boxes) - 1) // LEAF).bit_length(), 2, 3)))
+    _write_boxes(*tree, boxes)
+    return tree
+
+
+@compile_kernel
+def _write_keys(keys: IntArray, places: IntArray) -> None:
+    """Interleave the bits of the places (n, 3)."""
+    for i in range(len(keys)):
+        key = 0
+        for bit in range(BITS - 1, -1, -1):
+            for axis in range(3):
+                key = 2 * key + ((places[i, axis] >> bit) & 1)
+        keys[i] = key
+
+
+@compile_kernel
+def _write_boxes(order: IntArray, nodes: FloatArray, boxes: FloatArray) -> None:
+    """Write the boxes of a tree; those of empty leaves meet nothing."""
+    n_leaves = len(nodes) // 2
+    for box in range(len(nodes)):
+        for axis in range(3):
+            nodes[box, 0, axis], nodes[box, 1, axis] = np.inf, -np.inf
+    for place in range(len(order)):
+        for axis in range(3):
+            leaf = n_leaves + place // LEAF
+            nodes[leaf, 0, axis] = min(nodes[leaf, 0, axis], boxes[order[place], 0, axis])
+            nodes[leaf, 1, axis] = max(nodes[leaf, 1, axis], boxes[order[place], 1, axis])
+    for parent in range(n_leaves - 1, 0, -1):
+        for axis in range(3):
+            nodes[parent, 0, axis] = min(nodes[2 * parent, 0, axis], nodes[2 * parent + 1, 0, axis])
+            nodes[parent, 1, axis] = max(nodes[2 * parent, 1, axis], nodes[2 * parent + 1, 1, axis])
+
+
+@compile_part
+def collect_boxes(
+    members: IntArray, tree: tuple[IntArray, FloatArray], origin: FloatArray, axes: FloatArray, question: FloatArray
+) -> int:
+    """Write the numbers of boxes into `members`, all that meet a question and some more; return how many.
+
+    The question (2, 3) holds the points whose components along the `axes` (3, 3), seen from the origin, are between its
+    rows.
+    """
+    order, nodes = tree
+    n_leaves, count, box = len(nodes) // 2, 0, 1
+    while True:
+        if _meets(nodes[box], origin, axes, question):
+            if box < n_leaves:  # down to the first half
+                box = 2 * box
+                continue
+            start = (box - n_leaves) * LEAF
+            for place in range(start, min(start + LEAF, len(order))):
+                members[count] = order[place]
+                count += 1
+        while box & 1:  # up from second halves
+            box >>= 1
+        if box == 0:
+            return count
+        box += 1  # on to the second half
+
+
+@compile_part
+def _meets(box: FloatArray, origin: FloatArray, axes: FloatArray, question: FloatArray) -> bool:
+    """Return whether a box (2, 3) may meet a question; an empty one does not."""
+    if box[0, 0] > box[1, 0]:
+        return False
+    for row in range(3):
+        nearest, farthest, size = 0.0, 0.0, 0.0
+        for axis in range(3):
+            first = axes[row, axis] * (box[0, axis] - origin[axis])
+            second = axes[row, axis] * (box[1, axis] - origin[axis])
+            nearest += min(first, second)
+            farthest += max(first, second)
+            size += abs(first) + abs(second)
+        margin = MARGIN * size
+        if nearest > question[1, row] + margin or farthest < question[0, row] - margin:
+            return False
+    return True
+
+
+@compile_maker
+def find_boxes_at(points: FloatArray, order: IntArray, boxes: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return pairs of points (n, 3) and boxes by their numbers, all where the point lies in the box and some more."""
+    axes, question, members = np.eye(3), np.zeros((2, 3)), np.empty(len(order), np.int64)
+    counts = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        counts[i] = collect_boxes(members, (order, boxes), points[i], axes, question)
+    point, box, count = np.empty(counts.sum(), np.int64), np.empty(counts.sum(), np.int64), 0
+    for i in range(len(points)):
+        for place in range(collect_boxes(members, (order, boxes), points[i], axes, question)):
+            point[count], box[count] = i, members[place]
+            count += 1
+    return point, box

@@ -20,13 +20,23 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.option_checks import check_penalty
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
-from contactverif_surfaces.cell_points import CellPoints, SlaveView, axes_of, flatten_pushes
-from contactverif_surfaces.face_pairs import first_faces, positions_of
-from contactverif_surfaces.face_search import REACH, longest_edges
-from contactverif_surfaces.face_tree import find_boxes_at, grow_tree
-from contactverif_surfaces.local_derivatives import add_blocks, add_rows, differentiate, unknowns_of
-from contactverif_surfaces.plane_shapes import PAST_BORDER, cross_plane, evaluate_shapes
-from contactverif_surfaces.surface_traits import SURFACE_TRAITS
+from contactverif_surfaces.cell_points import (
+    PAST_BORDER,
+    SURFACE_TRAITS,
+    CellPoints,
+    SlaveView,
+    add_blocks,
+    add_rows,
+    axes_of,
+    cross_plane,
+    differentiate,
+    evaluate_shapes,
+    first_faces,
+    flatten_pushes,
+    positions_of,
+    unknowns_of,
+)
+from contactverif_surfaces.face_search import REACH, find_boxes_at, grow_tree, longest_edges
 
 
 @dataclass(frozen=True, slots=True, eq=False)

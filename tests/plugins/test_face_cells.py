@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from contactverif import Interface
-from contactverif_surfaces.cell_points import SlaveView
-from contactverif_surfaces.face_pairs import FacePairs
+from contactverif_surfaces.cell_points import FacePairs, SlaveView
 from contactverif_surfaces.face_search import TIE
 
 

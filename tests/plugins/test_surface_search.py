@@ -8,8 +8,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases, translated_surface_cases
 from contactverif_surfaces.cell_points import SlaveView
-from contactverif_surfaces.face_search import find_cells, find_face_cells, longest_edges, tree_of_faces
-from contactverif_surfaces.face_tree import Tree, grow_tree
+from contactverif_surfaces.face_search import Tree, find_cells, find_face_cells, grow_tree, longest_edges, tree_of_faces
 
 Cells = tuple[IntArray, IntArray]
 STRATEGIES = (surface_cases, flat_surface_cases, translated_surface_cases)
@@ -20,7 +19,9 @@ def edges_of(interface: Interface, x: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def cells_by(tree: Tree, interface: Interface, x: FloatArray) -> Cells:
-    return find_face_cells(x, interface.slave.faces, interface.master.faces, *edges_of(interface, x), *tree)
+    return find_face_cells(
+        x, interface.slave.faces, interface.master.faces, *edges_of(interface, x), (tree.order, tree.boxes)
+    )
 
 
 def everywhere(count: int) -> Tree:

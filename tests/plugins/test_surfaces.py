@@ -13,8 +13,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.oracle import uniform_surface_weights
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases
-from contactverif_surfaces.cell_points import GAUSS
-from contactverif_surfaces.plane_shapes import evaluate_shapes
+from contactverif_surfaces.cell_points import GAUSS, evaluate_shapes
 
 NAMES = contactverif_surfaces.__all__
 PASSING = [name for name in NAMES if not name.startswith("nts")]
