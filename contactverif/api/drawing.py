@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Property
 from contactverif.contract.subject import Subject
 from contactverif.run.judge import forces_to_draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+SURFACES = ".vtu"  # A case in space, for ParaView.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,3 +64,16 @@ def make_drawing(subject: Subject, question: Property, outcome: Outcome) -> Draw
     forces = forces_to_draw(question, outcome.case, subject)
     of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
     return Drawing(make_case_figure(outcome.case, title=title, forces=of_formulation, exact=exact))
+
+
+def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: Path, argument: str) -> None:
+    """Draw the case of an outcome to a picture, or write a case in space for ParaView."""
+    try:
+        if path.suffix.lower() == SURFACES:
+            from contactverif_reports.draw.surface_vtu import write_surfaces
+
+            write_surfaces(outcome.case, forces_to_draw(question, outcome.case, subject), path)
+            return
+        make_drawing(subject, question, outcome).write(path)
+    except MisuseError as error:
+        raise MisuseError(argument, error.found, error.needed) from None

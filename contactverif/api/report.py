@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactverif.api.run_files import RUN_FILES, either, run_writers
+from contactverif.api.run_files import RUN_FILES, either, write_run
 from contactverif.contract.counterexample import Counterexample, failing_examples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Property, Verdict
@@ -184,7 +184,7 @@ class Report(Run):
         if suffix not in RUN_FILES:
             raise MisuseError("path", repr(os.fspath(path)), f"a name that ends in {either(RUN_FILES)}")
         check_writable(target, "path", f"FILE{suffix}")
-        run_writers(self, None)[suffix](target)
+        write_run(self, target)
 
     def __repr__(self) -> str:
         from contactverif_reports.html.report_page import headline

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,31 +16,26 @@ JUNIT = ".xml"
 RUN_FILES = (REPORT, PAGE, JSON, JUNIT)
 
 
-def run_writers(run: Run, report: Path | None) -> dict[str, Callable[[Path], None]]:
-    """Return the function that writes a run to a path for each suffix. `report` is the report that a page names."""
+def write_run(run: Run, path: Path, report: Path | None = None) -> None:
+    """Write a run to a file, whose suffix says what is written. `report` is the report that a page names."""
+    match path.suffix.lower():
+        case ".nc":
+            from contactverif_reports.netcdf.write import write
 
-    def write_report(path: Path) -> None:
-        from contactverif_reports.netcdf.write import write
+            write(run, path)
+        case ".html":
+            from contactverif_reports.html.pages import write_page
+            from contactverif_reports.html.report_page import report_page
 
-        write(run, path)
+            write_page(path, report_page(run, report or Path("FILE.nc")), "--out")
+        case ".json":
+            from contactverif_reports.exchange.run_document import write_json
 
-    def write_html(path: Path) -> None:
-        from contactverif_reports.html.pages import write_page
-        from contactverif_reports.html.report_page import report_page
+            write_json(run, path)
+        case _:
+            from contactverif_reports.exchange.junit import write_junit
 
-        write_page(path, report_page(run, report or Path("FILE.nc")), "--out")
-
-    def write_document(path: Path) -> None:
-        from contactverif_reports.exchange.run_document import write_json
-
-        write_json(run, path)
-
-    def write_suites(path: Path) -> None:
-        from contactverif_reports.exchange.junit import write_junit
-
-        write_junit(run, path)
-
-    return {REPORT: write_report, PAGE: write_html, JSON: write_document, JUNIT: write_suites}
+            write_junit(run, path)
 
 
 def either(suffixes: Sequence[str]) -> str:

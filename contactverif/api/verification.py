@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from typing import Any
 
-from contactverif.api.plugin_places import Isolation, limits_of, settle_place
 from contactverif.api.report import Report
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError
@@ -24,6 +23,7 @@ from contactverif.isolation.limits import Limits
 from contactverif.plugins.registry import load_formulation, load_properties
 from contactverif.run.profiles import Profile, Shrink
 from contactverif.run.run import run
+from contactverif.run.run_options import Isolation, RunOptions
 from contactverif.run.scheduler import Progress
 
 _FORMULATIONS = "a name, a class or factory make(*, penalty), an instance with `residual`, a Subject, or a list"
@@ -165,9 +165,8 @@ def _limits(isolation: str | None) -> Limits | None:
     """Return the limits of the processes of registered names; None if they run in this process."""
     if isolation is not None and isolation not in [*Isolation]:
         raise MisuseError("isolation", repr(isolation), "box, landlock, process, inline or None")
-    place, opened = settle_place(None if isolation is None else Isolation(isolation))
-    defaults = Limits()
-    return limits_of(place, opened, seconds=defaults.seconds, memory=defaults.memory)
+    wanted = None if isolation is None else Isolation(isolation)
+    return RunOptions(isolation=wanted).limits(argument="isolation")
 
 
 def _load_subject(item: Any, limits: Limits | None) -> Subject | NotLoaded:

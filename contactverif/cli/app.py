@@ -1,8 +1,4 @@
-"""The command line: it registers the commands and turns every error of a user into one line.
-
-A command is one file. Rule: this file and those of the commands import nothing at the top that takes long, since every
-`--help` imports them all; a command imports what it needs when it runs.
-"""
+"""The command line: it registers the commands and turns every error of a user into one line."""
 
 from __future__ import annotations
 
@@ -16,22 +12,8 @@ from typing import Annotated
 
 import typer
 
-from contactverif.cli.audit_command import audit
-from contactverif.cli.bench_command import bench
-from contactverif.cli.campaign_command import campaign
-from contactverif.cli.compare_command import compare
-from contactverif.cli.draw_command import draw
-from contactverif.cli.explain_command import explain
-from contactverif.cli.list_command import list_installed
-from contactverif.cli.merge_command import merge
-from contactverif.cli.new_command import new
-from contactverif.cli.paper_command import paper
-from contactverif.cli.replay_command import replay
-from contactverif.cli.report_command import report
-from contactverif.cli.scenes_command import scenes
-from contactverif.cli.shared_options import spell_out_groups
-from contactverif.cli.stability_command import stability
-from contactverif.cli.verify_command import verify
+from contactverif.cli import commands
+from contactverif.cli.options import spell_out
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.foreign_text import name_line, one_line
 from contactverif.isolation.confine import ONE_THREAD
@@ -42,25 +24,25 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-COMMANDS: dict[str, Callable[..., None]] = {
-    "list": list_installed,
-    "verify": verify,
-    "explain": explain,
-    "campaign": campaign,
-    "merge": merge,
-    "compare": compare,
-    "report": report,
-    "replay": replay,
-    "audit": audit,
-    "draw": draw,
-    "stability": stability,
-    "bench": bench,
-    "paper": paper,
-    "scenes": scenes,
-    "new": new,
+COMMANDS: dict[str, Callable[..., int | None]] = {
+    "list": commands.list_installed,
+    "verify": commands.verify,
+    "explain": commands.explain,
+    "campaign": commands.campaign,
+    "merge": commands.merge,
+    "compare": commands.compare,
+    "report": commands.report,
+    "replay": commands.replay,
+    "audit": commands.audit,
+    "draw": commands.draw,
+    "stability": commands.stability,
+    "bench": commands.bench,
+    "paper": commands.paper,
+    "scenes": commands.scenes,
+    "new": commands.new,
 }
 for name, command in COMMANDS.items():
-    app.command(name)(spell_out_groups(command))
+    app.command(name)(spell_out(command))
 
 # The names that deeper modules have for an option.
 _OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {

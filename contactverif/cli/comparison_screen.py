@@ -13,12 +13,13 @@ from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
 from contactverif.cli.comparison_tables import number
-from contactverif.cli.console import PLAIN_STYLE, STYLES, fold, line
+from contactverif.cli.console import fold, line
 from contactverif.cli.run_tables import headline
 from contactverif.contract.result import Result
 from contactverif.run.ranking import by_rank
 from contactverif.studies.comparison_study import Study
 from contactverif_reports.compare.cells import Cell
+from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
 _MOST_ROWS = 7  # The properties with another verdict, and those with the same one, that have a line each.
 _ERROR = 7  # Columns of an error over its tolerance.

@@ -1,7 +1,7 @@
 """The terminal: how wide it is, how text is printed, how a table looks, and which colour a result has.
 
-Whatever a command prints goes through `show`, `show_as_it_is` or `say`, which let no control
-character of a plugin or a file reach the terminal.
+Whatever a command prints goes through `show`, `show_verbatim` or `echo`, which let no control character of a plugin or
+a file reach the terminal.
 """
 
 from __future__ import annotations
@@ -22,20 +22,11 @@ from rich.text import Text
 
 from contactverif.contract.foreign_text import printable
 from contactverif.contract.result import Result
+from contactverif.isolation.host import end_all
+from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
-STYLES = {  # Red only where the run fails by it. What a formulation states about itself is no news.
-    Result.PASS: "green",
-    Result.FAIL: "magenta",
-    Result.BROKEN_PROMISE: "bold red",
-    Result.CRASHED: "red",
-    Result.WRONG_TRAITS: "red",
-    Result.NOT_LOADED: "red",
-    Result.NOT_JUDGED: "yellow",
-    Result.OMITTED: "yellow",
-    Result.UNDECIDED: "yellow",
-}
 _Item = TypeVar("_Item")
-PLAIN_STYLE = "dim"  # The style of the other results.
+_LINES_OF_A_PLUGIN = 5
 _PIPE_WIDTH = 140  # The number of columns where no terminal says how many there are.
 
 
@@ -57,15 +48,22 @@ def show(content: RenderableType) -> None:
     console.print(_clean(console, content))
 
 
-def show_as_it_is(text: Text) -> None:
+def show_verbatim(text: Text) -> None:
     """Print without folding a line: a drawing, or a command that is to be copied."""
     console = QuietConsole()
     console.print(_clean(console, text, soft_wrap=True), soft_wrap=True)
 
 
-def say(words: str, *, to_stderr: bool = False) -> None:
+def echo(words: str, *, to_stderr: bool = False) -> None:
     """Print words as they are, without folding a line."""
     typer.echo(printable(words), err=to_stderr)
+
+
+def print_plugin_output() -> None:
+    """End the processes of the plugins, and show the last lines that each of them printed."""
+    for name, printed in end_all().items():
+        lines = printed.decode(errors="replace").splitlines()[-_LINES_OF_A_PLUGIN:]
+        show_verbatim(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
 
 
 def _clean(console: Console, content: RenderableType, *, soft_wrap: bool = False) -> Segments:

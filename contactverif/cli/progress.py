@@ -20,11 +20,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TaskID,
 from rich.table import Column
 from rich.text import Text
 
-from contactverif.cli.console import PLAIN_STYLE, STYLES, QuietConsole
+from contactverif.cli.console import QuietConsole
 from contactverif.contract.foreign_text import one_line
 from contactverif.contract.result import Row
 from contactverif.run import scheduler
 from contactverif.run.judge import SLOW_CALL
+from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
 _BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.

@@ -13,8 +13,8 @@ from rich.text import Text
 
 from contactverif.api.run_files import PAGE
 from contactverif.cli.comparison_tables import MOST_MESHES, NAME_WIDTH, number
-from contactverif.cli.console import add_groups, indent_below, plain_table, show, show_as_it_is
-from contactverif.cli.output_files import OutputFiles
+from contactverif.cli.console import add_groups, indent_below, plain_table, show, show_verbatim
+from contactverif.cli.options import OutputFiles
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error
@@ -47,7 +47,7 @@ def compare_reports(paths: Sequence[Path], globs: Sequence[str], files: OutputFi
         write_page(files.paths[PAGE], changes_page(changes, meshes), "--out")
     show(ChangesTable(changes))
     for example in list(meshes.values())[:MOST_MESHES]:
-        show_as_it_is(_stored_mesh(example, changes.new.path))
+        show_verbatim(_stored_mesh(example, changes.new.path))
     files.announce()
     show(regressions_text(changes))
     return not changes.regressions

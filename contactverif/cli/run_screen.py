@@ -6,19 +6,22 @@ at last the families of what passes. `run_tables` has every row.
 
 from __future__ import annotations
 
+import shlex
+import textwrap
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.cli.console import STYLES, fold, line
-from contactverif.cli.counterexample_output import counterexample_text
-from contactverif.cli.run_tables import finding_of, headline, remark_of
-from contactverif.contract.counterexample import counterexamples
-from contactverif.contract.property import Verdict
+from contactverif.cli.console import echo, fold, indent_below, line, show, show_verbatim
+from contactverif.cli.options import Screen
+from contactverif.cli.run_tables import RunTable, finding_of, headline, remark_of
+from contactverif.contract.counterexample import Counterexample, counterexamples, failing_examples
+from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import (
     BROKEN_BY_FAILING,
     NOT_HERE,
@@ -30,6 +33,8 @@ from contactverif.contract.result import (
     Run,
 )
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
+from contactverif_reports.draw import as_text
+from contactverif_reports.tables import STYLES
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
 _MOST_WRONG = 8  # The same of those that are wrong beside the most telling one.
@@ -52,6 +57,16 @@ _COUNTED = {
     Result.NOT_APPLICABLE: "do not apply",
     Result.NOT_PROVIDED: "need a missing part",
 }
+
+
+def show_run(result: Run, screen: Screen, report: Path | None) -> None:
+    """Show a run as the user wants it: its few telling lines, or every row, and counterexamples."""
+    show(RunTable(result) if screen.verbose else RunScreen(result, report))
+    if screen.verbose or screen.show == "all":
+        for example in failing_examples(result):
+            show_verbatim(counterexample_text(example, report))
+    if advice := how_to_explain(result, report):
+        echo(advice)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,3 +218,77 @@ def _fold_families(rows: Sequence[Row]) -> Iterator[str]:
         families.setdefault(row.info.family, []).append(row.property_id)
     for family, ids in families.items():
         yield from [f"{len(ids)} of {family}"] if len(ids) > _MOST_IDS else ids
+
+
+def counterexample_text(example: Counterexample, report: Path | None, width: int = 10**4) -> Text:
+    """Return numbers and drawing of a counterexample, and the line that replays it if there is a report.
+
+    Words are folded to a width. A drawing and a command are not.
+    """
+    row, outcome = example.row, example.outcome
+    words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
+    title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}"
+    text = indent_below(
+        "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
+        *chain.from_iterable(words),
+        *([f"promised by {row.promised_by}"] if row.promised_by else []),
+        *as_text(outcome.case).splitlines(),
+        *([] if report is None else [example.replay_command(str(report))]),
+    )
+    text.no_wrap, text.overflow = True, "ignore"
+    return text
+
+
+def how_to_keep(run: Run) -> str:
+    """Say how the cases that fail are stored, so that they can be replayed; empty where there is none."""
+    seed = run.provenance.get("seed")
+    return f"to keep these cases: the same command with --seed {seed} --out FILE.nc" if failing_examples(run) else ""
+
+
+def how_to_explain(run: Run, report: Path | None) -> str:
+    """Return the line that explains the first row of the screen that fails, with its numbers if a report has them."""
+    failing = by_rank(row for row in run.rows if row.verdict in (Verdict.FAIL, Verdict.CRASHED))
+    news = [row for row in failing if row.result is Result.FAIL]
+    row = first_failure(failing) or next(iter([*news, *failing]), None)
+    if row is None:
+        return ""
+    stored = report is not None and any(example.row is row for example in failing_examples(run))
+    option = f" --report {shlex.quote(str(report))}" if stored else ""
+    return f"to have a row explained: contactverif explain {row.property_id}{option}"
+
+
+def ending_lines(outcome: Outcome) -> list[str]:
+    """Return how Newton's method ended where a property solved, with advice where it did not converge."""
+    details: Mapping[str, float] = outcome.measurement.details if outcome.measurement is not None else {}
+    lines = []
+    for name, value in details.items():
+        kind, _, solution = name.partition(", ")
+        iterations = details.get(name.replace("end", "iterations", 1))
+        if kind == "end" and iterations is not None:
+            from contactverif.mechanics.trace import End  # It brings scipy, and is needed only where a property solved.
+
+            end = End(int(value))
+            words = f"{end.label} after {iterations:g} iteration{'s' * (iterations != 1)}"
+            label = f" ({solution})" if solution else ""
+            lines.append(f"Newton's method{label}: {words}{'' if end is End.CONVERGED else f': {end.advice}'}")
+    return lines
+
+
+def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
+    """Return the numbers that fail, or all, beside their tolerances, and how Newton ended; else the reason."""
+    measurement = outcome.measurement
+    if measurement is None:
+        return [outcome.reason]
+    lines = [f"✗ {measurement.broken}"] if measurement.broken else []
+    lines += [str(measurement.finding)] if measurement.finding is not None else []
+    numbers = checked_numbers(info, measurement)
+    wrong = [number for number in numbers if number.ratio > 1]
+    for number in wrong or ([] if measurement.broken else numbers):
+        mark, quantity = "✗" if wrong else "✓", number.quantity
+        lines.append(f"{mark} {quantity.name}: {number.value:.3g}, must be {quantity.sense} {number.tolerance:.3g}")
+    others = []
+    for name, value in measurement.details.items():
+        kind, _, solution = name.partition(", ")
+        if kind not in ("end", "iterations"):
+            others.append(f"{kind}{f' ({solution})' if solution else ''}: {value:.3g}")
+    return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])

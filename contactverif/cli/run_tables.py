@@ -1,4 +1,4 @@
-"""The table of a run in the terminal, and the line that sums it up.
+"""All rows of a run in the terminal with the coverage of its cases, and the line that sums it up.
 
 A table reads a `Run`, from memory or from a file, and needs no more than 80 columns. Every word in it that does not
 explain itself is explained in the legend below it.
@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.cli.console import PLAIN_STYLE, STYLES, fold, line
-from contactverif.cli.coverage_tables import coverage_text
-from contactverif.contract.case_counts import whole_percent
+from contactverif.cli.console import fold, line
+from contactverif.contract.case_counts import CaseCounts, add_by_kind, percent, total, whole_percent
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import BROKEN_BY_FAILING, OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.result import BROKEN_BY_FAILING, OPPOSITE_SIGN, Coverage, Result, Row, Run, coverage_of
 from contactverif.run.ranking import by_rank
+from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 _COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
@@ -51,6 +51,10 @@ _COUNTED = {  # {result: (words for one, words for several)} in the last line
     Result.NOT_LOADED: ("plugin not loaded", "plugins not loaded"),
 }
 _MOST_SUMMED_UP = 3  # Rows of one result that the last line names.
+_MOST_REASONS = 3  # The most frequent reasons of undecided cases that are shown.
+_KIND_COLUMNS = ("planned", "judged", "failed", "undecided", "idle")
+_NO_KIND = "other"  # The line of the cases that name no kind.
+_LONGEST_KIND = 35  # A longer name is cut, or the table would not fit into 80 columns.
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +62,7 @@ class RunTable:
     """A line for each formulation and property: promise, result, and how close it came to the tolerance.
 
     A remark stands behind its line if there is room, else below it. The name of the closest number is left out if there
-    is no room. Below the table stands what the cases were worth.
+    is no room. Below the table stands the coverage.
     """
 
     run: Run
@@ -100,7 +104,8 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequ
     """Sum up rows and plugins that did not load, behind sentences about whole formulations."""
     sentences = list(accusations)
     for result, (singular, plural) in _COUNTED.items():
-        names = [_name(row) for row in by_rank(rows) if row.result is result and row.unexpected]
+        named_rows = [row for row in by_rank(rows) if row.result is result and row.unexpected]
+        names = [f"{row.formulation} {row.property_id}{_broken_otherwise(row)}" for row in named_rows]
         names += not_loaded if result is Result.NOT_LOADED else []
         if names:
             named = f": {_list(names, _MOST_SUMMED_UP)}" if result is not Result.OMITTED else ""
@@ -108,11 +113,10 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], accusations: Sequ
     return Text(" ".join(sentences) or "Nothing was checked.", style="red")
 
 
-def _name(row: Row) -> str:
-    reason = (
-        f" ({row.unexpected})" if row.unexpected != BROKEN_BY_FAILING and row.result is Result.BROKEN_PROMISE else ""
-    )
-    return f"{row.formulation} {row.property_id}{reason}"
+def _broken_otherwise(row: Row) -> str:
+    """Return in parentheses why a promise is broken, where it is not by failing."""
+    broken = row.result is Result.BROKEN_PROMISE and row.unexpected != BROKEN_BY_FAILING
+    return f" ({row.unexpected})" if broken else ""
 
 
 def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:
@@ -215,3 +219,82 @@ def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:
         folded = textwrap.wrap(words, max(max_width - len(indent), 20))
         yield line(f"  {name:{width}}  " + f"\n{indent}".join(folded), "dim")
     yield Text("")
+
+
+def coverage_text(run: Run, width: int) -> Iterator[Text]:
+    """Yield the shares of undecided and idle cases, then the cases of each kind; properties of equal kinds together."""
+    everything = coverage_of(run)
+    if not everything:
+        return
+    yield from _shares(everything, width)
+    with_kinds: dict[tuple[str, ...], list[Coverage]] = {}
+    for coverage in everything:
+        if coverage.kinds:
+            with_kinds.setdefault(tuple(coverage.kinds), []).append(coverage)
+    for group in with_kinds.values():
+        yield from _kinds(group, width)
+
+
+def _shares(everything: Sequence[Coverage], width: int) -> Iterator[Text]:
+    together = _together(everything)
+    incomplete = [each for each in everything if each.counts.undecided or each.counts.idle]
+    if not incomplete:
+        yield fold(f"No case was undecided, and none was idle (nothing in contact){together}.", width, "dim", indent=0)
+        yield Text("")
+        return
+    title = f"Undecided cases, and idle ones (nothing in contact){together}"
+    yield fold(title, width, "bold", indent=0)
+    size = max(len("property"), *(len(each.info.id) for each in incomplete))
+    yield line(f"  {'property':{size}}  {'cases':>7}  {'undecided':>9}  {'idle':>7}", style="bold")
+    for each in incomplete:
+        counts = each.counts
+        shares = f"{percent(counts.undecided_share):>9}  {percent(counts.idle_share):>7}"
+        yield line(f"  {each.info.id:{size}}  {counts.cases:7}  {shares}")
+        reasons = [*each.reasons.items()]
+        for reason, number in reasons[:_MOST_REASONS]:
+            yield fold(f"{number} undecided: {reason}", width, "dim")
+        if others := reasons[_MOST_REASONS:]:
+            more = sum(number for _, number in others)
+            yield fold(f"{more} undecided for {len(others)} other reasons", width, "dim")
+    if len(incomplete) < len(everything):
+        words = "In all other properties every case was decided, and something was in contact."
+        yield fold(words, width, "dim", indent=2)
+    yield Text("")
+
+
+def _together(group: Sequence[Coverage]) -> str:
+    n_formulations = max(each.n_formulations for each in group)
+    return f", {n_formulations} formulations together" if n_formulations > 1 else ""
+
+
+def _kinds(group: Sequence[Coverage], width: int) -> Iterator[Text]:
+    """Yield how many cases of each kind were judged, in all properties of a group together."""
+    kinds = add_by_kind(each.kinds for each in group)
+    properties = ", ".join(each.info.id for each in group)
+    yield fold(f"Cases of each kind in {properties}{_together(group)}", width, "bold", indent=0)
+    size = min(max(len("kind"), *map(len, kinds)), _LONGEST_KIND)
+    yield line(f"  {'kind':{size}}  {_row(*_KIND_COLUMNS)}", style="bold")
+    for kind, counts in kinds.items():
+        style = "yellow" if counts.judged == counts.idle else ""  # Nothing of this kind was judged in contact.
+        yield line(f"  {(kind or _NO_KIND)[:size]:{size}}  {_counts(counts)}", style=style)
+    yield line(f"  {'all':{size}}  {_counts(total(kinds.values()))}", style="dim")
+    weak = [f"{each.info.id}: {text}" for each in group if (text := _weak_kinds(each))] if len(group) > 1 else []
+    if weak:
+        yield line("  Kinds of which a property could judge less than half:", style="yellow")
+    for text in weak:
+        yield fold(text, width, "dim")
+    yield Text("")
+
+
+def _weak_kinds(coverage: Coverage) -> str:
+    """Return the kinds of which less than half of the cases were judged, with the numbers."""
+    weak = {kind: counts for kind, counts in coverage.kinds.items() if counts.judged < counts.cases / 2}
+    return ", ".join(f"{kind or _NO_KIND} {counts.judged}/{counts.cases}" for kind, counts in weak.items())
+
+
+def _counts(counts: CaseCounts) -> str:
+    return _row(*map(str, (counts.cases, counts.judged, counts.failed, counts.undecided, counts.idle)))
+
+
+def _row(*cells: str) -> str:
+    return "  ".join(f"{cell:>{len(name)}}" for name, cell in zip(_KIND_COLUMNS, cells, strict=True)).rstrip()

@@ -6,17 +6,15 @@ import shlex
 from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 from rich.table import Table
 from rich.text import Text
 
 from contactverif.api.run_files import REPORT
-from contactverif.cli.isolation_options import IsolationOptions
-from contactverif.cli.output_files import MARKDOWN, PICTURES, OutputFiles
-from contactverif.cli.shared_options import EveryFormulation, FormulationNames, output_option
-from contactverif.cli.verify_command import select_names
+from contactverif.cli.options import MARKDOWN, PICTURES, OutputFiles, select_names
+from contactverif.run.run_options import RunOptions
 
 if TYPE_CHECKING:
     from contactverif.contract.result import Run
@@ -25,44 +23,14 @@ if TYPE_CHECKING:
 _MOST_IDS = 3  # Cases of a formulation whose command is printed.
 
 
-def stability(
-    *,
-    names: FormulationNames = None,
-    all_: EveryFormulation = False,
-    out: Annotated[
-        list[Path] | None,
-        output_option(
-            "Write the results: FILE.nc the numbers, FILE.svg or FILE.png the figure, FILE.md a page. Repeatable."
-        ),
-    ] = None,
-    isolation: IsolationOptions,
-) -> None:
-    """Draw error against condition number, to tell bad conditioning from bad rounding.
-
-    The states have gaps down to 1e-12, segments down to 1e-9, offsets up
-    to 1e9 and penalties up to 1e12 E/h. The error of a stable formulation
-    is at most 4 u × condition number, the line of the figure. The error of
-    one that rounds positions far from the origin is above that line. The
-    properties fail from 16 u × condition number on.
-
-    \bExit status
-      0  no promise is broken: what says that it is stable under
-         translations stays below 16 u × condition number
-      1  a promise is broken, a property could not be judged, or a plugin
-         does not load
-      2  the command line is wrong; one line says what is needed
-
-    \bExamples
-      contactverif stability vts-ppt mortar --out stability.svg
-      contactverif stability mine --out mine.nc --out mine.png
-      contactverif replay mine.nc --case mine.stability.sweep.offset-1e6-a
-    """
+def stability(options: RunOptions, out: Sequence[Path]) -> int:
+    """Run the study, write its files and show it; return the exit status."""
     from contactverif.cli.progress import Bar
     from contactverif.plugins.registry import load_formulation
     from contactverif.studies.stability_study import run_stability
 
-    limits = isolation.limits()
-    all_names = select_names(names or [], all_, limits)
+    limits = options.limits()
+    all_names = select_names(options)
     files = OutputFiles.check(out, (REPORT, *PICTURES, MARKDOWN))
     subjects = [load_formulation(name, limits) for name in all_names]
     with Bar() as bar:
@@ -70,7 +38,7 @@ def stability(
         result = run_stability(subjects, progress=bar.show_progress, outputs=outputs)
     _write(result, files)
     _show(result, files)
-    raise typer.Exit(0 if result.promises_kept else 1)
+    return 0 if result.promises_kept else 1
 
 
 def _write(result: Run, files: OutputFiles) -> None:
@@ -81,7 +49,7 @@ def _write(result: Run, files: OutputFiles) -> None:
         from contactverif_reports.netcdf.write import write
 
         write(result, files.paths[REPORT], with_named_cases=True)
-    for picture in files.pictures():
+    for picture in (path for suffix, path in files.paths.items() if suffix in PICTURES):
         from contactverif_reports.draw.stability_figure import draw_stability  # importing matplotlib is slow
 
         draw_stability(sweep_panels(result), picture)
@@ -96,7 +64,7 @@ def _write(result: Run, files: OutputFiles) -> None:
 
 def _show(result: Run, files: OutputFiles) -> None:
     """Print the table, a sentence for each formulation with commands to replay its worst cases, and the files."""
-    from contactverif.cli.console import show, show_as_it_is
+    from contactverif.cli.console import show, show_verbatim
     from contactverif.cli.run_tables import summary
     from contactverif_reports.stability.stability_page import sentence_of
     from contactverif_reports.stability.sweep_points import sweep_panels
@@ -111,7 +79,7 @@ def _show(result: Run, files: OutputFiles) -> None:
         failing = [point for point in panel.above if point.fails]
         for point in failing[:_MOST_IDS] if REPORT in files.names else ():
             report = shlex.quote(str(files.names[REPORT]))
-            show_as_it_is(Text(f"    contactverif replay {report} --case {shlex.quote(point.case_id)}"))
+            show_verbatim(Text(f"    contactverif replay {report} --case {shlex.quote(point.case_id)}"))
     files.announce()
     show(summary(result))
 

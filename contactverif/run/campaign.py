@@ -6,11 +6,10 @@ The union of the stores of all shards is the store of a run, with which `merge` 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -152,16 +151,8 @@ def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:
     for name in (field for field in Plan.__struct_fields__ if field not in _OF_ONE_STORE):
         if getattr(a, name) != getattr(b, name):
             return name
-    both = [_without_place(plan.options) for plan in (a, b)]
-    for name in sorted({*both[0], *both[1]} - (set() if shard_too else {_SHARD})):
-        values = (msgspec.msgpack.encode(options.get(name)) for options in both)  # A file has lists for tuples.
+    for name in sorted({*a.options, *b.options} - {"isolation", *(() if shard_too else (_SHARD,))}):
+        values = (msgspec.msgpack.encode(plan.options.get(name)) for plan in (a, b))  # A file has lists for tuples.
         if len({*values}) > 1:
             return name
     return ""
-
-
-def _without_place(options: Mapping[str, Any]) -> dict[str, Any]:
-    isolation = options.get("isolation")
-    if not isinstance(isolation, Mapping):
-        return dict(options)
-    return {**options, "isolation": {name: value for name, value in isolation.items() if name != "isolation"}}

@@ -46,18 +46,9 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     profile: str = ""
     examples: int = 0
     seed: int = 0
+    place: str = ""  # The options that say where the run asks; empty if it asks on random interfaces and scenes.
     machine: dict[str, str] = {}  # What the last bits of a number depend on, beside the versions.
     format: int = FORMAT
-
-
-def place_words(options: Mapping[str, Any]) -> str:
-    """Return options {name: value} as they are typed, without those that are not there."""
-    words = []
-    for name, value in options.items():
-        option = f"--{name.replace('_', '-')}"
-        values = value if isinstance(value, list | tuple) else [value] if value else []
-        words += [option if entry is True else f"{option} {entry}" for entry in values]
-    return " ".join(words)
 
 
 def read_plan(folder: Path, argument: str) -> Plan:
@@ -274,9 +265,8 @@ class Store:
         """Return what a report should say of where its outcomes come from: code, place, and how many were stored."""
         digests = {name: digest for name, digest in self.plan.versions.items() if name.startswith(CODE)}
         facts = {name.replace(" ", "_"): digest for name, digest in digests.items()}
-        place = place_words(self.plan.options.get("place") or {})
         stored = f"{self.n_stored}, of which {self.n_rechecked} were judged again" if self.n_stored else ""
-        return facts | {name: words for name, words in (("place", place), (STORED, stored)) if words}
+        return facts | {name: words for name, words in (("place", self.plan.place), (STORED, stored)) if words}
 
     def close(self) -> None:
         """Close the file of this process, once it is on the disk."""

@@ -1,23 +1,27 @@
-"""The checks of a decorated test: each runs one property of one formulation and tells pytest the result."""
+"""The checks of a decorated test: each runs one property of one formulation, and tells pytest the result.
+
+A check that fails shows the promise, the numbers, a mesh that fails, and a command that repeats it.
+"""
 
 from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Mapping
+import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from contactverif.contract.property import Property, Verdict
-from contactverif.contract.result import NotLoaded, Row
+from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.result import OPPOSITE_SIGN, NotLoaded, Row
 from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import load_formulation, load_properties, subject_of
 from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.run import check_known, run
-from contactverif.testing.failure_text import explain
 from contactverif.testing.parametrize import CheckOptions
+from contactverif_reports.draw import as_text
 
 
 @dataclass(slots=True, repr=False)
@@ -55,7 +59,9 @@ class Check:
         row, opposite_sign = self.row, bool(result.opposite_signs)
         if row.unexpected or opposite_sign:
             diagnosis = result.diagnoses.get(row.formulation, "")
-            command = self._command()
+            node = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]  # "file::test[id] (call)"
+            options = [f"--contactverif-seed={self.seed}", f"--contactverif-examples={self.profile.examples}"]
+            command = shlex.join(["pytest", node, *options])
             raise AssertionError(explain(row, command=command, opposite_sign=opposite_sign, diagnosis=diagnosis))
         if row.verdict in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED):
             pytest.skip(row.reason)
@@ -64,42 +70,75 @@ class Check:
         if row.verdict is Verdict.FAIL and row.promise is None:
             pytest.xfail(f"fails; the formulation promises nothing here: {row.reason}")
 
-    def _command(self) -> str:
-        """Return the command that runs this check once more."""
-        node = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]  # "file::test[id] (call)"
-        options = [f"--contactverif-seed={self.seed}", f"--contactverif-examples={self.profile.examples}"]
-        return shlex.join(["pytest", node, *options])
-
 
 def make_checks(arguments: CheckOptions, options: Any, fresh_seed: int) -> list[Check]:
-    """Return the checks of a decorated test."""
+    """Return the checks of a decorated test; what is typed behind `pytest` counts more than the decorator."""
     questions = load_properties(arguments.properties)
     check_known(arguments.known, questions)
+    examples, seed = options.contactverif_examples, options.contactverif_seed
     profile = profile_named(options.contactverif_profile or arguments.profile or "dev").resolve(
-        examples=_first(options.contactverif_examples, arguments.examples),
-        seed=_first(options.contactverif_seed, arguments.seed),
+        examples=arguments.examples if examples is None else examples,
+        seed=arguments.seed if seed is None else seed,
         fresh=fresh_seed,
     )
+    subjects = [
+        load_formulation(item)
+        if isinstance(item, str)
+        else subject_of(getattr(item, "__name__", type(item).__name__), item)
+        for item in arguments.formulations
+    ]
+    known = arguments.known
     return [
-        Check(subject, question, profile, _known_of(question, arguments.known))
-        for subject in map(_load_subject, arguments.formulations)
+        Check(subject, question, profile, {id_: known[id_] for id_ in (_id(question),) if id_ in known})
+        for subject in subjects
         for question in questions
     ]
-
-
-def _known_of(question: Property | NotLoaded, known: Mapping[str, str]) -> dict[str, str]:
-    return {property_id: reason for property_id, reason in known.items() if property_id == _id(question)}
-
-
-def _load_subject(formulation: str | Callable[..., Any]) -> Subject | NotLoaded:
-    if isinstance(formulation, str):
-        return load_formulation(formulation)
-    return subject_of(getattr(formulation, "__name__", type(formulation).__name__), formulation)
 
 
 def _id(question: Property | NotLoaded) -> str:
     return question.id if isinstance(question, Property) else question.formulation
 
 
-def _first(*values: int | None) -> int | None:
-    return next((value for value in values if value is not None), None)
+def explain(row: Row, *, command: str, opposite_sign: bool = False, diagnosis: str = "") -> str:
+    """Return why a row makes a run fail; that the forces have the opposite sign is said first, then a diagnosis."""
+    question = row.info
+    lines = [f"{row.formulation}: {OPPOSITE_SIGN}"] if opposite_sign else []
+    lines += [f"{row.formulation}, {question.id}: {row.unexpected}"] if row.unexpected else []
+    lines += [f"  Diagnosis: {diagnosis}"] if diagnosis else []
+    lines.append(f"  The property: {question.summary}")
+    if row.planned and row.verdict is not Verdict.NOT_JUDGED:  # Its reason says the numbers.
+        lines.append(f"  {row.judged} of {row.planned} cases could be judged.")
+    outcome = row.shrunk or row.first or row.witness
+    if row.reason:
+        lines.append(f"  The {'reason' if outcome is row.witness else 'worst case'}: {row.reason}")
+    if row.suspicion:
+        lines.append(f"  {row.suspicion}")
+    if outcome is not None:
+        lines += _example(row, outcome)
+    lines.append(f"  To run it again: {command}")
+    return "\n".join(lines)
+
+
+def _example(row: Row, outcome: Outcome) -> list[str]:
+    """Return the numbers and the drawing of a case."""
+    name, role = outcome.case.name, "witness" if outcome is row.witness else "case"
+    unnamed = "smallest case that fails" if row.shrunk else "first case that clearly fails, not shrunk"
+    lines = [f"  The {role} {name}: {outcome.verdict}" if name else f"  The {unnamed}:"]
+    if outcome.measurement is None:
+        lines.append(f"    {outcome.reason}")
+    return [*lines, *_numbers(row.info, outcome), textwrap.indent(as_text(outcome.case), "    ")]
+
+
+def _numbers(question: PropertyInfo, outcome: Outcome) -> list[str]:
+    """Return each measured number against its tolerance, with the formula of the tolerance and its reason."""
+    measurement = outcome.measurement
+    if measurement is None:
+        return []
+    lines = [f"    {measurement.broken}"] if measurement.broken else []
+    for number in checked_numbers(question, measurement):
+        mark, quantity = "✗" if number.ratio > 1 else "✓", number.quantity
+        lines.append(f"    {mark} {quantity.name}: {number.value:.6g}; needed: {quantity.sense} {number.tolerance:.3g}")
+        lines.append(f"      tolerance: {quantity.tolerance} ({quantity.reason})")
+    if measurement.finding is not None:
+        lines.append(f"    {measurement.finding}")
+    return lines

@@ -78,7 +78,7 @@ def test_the_exit_status_of_a_broken_promise_is_that_of_verify(
     """The harness is told that `nts` promises what it cannot keep."""
     question = next(iter(load_properties(["patch.flat.single"])))
     monkeypatch.setattr(
-        "contactverif.plugins.registry.load_properties",
+        "contactverif.cli.verify.load_properties",
         lambda globs, **others: [replace(question, promise=lambda traits: True)],
     )
     assert isinstance(question, Property)

@@ -12,7 +12,6 @@ from studies.bench_results import make_cells, make_results
 from subjects import change_verbs, load_subject
 
 from contactverif.contract.subject import Subject
-from contactverif.plugins import registry
 from contactverif.studies.bench import cell_runs, meter
 from contactverif_reports.bench.changes import changes
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
@@ -133,7 +132,9 @@ def test_one_that_sleeps_is_found_by_seconds_and_a_needless_residual_without_a_c
     words: str,
 ) -> None:
     seconds, needless = {"vts-ppt": 1e-3, "nts-ar": 1e-3}, set[str]()
-    monkeypatch.setattr(registry, "load_formulation", lambda name, limits: make_busy(name, counter, seconds, needless))
+    monkeypatch.setattr(
+        "contactverif.cli.bench.load_formulation", lambda name, limits: make_busy(name, counter, seconds, needless)
+    )
     assert ask(*QUICK, "--processes", "1", "--out", tmp_path / "old.nc").status == 0
     seconds["vts-ppt"] *= factor
     needless |= {"vts-ppt"} if is_needless else set()

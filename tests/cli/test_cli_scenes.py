@@ -13,8 +13,8 @@ from handmade_run import run_with
 from subjects import Changed, load_subject
 
 from contactverif import End, Subject, named_case
-from contactverif.cli import scene_drawing
-from contactverif.cli.gallery import MEANINGS
+from contactverif.cli import scenes
+from contactverif.cli.scenes import MEANINGS
 from contactverif.contract.result import NotLoaded
 from contactverif.problems.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.run import judge as judging
@@ -170,12 +170,12 @@ def test_draw_writes_for_paraview(ask: Ask, tmp_path: Path) -> None:
 def test_a_formulation_that_cannot_be_asked_is_a_line(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = scene_drawing.load_formulation
+    real = scenes.load_formulation
 
     def load(name: str, limits: Any) -> Any:
         return NotLoaded(name, "no licence") if name == "nts" else real(name, limits)
 
-    monkeypatch.setattr(scene_drawing, "load_formulation", load)
+    monkeypatch.setattr(scenes, "load_formulation", load)
     answer = ask("draw", "--scene", "c", "-f", "nts", "-f", "vts-ppt", "--out", tmp_path / "c.png")
     assert (answer.status, answer.err) == (1, "")
     assert "\nnts: not loaded: no licence\n" in answer.out
@@ -193,7 +193,7 @@ def test_draw_says_what_to_try_where_newtons_method_diverges(
     plugin = load_subject("vts-ppt").with_penalty(1e4).plugin
     plugin = Changed(plugin, tangent=lambda *state: -1e4 * np.eye(state[-1].size))
     diverging = Subject("mine", lambda *, penalty: plugin)
-    monkeypatch.setattr(scene_drawing, "load_formulation", lambda name, limits: diverging)
+    monkeypatch.setattr(scenes, "load_formulation", lambda name, limits: diverging)
     answer = ask("draw", "--scene", "c", "-f", "mine", "--out", tmp_path / "c.svg", columns=80)
     assert answer.status == 0
     assert "diverged" in answer.out

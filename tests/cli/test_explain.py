@@ -9,13 +9,12 @@ from rich.cells import cell_len
 from subjects import load_property
 
 from contactverif.cli.console import QuietConsole
+from contactverif.cli.explain import TerminalMarkdown
 from contactverif.cli.run_tables import _COLUMNS
-from contactverif.cli.terminal_markdown import TerminalMarkdown
 from contactverif.contract.result import Result
 from contactverif.contract.traits import Traits
 from contactverif.explanations.known_failures import planted_mistakes, smallest_mesh, stated_failures
 from contactverif.explanations.terms import symbol_meanings, term_text, term_texts
-from contactverif.plugins import registry
 from contactverif.plugins.registry import load_formulations, property_ids
 
 COLUMNS, OPTIONS = 80, ("--seed", "1", "--examples", "3")
@@ -27,7 +26,7 @@ WORDS = ("promise", "witness", "kink", "undecided", "idle", "locking", "patch te
 
 @pytest.fixture(autouse=True)
 def load_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "load_formulations", lambda limits: INSTALLED)
+    monkeypatch.setattr("contactverif.cli.explain.load_formulations", lambda limits: INSTALLED)
 
 
 def words(text: str) -> list[str]:

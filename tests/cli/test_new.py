@@ -14,7 +14,7 @@ import pytest
 import yaml
 from asking import Ask, check_mistake
 
-from contactverif.cli import new_project
+from contactverif.cli import new as new_project
 
 Make = Callable[..., Path]
 FREE = "needed a name that is free"

@@ -58,12 +58,11 @@ if pathlib.Path(tempfile.gettempdir(), "kernels", "forged").exists():
 }
 PROGRAM = """
 import sys
-from contactverif.api.plugin_places import Isolation
-from contactverif.cli.isolation_options import IsolationOptions
 from contactverif.isolation.host import end_all
 from contactverif.plugins.registry import load_formulations, standalone_names
+from contactverif.run.run_options import Isolation, RunOptions
 
-limits = IsolationOptions(Isolation(sys.argv[1])).limits()
+limits = RunOptions(isolation=Isolation(sys.argv[1])).limits()
 for item in load_formulations(limits):
     print(getattr(item, "name", None) or f"{item.formulation}: {item.reason}")
 print(*standalone_names(limits))

@@ -12,14 +12,14 @@ from handmade import Handmade, case, over_a_node, subject
 from subjects import judge_as, load_subject
 
 from contactverif import Case, Interface, Promises, Subject, Traits, Verdict, judge_case
-from contactverif.cli.counterexample_output import counterexample_text
+from contactverif.cli.run_screen import counterexample_text
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import judge
 from contactverif.problems.long_states import long_states
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import smooth_cases
-from contactverif.testing.failure_text import explain
+from contactverif.testing.checks import explain
 from contactverif_properties.states import freeze_state, random_directions
 from contactverif_properties.tangent import (
     BLOCK,

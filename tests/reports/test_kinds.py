@@ -6,8 +6,8 @@ import pytest
 import xarray as xr
 from handmade_report import run_with_kinds
 
-from contactverif.cli.counterexample_output import counterexample_text
-from contactverif.cli.coverage_tables import coverage_text
+from contactverif.cli.run_screen import counterexample_text
+from contactverif.cli.run_tables import coverage_text
 from contactverif.contract.case_counts import CaseCounts, percent
 from contactverif.contract.counterexample import failing_examples
 from contactverif.contract.result import coverage_of

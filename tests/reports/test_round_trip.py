@@ -15,8 +15,8 @@ from rich.console import Console, RenderableType
 
 from contactverif import Finding, Measurement, MisuseError, Outcome, Verdict, load_formulation, load_properties
 from contactverif.cli.comparison_tables import errors_table, iterations_table, last_line, results_table
-from contactverif.cli.counterexample_output import counterexample_text, how_to_keep
 from contactverif.cli.report_comparison import ChangesTable, regressions_text
+from contactverif.cli.run_screen import counterexample_text, how_to_keep
 from contactverif.cli.run_tables import RunTable, summary
 from contactverif.contract.counterexample import counterexamples, failing_examples
 from contactverif.contract.result import NotLoaded, Result, Row, Run

@@ -15,7 +15,7 @@ from contactverif.contract.property import Property, PropertyInfo, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 from contactverif.contract.traits import Traits
 from contactverif.run.run import run
-from contactverif.testing.failure_text import explain
+from contactverif.testing.checks import explain
 from contactverif_mortar import mortar_lm
 from contactverif_nts import nts, nts_ar
 

@@ -1,4 +1,4 @@
-"""The files of a new plugin project, from the templates beside this file.
+"""The work of `new`: the files of a plugin project, from the templates beside this file.
 
 Rule: a project appears whole or not at all, under a name that nothing else has.
 """
@@ -11,12 +11,14 @@ import keyword
 import os
 import re
 import tempfile
+from collections.abc import Mapping
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from importlib.resources import files
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from contactverif.cli.console import echo
 from contactverif.contract.errors import MisuseError
 from contactverif.plugins.registry import formulation_names
 
@@ -44,7 +46,21 @@ _LIBRARY_TEMPLATES = {
     ".gitignore": "gitignore",
 }
 _HEADER = "contactverif.h"
+_FLAGS = {"jax": "--jax", "3d": "--3d", "c": "--c", "f90": "--fortran"}
 _LOADERS = {"c": "c", "f90": "uel"}  # The formulations that load a library, by its language.
+
+
+def new(name: str, kinds: Mapping[str, bool]) -> None:
+    """Make a project of the kind that is wanted, if one is, and say what comes next."""
+    wanted = [kind for kind, typed in kinds.items() if typed]
+    if len(wanted) > 1:
+        raise MisuseError("NAME", " and ".join(_FLAGS[kind] for kind in wanted), "one of them")
+    kind = wanted[0] if wanted else ""
+    echo(f"{name}: {', '.join(make_project(name, kind))}")
+    if kind in _LOADERS:
+        echo(f"next: cd {name} && make && contactverif verify {library_subject(name, kind)}")
+    else:
+        echo(f"next: cd {name} && pip install -e . && pytest && contactverif verify {name}")
 
 
 def library_subject(name: str, language: str) -> str:

@@ -1,20 +1,17 @@
-"""The command `list`: installed formulations with what they state, properties, problems, and engines."""
+"""The work of `list`: installed formulations with what they state, properties, problems, and engines."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated
-
-import typer
 from rich.text import Text
 
-from contactverif.cli.isolation_options import IsolationOptions
-
-if TYPE_CHECKING:
-    from contactverif.contract.result import NotLoaded
-    from contactverif.contract.subject import Subject
-    from contactverif.contract.traits import Traits
-    from contactverif.isolation.remote import Wrapper
+from contactverif.cli.console import show
+from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.contract.traits import Traits
+from contactverif.isolation.remote import Wrapper
+from contactverif.plugins.registry import describe_engines, load_formulations, load_problems, load_properties
+from contactverif.run.run_options import RunOptions
+from contactverif_reports.tables import Column, Table
 
 _YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
     ("normal", "passes with node on node", "fails with node on node"),
@@ -35,63 +32,40 @@ _YES_OR_NO = (  # (trait, statement where it is true, statement where it is fals
 )
 
 
-def list_installed(
-    *,
-    traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
-    isolation: IsolationOptions,
-) -> None:
-    """List the installed formulations with their promises, properties, problems of bench, and engines.
-
-    A promise is what a formulation says of itself; verify checks it. A
-    witness is a named case on which a formulation says that it fails.
-
-    \bExit status
-      0  listed
-
-    \bExamples
-      contactverif list
-      contactverif list --traits
-    """
-    from contactverif.cli.console import plain_table, show
-    from contactverif.contract.result import NotLoaded
-    from contactverif.contract.subject import Subject
-    from contactverif.plugins.registry import describe_engines, load_formulations, load_problems, load_properties
-
-    table = plain_table("formulations", words=("name",))
-    table.add_column("in")  # It gives way on a narrow screen, and names do not.
-    table.add_column("promises")
-    for item in load_formulations(isolation.limits()):
+def list_installed(options: RunOptions, *, every_trait: bool) -> None:
+    """Show four tables; of the traits the most important ones or all."""
+    table = Table([Column("name"), _wrapped("in"), _wrapped("promises")], "formulations")
+    for item in load_formulations(options.limits()):
         if isinstance(item, NotLoaded):
-            table.add_row(item.formulation, "", _not_loaded(item))
+            table.add(item.formulation, "", _not_loaded(item))
         else:
             dimensions = item.traits.abilities.dimensions if isinstance(item, Subject) else ()
-            table.add_row(item.name, _dimensions(dimensions), _promises(item, traits))
-    show(table)
-    table = plain_table("properties", words=("id",))
-    table.add_column("in")
-    table.add_column("asks")
+            table.add(item.name, _dimensions(*dimensions), _promises(item, every_trait))
+    show(table.terminal())
+    table = Table([Column("id"), _wrapped("in"), _wrapped("asks")], "properties")
     for question in load_properties():
         if isinstance(question, NotLoaded):
-            table.add_row(question.formulation, "", _not_loaded(question))
+            table.add(question.formulation, "", _not_loaded(question))
         else:
-            table.add_row(
-                question.id, _dimensions((2,) if question.cases_in_space is None else (2, 3)), question.summary
-            )
-    show(table)
-    table = plain_table("problems", words=("name",))
-    table.add_column("what bench solves")
+            dimensions = (2,) if question.cases_in_space is None else (2, 3)
+            table.add(question.id, _dimensions(*dimensions), question.summary)
+    show(table.terminal())
+    table = Table([Column("name"), _wrapped("what bench solves")], "problems")
     for name, problem in load_problems().items():
-        table.add_row(name, _not_loaded(problem) if isinstance(problem, NotLoaded) else problem.label)
-    show(table)
-    table = plain_table("engines", words=("name",))
-    table.add_column("what it is")
+        table.add(name, _not_loaded(problem) if isinstance(problem, NotLoaded) else problem.label)
+    show(table.terminal())
+    table = Table([Column("name"), _wrapped("what it is")], "engines")
     for name, words in describe_engines().items():
-        table.add_row(name, words)
-    show(table)
+        table.add(name, words)
+    show(table.terminal())
 
 
-def _dimensions(dimensions: Iterable[int]) -> str:
-    """Return the numbers of coordinates in words, "2-D, 3-D"."""
+def _wrapped(head: str) -> Column:
+    """Return a column that gives way on a narrow screen; names do not."""
+    return Column(head, wrap=True)
+
+
+def _dimensions(*dimensions: int) -> str:
     return ", ".join(f"{dimension}-D" for dimension in dimensions)
 
 
@@ -101,8 +75,6 @@ def _not_loaded(item: NotLoaded) -> Text:
 
 def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
     """Return what a formulation states and which parts it leaves out, or what a wrapper does."""
-    from contactverif.contract.subject import OPTIONAL_PARTS, Subject
-
     if not isinstance(item, Subject):
         verbs = {"/NAME": "wraps another", "=PATH": "loads a file", "=KIND": "has kinds"}
         verb = next(words for ending, words in verbs.items() if item.form.endswith(ending))
@@ -119,12 +91,10 @@ def _statements(traits: Traits, every_trait: bool) -> list[str]:
         statements.append("passes the flat patch test" if traits.promises.patch.flat else "fails the flat patch test")
     if traits.promises.tangent is not None:
         statements.append(f"{traits.promises.tangent} tangent")
-    return statements + _further_statements(traits) if every_trait else statements
-
-
-def _further_statements(traits: Traits) -> list[str]:
+    if not every_trait:
+        return statements
     values = traits.by_name()
-    statements = [yes if values[name] else no for name, yes, no in _YES_OR_NO if values[name] is not None]
+    statements += [yes if values[name] else no for name, yes, no in _YES_OR_NO if values[name] is not None]
     for words, value in (
         ("area {}", traits.rules.area),
         ("penalty {}", traits.rules.penalty),
@@ -134,6 +104,5 @@ def _further_statements(traits: Traits) -> list[str]:
         ("forces stated on {}", ", ".join(traits.evidence.published_forces)),
     ):
         statements += [words.format(value)] if value else []
-    return statements + [
-        f"{property_id} fails on {case}" for property_id, case in sorted(traits.evidence.witnesses.items())
-    ]
+    witnesses = sorted(traits.evidence.witnesses.items())
+    return statements + [f"{property_id} fails on {case}" for property_id, case in witnesses]

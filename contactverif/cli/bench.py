@@ -1,0 +1,134 @@
+"""The work of `bench`: speed against error, on scenes whose exact solution is known."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from contactverif.api.run_files import PAGE, REPORT
+from contactverif.cli.console import echo, print_plugin_output, show
+from contactverif.cli.options import MARKDOWN, OutputFiles, picture_folder, select_names
+from contactverif.cli.progress import Bar
+from contactverif.contract.errors import MisuseError
+from contactverif.isolation.confine import ONE_THREAD
+from contactverif.plugins.registry import load_formulation
+from contactverif.run.journal import journal_folder, remove_journal
+from contactverif.run.run_options import RunOptions
+from contactverif.studies.bench.bench_plan import BenchPlan, make_plan
+from contactverif.studies.bench.bench_study import run_bench
+from contactverif_reports.bench.bench_text import bench_markdown
+from contactverif_reports.bench.changes import Change, changes
+from contactverif_reports.bench.cost_tables import (
+    cost_sentences,
+    costs_at,
+    format_seconds,
+    format_share,
+    ratios_at,
+)
+from contactverif_reports.bench.costs import REFERENCE
+from contactverif_reports.bench.results import RULE, BenchResults, Outcome
+from contactverif_reports.files import whole
+from contactverif_reports.netcdf.bench_file import read_bench, write_bench
+from contactverif_reports.tables import Column, Table, numbers
+
+_LONG_CALLS = 10  # A state of a large mesh, or all states of differences, may take so many times the limit of a call.
+
+
+def bench(
+    options: RunOptions,
+    scenes: Sequence[str],
+    *,
+    quick: bool,
+    instances: int | None,
+    processes: int | None,
+    against: Path | None,
+    out: Sequence[Path],
+) -> int:
+    """Measure formulations, or show a file of a bench again; return 1 if something became worse, else 0."""
+    files, pictures = OutputFiles.check(out, (REPORT, PAGE, MARKDOWN)), picture_folder(options.pictures)
+    old = read_bench(against) if against else None
+    file = options.names[0] if options.names and options.names[0].lower().endswith(REPORT) else ""
+    if file and (len(options.names) > 1 or options.every):
+        raise MisuseError("NAME", f"{file} and more", "formulations alone, or one file of a bench")
+    if file:
+        results = read_bench(file)
+    else:
+        plan = make_plan(scenes, quick=quick, instances=instances, processes=processes)
+        results = _run(options, plan, files)
+    since = () if old is None else changes(results, old)
+    _write(results, since, files, pictures, file)
+    for scene in results.scenes:
+        show(_costs_table(results, scene).terminal(dense=True))
+    if any(results.uses_differences(name, scene) for name in results.formulations for scene in results.scenes):
+        show("* with differences of forces where there is no tangent, or it did not help")
+    for scene in results.scenes:
+        show("\n".join(cost_sentences(results, scene, results.targets[scene][0])))
+    for name, reason in results.not_loaded.items():
+        show(f"{name} is not measured: {reason}")
+    if old is not None:
+        sentences = [change.sentence for change in since]
+        show("\n".join(sentences) or "The earlier bench has none of these formulations and cells.")
+    files.announce()
+    if pictures is not None:
+        echo(f"pictures: {options.pictures}")
+    crashed = bool((results.outcomes == Outcome.CRASHED).any())
+    return int(crashed or bool(results.not_loaded) or any(change.worse for change in since))
+
+
+def _run(options: RunOptions, plan: BenchPlan, files: OutputFiles) -> BenchResults:
+    """Run the bench with a progress bar."""
+    names, limits = select_names(options), options.limits()
+    of_solution = None if limits is None else replace(limits, seconds=_LONG_CALLS * limits.seconds)
+    subjects = [load_formulation(name, of_solution) for name in names]
+    with Bar() as bar:
+        results = run_bench(subjects, plan, output=files.paths.get(REPORT), progress=bar.update)
+    print_plugin_output()
+    one_thread = all(os.environ.get(name) == "1" for name in ONE_THREAD)
+    facts = {"command": shlex.join(["contactverif", *sys.argv[1:]]), "threads": "1" if one_thread else "not set"}
+    return replace(results, provenance={**results.provenance, **facts})
+
+
+def _write(
+    results: BenchResults, since: Sequence[Change], files: OutputFiles, pictures: Path | None, file: str
+) -> None:
+    """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
+    if REPORT in files.paths:
+        write_bench(results, files.paths[REPORT])
+        remove_journal(journal_folder(files.paths[REPORT]))
+    if pictures is not None:
+        from contactverif_reports.draw.bench_figures import draw_bench  # It imports matplotlib, which is slow.
+
+        draw_bench(results, pictures)
+    if PAGE in files.paths:
+        from contactverif_reports.html.bench_page import bench_page
+        from contactverif_reports.html.pages import write_page
+
+        write_page(files.paths[PAGE], bench_page(results, since))
+    if MARKDOWN in files.paths:
+        report = (files.names.get(REPORT) or Path(file)).name
+        with whole(files.paths[MARKDOWN]) as part:
+            part.write_text(bench_markdown(results, report, pictures is not None), encoding="utf-8")
+
+
+def _costs_table(results: BenchResults, scene: str) -> Table:
+    """Return what the largest target of a scene costs, and how many of all runs failed."""
+    target = results.targets[scene][0]
+    title = f"{scene}: {results.label(scene)}\nto an error of {format_share(target)} in the forces, at {RULE.label}"
+    heads = ("reached", "evaluation", f"over {REFERENCE}", "systems", "factor", "failed")
+    table = Table([Column("formulation", wrap=True), *numbers(*heads)], title)
+    ratios = ratios_at(results, scene, target, "evaluation")
+    for name, cost in costs_at(results, scene, target).items():
+        differences = "*" if results.uses_differences(name, scene) else ""
+        reached = f"{int(cost.reached.sum())}/{len(cost.reached)}"
+        systems = f"{cost.middle('systems'):.0f}" if cost.is_usual else "∞"
+        seconds = [format_seconds(cost.middle(number)) for number in ("evaluation", "factorisation")]
+        ratio = ratios[name].text if name in ratios else ""
+        failed = results.failures(name, scene)
+        table.add(
+            f"{name}{differences}", reached, seconds[0], ratio, systems, seconds[1], f"{failed.sum()}/{failed.size}"
+        )
+    return table

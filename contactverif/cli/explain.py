@@ -1,0 +1,119 @@
+"""The work of `explain`: what a property asks, or what a term means, and the numbers of a case that fails."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.markdown import Heading, Markdown, MarkdownElement
+from rich.text import Text
+
+from contactverif.cli.console import echo, show, show_verbatim
+from contactverif.contract.counterexample import Counterexample, counterexamples, find_counterexample
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.names import unknown_name_error
+from contactverif.contract.result import Run
+from contactverif.explanations.case_numbers import case_text
+from contactverif.explanations.known_failures import stated_failures
+from contactverif.explanations.markdown import without_links
+from contactverif.explanations.property_text import property_text
+from contactverif.explanations.terms import list_of_terms, symbol_meanings, term_text, term_texts
+from contactverif.explanations.trait_text import trait_names, trait_text
+from contactverif.plugins.registry import load_formulations, property_ids, the_property
+from contactverif.run.run_options import RunOptions
+from contactverif_reports.draw import as_text
+from contactverif_reports.netcdf.read import read_run
+
+_MOST_COLUMNS = 80  # Longer lines are hard to read.
+
+
+def explain(name: str | None, report: Path | None, case: str | None, options: RunOptions) -> None:
+    """Explain a name, with the numbers of a report; or list the terms."""
+    run, examples = _read(name, report, case)
+    if run is not None:
+        name = name or examples[0].property_id
+    if name in property_ids(engines=True):
+        _explain_property(name, run, examples, report, options)
+    elif name is None:
+        _show(list_of_terms())
+    elif text := term_text(name) or trait_text(name):
+        _show(text)
+    else:
+        names = {*property_ids(engines=True), *term_texts(), *symbol_meanings(), *trait_names()}
+        needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
+        raise unknown_name_error("NAME", name, names, needed)
+
+
+def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run | None, list[Counterexample]]:
+    """Return the run in a report, and the counterexamples of it that the user means."""
+    if report is None:
+        if case is not None:
+            raise MisuseError("--report", "nothing", f"the report that has the case {case!r}")
+        return None, []
+    run = read_run(report)
+    if case is not None:
+        example = find_counterexample(run, case)
+        if name not in (None, example.property_id):
+            raise MisuseError("NAME", repr(name), f"{example.property_id}, the property of the case {case}")
+        return run, [example]
+    every = counterexamples(run).values()
+    examples = [example for example in every if example.property_id == name]
+    if not examples and name not in {row.property_id for row in run.rows}:
+        failing = ", ".join(dict.fromkeys(example.property_id for example in every))
+        needed = f"one of which {report} has a counterexample: {failing}" if failing else "no --report"
+        raise MisuseError("NAME", "nothing" if name is None else repr(name), needed)
+    return run, examples
+
+
+def _explain_property(
+    name: str, run: Run | None, examples: list[Counterexample], report: Path | None, options: RunOptions
+) -> None:
+    """Show the text of a property, its results in a report, and the formulations that state a failure."""
+    question = the_property(name)
+    _show(property_text(question))
+    if run is not None and not examples:
+        for row in run.rows:
+            if row.property_id == name:
+                echo(f"\n{row.formulation}: {row.result}{': ' if row.reason else ''}{row.reason}")
+    for example in examples:
+        echo("")
+        diagnosis = run.diagnoses.get(example.formulation, "") if run is not None else ""
+        _show(case_text(example, diagnosis, solved=question.bodies))
+        show_verbatim(Text(f"\n{as_text(example.case)}\n{example.replay_command(str(report))}"))
+    echo("")
+    # The formulations come last, because a reader need not wait until they are loaded.
+    _show(stated_failures(question, load_formulations(options.limits())))
+
+
+def _show(markdown: str) -> None:
+    show(TerminalMarkdown(markdown))
+
+
+class _LeftHeading(Heading):
+    """A heading that is bold, without a frame."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        yield Text(self.text.plain, style="bold")
+
+
+class _Markdown(Markdown):
+    """Markdown whose headings have no frame."""
+
+    elements: ClassVar[dict[str, type[MarkdownElement]]] = {**Markdown.elements, "heading_open": _LeftHeading}
+
+
+@dataclass(frozen=True, slots=True)
+class TerminalMarkdown:
+    """Markdown of the site in a terminal: headings stand at the left, and a link is its words alone."""
+
+    markdown: str
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        narrow = options.update(width=min(options.max_width, _MOST_COLUMNS))
+        for line in console.render_lines(_Markdown(without_links(self.markdown)), narrow):
+            text = Text.assemble(*((part.text, part.style or "") for part in line), no_wrap=True)
+            text.rstrip()
+            yield text

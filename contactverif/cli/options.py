@@ -1,0 +1,290 @@
+"""The options of the command line: how those of a run are typed, the files that a command writes, and completion.
+
+Every `--help` imports this file, so nothing at its top takes long to import.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import typer
+
+from contactverif.api.run_files import JSON, JUNIT, PAGE, REPORT, either
+from contactverif.contract.errors import MisuseError
+from contactverif.run.run_options import Option, RunOptions, declared_options, group_names
+
+if TYPE_CHECKING:
+    from contactverif.contract.case import Case
+    from contactverif.contract.interface import Interface
+
+PICTURES = (".png", ".svg")
+SOLVED_SCENE = ".vtu"
+MARKDOWN = ".md"
+_LABELS = {
+    REPORT: "report",
+    PAGE: "page",
+    MARKDOWN: "page",
+    JSON: "JSON",
+    JUNIT: "JUnit",
+    ".png": "picture",
+    ".svg": "picture",
+    SOLVED_SCENE: "for ParaView",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """The parts of the results that are printed."""
+
+    verbose: Annotated[
+        bool, Option("Show every row, every counterexample, and the coverage.", flags=("--verbose", "-v"))
+    ] = False
+    quiet: Annotated[bool, Option("Show the last line alone.", flags=("--quiet", "-q"))] = False
+    show: Annotated[
+        Literal["first", "all"], Option("The counterexamples that are drawn: the most telling one, or all.")
+    ] = "first"
+
+
+@dataclass(frozen=True, slots=True)
+class Takes:
+    """The options of a run that a command takes, in the order of its help."""
+
+    names: Sequence[str]  # Options, groups of options, and parameters of the command that stand between them.
+    words: Mapping[str, str] = field(default_factory=dict)  # {option: its help, where it is another one}
+
+
+def complete_formulation(incomplete: str) -> list[str]:
+    """Return the installed formulations whose name begins so, for the shell."""
+    from contactverif.plugins.registry import formulation_names
+
+    return [name for name in formulation_names() if name.startswith(incomplete)]
+
+
+def complete_property(incomplete: str) -> list[str]:
+    """Return the installed properties whose id begins so, for the shell."""
+    from contactverif.plugins.registry import property_ids
+
+    return [property_id for property_id in property_ids(engines=True) if property_id.startswith(incomplete)]
+
+
+_COMPLETIONS = {"names": complete_formulation, "properties": complete_property}
+
+
+def formulation_option(words: str, *flags: str) -> Any:
+    """Return an option that names a formulation; typer makes the flag of its name, unless some are given."""
+    return typer.Option(*flags, help=words, metavar="NAME", autocompletion=complete_formulation)
+
+
+def output_option(words: str) -> Any:
+    """Return the option for the files that a command writes, with its help in words."""
+    return typer.Option("--out", help=words, metavar="FILE")
+
+
+def spell_out(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """Return a command whose parameters are single options, as typer needs them, and no groups.
+
+    A group is a dataclass whose fields are options; of `RunOptions` the command says which ones it takes.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    own = inspect.signature(command).parameters
+    groups: dict[str, tuple[Any, dict[str, Any]]] = {}  # {parameter: its class, its fields}
+    single: dict[str, inspect.Parameter] = {}
+
+    def add(name: str) -> None:
+        parameter = own[name].replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+        single.setdefault(name, parameter)
+
+    for name, hint in hints.items():
+        kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        if name in own and not is_dataclass(kind):
+            add(name)
+        elif name in own:
+            declared = declared_options(kind)
+            takes = next((extra for extra in extras if isinstance(extra, Takes)), Takes([*declared]))
+            defaults = {option: getattr(kind(), option) for option in declared}
+            for each in takes.names:
+                if each in own:
+                    add(each)
+                    continue
+                for option in group_names(each) if kind is RunOptions else [each]:
+                    single[option] = _typed(option, *declared[option], defaults[option], takes.words.get(option))
+            groups[name] = (
+                kind,
+                {option: defaults[option] for option in declared if option in single and option not in own},
+            )
+
+    @functools.wraps(command)
+    def spelled_out(**values: Any) -> int | None:
+        for name, (kind, defaults) in groups.items():
+            values[name] = kind(**{each: _value(each, values.pop(each), defaults[each]) for each in defaults})
+        return command(**values)
+
+    spelled_out.__signature__ = inspect.Signature([*single.values()])  # type: ignore[attr-defined]
+    spelled_out.__annotations__ = {name: parameter.annotation for name, parameter in single.items()}
+    return spelled_out
+
+
+def _typed(name: str, kind: Any, option: Option, default: Any, words: str | None) -> inspect.Parameter:
+    """Return an option as a parameter of typer: what has several values is a list, and None where nothing is typed."""
+    several = next((part for part in (kind, *get_args(kind)) if get_origin(part) in (tuple, dict)), None)
+    if several is not None:
+        kind, default = list[get_args(several)[0]] | None, None  # type: ignore[misc]
+    flags = option.flags or (f"--{name.replace('_', '-')}",)
+    more: dict[str, Any] = {
+        "help": words or option.help,
+        "metavar": option.metavar,
+        "autocompletion": _COMPLETIONS.get(name),
+    }
+    info = typer.Argument(**more) if name == "names" else typer.Option(*flags, **more)
+    default = False if kind is bool else default
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info])
+
+
+def _value(name: str, typed: Any, default: Any) -> Any:
+    """Return the value of a field from what is typed."""
+    if typed is None:
+        return default
+    if isinstance(typed, bool):
+        return typed != default
+    if isinstance(typed, list):
+        return _known_failures(typed) if name == "known" else tuple(typed)
+    return typed
+
+
+def _known_failures(texts: Sequence[str]) -> dict[str, str]:
+    """Return {property: reason} of each ID=REASON."""
+    reasons = {}
+    for text in texts:
+        property_id, _, reason = text.partition("=")
+        if not (property_id and reason):
+            raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")
+        reasons[property_id] = reason
+    return reasons
+
+
+def with_engines(names: Sequence[str], engines: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of formulations, and those of engines as they stand beside them."""
+    from contactverif.contract.engine_subject import ENGINE
+
+    return (*names, *(f"{ENGINE}{name.removeprefix(ENGINE)}" for name in engines))
+
+
+def select_names(options: RunOptions) -> tuple[str, ...]:
+    """Return the formulations and engines that the user named, or all formulations."""
+    from contactverif.plugins.registry import formulation_names, standalone_names
+
+    names = with_engines(options.names, options.engines)
+    if options.every and names:
+        raise MisuseError("NAME", f"{', '.join(names)} and --all", "one of the two")
+    if options.every:
+        return tuple(standalone_names(options.limits()))
+    if not names:
+        raise MisuseError("NAME", "nothing", f"--all, or some of {', '.join(formulation_names())}")
+    return names
+
+
+def read_place(options: RunOptions) -> Interface | Case | None:
+    """Return the scene or the interface on which a run asks; None for random ones.
+
+    What the scene of a mesh is, or why it has none, goes to standard error.
+    """
+    places = {"--scene": options.scene, "--scene-file": options.scene_file, "--mesh": options.mesh}
+    typed = [(option, value) for option, value in places.items() if value is not None]
+    if len(typed) > 1:
+        raise MisuseError(typed[0][0], f"{typed[0][1]} and {typed[1][0]} {typed[1][1]}", "one of the two")
+    if options.scene_file is not None:
+        from contactverif.meshes.scene_file import load_scene_file
+
+        return load_scene_file(options.scene_file).case()
+    if options.scene is not None:
+        from contactverif.problems.catalogue import load_scene
+
+        return load_scene(options.scene).case()
+    mesh, slave, master = options.mesh, options.slave, options.master
+    if mesh is None:
+        for option in ("slave", "master", "flip", "material", "support"):
+            if getattr(options, option):
+                raise MisuseError("--mesh", f"none, but --{option}", "--mesh FILE, which the tags belong to")
+        return None
+    if slave is None or master is None:
+        missing = "--slave" if slave is None else "--master"
+        raise MisuseError(
+            missing, "nothing", f"{missing} TAG, a physical group of lines, or of faces in space, of {mesh}"
+        )
+    from contactverif.meshes.mesh_file import read_interface
+    from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support, read_scene
+
+    try:
+        materials = dict(map(parse_material, options.material))
+        supports = dict(map(parse_support, options.support))
+        scene = read_scene(mesh, slave=slave, master=master, flip=options.flip, materials=materials, supports=supports)
+    except MisuseError as error:
+        if options.material or options.support:
+            raise
+        interface = read_interface(mesh, slave=slave, master=master, flip=options.flip)
+        typer.echo(f"contactverif: no bodies are solved: {error}", err=True)
+        return interface
+    for line in describe_bodies(scene):
+        typer.echo(f"contactverif: {line}", err=True)
+    return scene.case()
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFiles:
+    """The files that a command writes, at most one of each suffix.
+
+    Everything that can be wrong with a name is said by `check`, before anything takes long.
+    """
+
+    names: Mapping[str, Path]  # {suffix: name as the user typed it}.
+    paths: Mapping[str, Path]  # {suffix: absolute path}. A plugin may change the working folder while it runs.
+
+    @classmethod
+    def check(cls, names: Sequence[Path] | None, suffixes: Sequence[str]) -> OutputFiles:
+        """Return the files, once it is sure that they can be written."""
+        from contactverif_reports.files import check_writable
+
+        by_suffix: dict[str, Path] = {}
+        for name in names or ():
+            suffix = name.suffix.lower()
+            if suffix not in suffixes:
+                raise MisuseError("--out", f"{str(name)!r}", f"a name that ends in {either(suffixes)}")
+            if suffix in by_suffix:
+                raise MisuseError("--out", f"{by_suffix[suffix]} and {name}", f"one file that ends in {suffix}")
+            check_writable(name, "--out", f"FILE{suffix}")
+            by_suffix[suffix] = name
+        return cls(by_suffix, {suffix: name.absolute() for suffix, name in by_suffix.items()})
+
+    def only(self, suffixes: Collection[str]) -> OutputFiles:
+        """Return the files with these suffixes."""
+        names, paths = (
+            {key: path for key, path in files.items() if key in suffixes} for files in (self.names, self.paths)
+        )
+        return OutputFiles(names, paths)
+
+    def drawings(self) -> Iterator[Path]:
+        """Yield the absolute path of each picture, and of a file for ParaView."""
+        yield from (path for suffix, path in self.paths.items() if suffix in (*PICTURES, SOLVED_SCENE))
+
+    def announce(self) -> None:
+        """Print the name of each file that was written, a line each."""
+        from contactverif.cli.console import echo
+
+        for suffix, label in _LABELS.items():
+            if suffix in self.names:
+                echo(f"{label}: {self.names[suffix]}")
+
+
+def picture_folder(name: Path | None) -> Path | None:
+    """Make the folder that `--pictures` names, and return its absolute path; None without a name."""
+    if name is None:
+        return None
+    from contactverif_reports.files import made_folder
+
+    made_folder(name, "--pictures")
+    return name.absolute()

@@ -1,0 +1,463 @@
+"""The runs of the harness: `verify`, the shards of `campaign`, and `merge`, which makes the report of all shards."""
+
+from __future__ import annotations
+
+import gc
+import os
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import msgspec
+import typer
+
+from contactverif.api.drawing import draw_outcome
+from contactverif.api.run_files import REPORT, RUN_FILES, write_run
+from contactverif.cli.annotations import annotate
+from contactverif.cli.console import echo, print_plugin_output, show
+from contactverif.cli.options import OutputFiles, Screen, picture_folder, read_place, select_names, with_engines
+from contactverif.cli.progress import Bar
+from contactverif.cli.run_screen import RunScreen, how_to_keep, show_run
+from contactverif.cli.run_tables import summary
+from contactverif.contract.case import Case
+from contactverif.contract.counterexample import case_id, failing_examples
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import name_line, one_line
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Property
+from contactverif.contract.result import NotLoaded, Run
+from contactverif.contract.subject import Subject
+from contactverif.isolation.box import why_no_box
+from contactverif.isolation.limits import Limits
+from contactverif.plugins.provenance import CODE, code_digests, collect_versions, machine
+from contactverif.plugins.registry import load_properties
+from contactverif.run.campaign import Shard, mark_done, open_shard, read_shards
+from contactverif.run.failure_memory import FailureMemory
+from contactverif.run.journal import hold_journal, journal_folder, keep_earlier, new_journal, remove_journal
+from contactverif.run.profiles import Shrink
+from contactverif.run.rows import find_missing
+from contactverif.run.run import RunStopped, run, run_failures, run_share
+from contactverif.run.run_options import Isolation, RunOptions, declared_options, read_settings
+from contactverif.run.scheduler import WorkerError, begin_loading
+from contactverif.run.store import STORED, Plan, Store, check_versions, read_plan
+from contactverif.run.worker_pool import check_jobs, default_jobs, worker_pool
+from contactverif.sampling.draw import Sampling
+from contactverif_reports.files import made_folder, reason_not_to_grow
+
+VERIFY, COMPARE, CAMPAIGN = "verify", "compare", "campaign"
+_STOPPED = 130  # The exit status after Ctrl-C.
+_NOT_WRITTEN = 2  # The exit status if a file could not be written.
+_CAMPAIGN_SEED = 0  # The seed if there is none: all shards must have the same.
+_BESIDE_RESUME = ("every", "keep_going", "last_failed", "memory", "jobs")
+_Loaded = TypeVar("_Loaded")
+
+
+def verify(options: RunOptions, screen: Screen, resume: Path | None) -> int:
+    """Check properties of formulations; return the exit status."""
+    memory = read_settings().memory and options.memory
+    if resume is not None:
+        job = resumed_job(resume, replace(options, names=with_engines(options.names, options.engines), engines=()))
+    else:
+        job = new_job(replace(options, names=select_names(options)).with_settings())
+    if options.last_failed:
+        return _judge_last_failed(job)
+    return _run_job(job, screen, memory=memory)
+
+
+def campaign(options: RunOptions, shard: str, folder: Path) -> int:
+    """Judge a shard of a run, and keep its outcomes in a folder for `merge`; return the exit status."""
+    piece = Shard.parse(shard)
+    typed = replace(options, names=select_names(options), keep_going=True)
+    job = new_job(typed.with_settings(), fresh_seed=_CAMPAIGN_SEED, command=CAMPAIGN)
+    plan = piece.plan(job.plan())
+    made_folder(folder, "--out")
+    journal_of_shard = folder.absolute() / piece.folder
+    with open_shard(journal_of_shard, plan) as is_done:
+        if is_done:
+            echo(f"shard {piece.text} is done already")
+            return 0
+        plugins = replace(job, hidden=(folder.absolute(),)).load()
+        for item in (*plugins.subjects, *plugins.questions):
+            if isinstance(item, NotLoaded):
+                words = f"{name_line(item.formulation)} does not load: {one_line(item.reason)}"
+                echo(f"contactverif: {words}", to_stderr=True)
+                return 1
+        subjects = [item for item in plugins.subjects if isinstance(item, Subject)]
+        questions = [item for item in plugins.questions if isinstance(item, Property)]
+        with Bar() as bar:
+            store = Store(plan, journal_of_shard, [journal_of_shard])
+            run_share(subjects, questions, job.sampling, bar.show_progress, store, share=piece.share)
+        print_plugin_output()
+        _print_remarks(store)
+        n_outcomes = mark_done(journal_of_shard, plan)
+    echo(f"shard {piece.text} is done: {n_outcomes} outcomes")
+    return 0
+
+
+def merge(folder: Path, out: tuple[Path, ...], shrink: Shrink | None, audited: float | None, screen: Screen) -> int:
+    """Make the report of a campaign from the journals of its shards, and audit a share of it; return the exit status.
+
+    What fails is shrunk here.
+    """
+    from contactverif.cli.reports import audit, check_share
+
+    check_share(1.0 if audited is None else audited)
+    plan, journals = read_shards(folder, "FOLDER")
+    options = options_of(plan, CAMPAIGN, "FOLDER")
+    job = new_job(replace(options, shrink=shrink or options.shrink, out=out))
+    files = " ".join(f"--out {shlex.quote(str(path))}" for path in out)
+    again = f"contactverif merge {shlex.quote(str(folder))} {files}{f' --shrink {shrink}' if shrink else ''}"
+    if audited is not None and REPORT not in job.files.names:
+        raise MisuseError("--audit", "no report", f"--out FILE{REPORT} beside it")
+    status = _run_job(replace(job, sources=journals, again=again), screen)
+    if audited is not None and job.files.paths[REPORT].exists():
+        differs = audit(job.files.paths[REPORT], audited, options)
+        status = status or differs
+    return status
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plugins:
+    """The formulations and the properties of a run, as they were loaded."""
+
+    subjects: Sequence[Subject | NotLoaded]
+    questions: Sequence[Property | NotLoaded]
+
+    def subject(self, name: str) -> Subject:
+        """Return a formulation that was loaded."""
+        return next(item for item in self.subjects if isinstance(item, Subject) and item.name == name)
+
+    def question(self, property_id: str) -> Property:
+        """Return a property that was loaded."""
+        return next(item for item in self.questions if isinstance(item, Property) and item.id == property_id)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A run of `verify`, `compare` or `campaign` before it begins, or what `merge` makes of a campaign."""
+
+    options: RunOptions  # They are settled.
+    files: OutputFiles
+    pictures: Path | None  # The folder for pictures.
+    place: Interface | Case | None  # The interface or scene on which everything is checked; None for random ones.
+    sources: tuple[Path, ...] = ()  # The journals whose outcomes are not judged again.
+    resumes: bool = False  # The run goes on with its own journal.
+    again: str = ""  # The command line that goes on with the run, if it is not that command with `--resume`.
+    command: str = VERIFY
+    hidden: tuple[Path, ...] = ()  # Other files of the run that a plugin in a box does not see.
+
+    def load(self, executor: Executor | None = None) -> Plugins:
+        """Load the formulations, in the workers where there are any, and the properties meanwhile."""
+        loaders = begin_loading(self.options.names, self.limits(), executor)
+        questions = load_properties(self.options.properties, engines=True)
+        return Plugins([load() for load in loaders], questions)
+
+    def limits(self) -> Limits | None:
+        """Return the limits of the plugins' processes; in a box they do not see what this run writes."""
+        files = self.files.paths.values()
+        return self.options.limits([*files, *map(journal_folder, files), *self.hidden])
+
+    def run_options(self, **others: Any) -> dict[str, Any]:
+        """Return the options of a run, those of `contactverif.run.run.run`, and others beside them."""
+        return others | {
+            "profile": self.options.size,
+            "place": self.place,
+            "known": self.options.known,
+            "keep_going": self.options.keep_going,
+            "shrink": self.options.shrink or "one",
+        }
+
+    @property
+    def jobs(self) -> int:
+        """The number of processes: the user's, or one that fits the work."""
+        if self.options.jobs is not None:
+            return check_jobs(self.options.jobs)
+        return default_jobs(len(self.options.names) * len(self.options.properties) * self.options.size.examples)
+
+    @property
+    def sampling(self) -> Sampling:
+        """The size and the seed of the run, and the place where it asks."""
+        size = self.options.size
+        assert size.seed is not None
+        return Sampling.at(self.place, size.examples, size.seed)
+
+    @property
+    def output(self) -> Path | None:
+        """The file that the journal belongs to: the report, or else the page, or else another."""
+        return next((self.files.names[suffix] for suffix in RUN_FILES if suffix in self.files.names), None)
+
+    def plan(self) -> Plan:
+        """Return the plan for the header of a journal."""
+        size = self.options.size
+        assert size.seed is not None
+        return Plan(
+            command=self.command,
+            options=self.options.to_builtins(),
+            folder=os.getcwd(),
+            versions=versions_of(self.options),
+            formulations=self.options.names,
+            properties=self.options.properties,
+            profile=size.name,
+            examples=size.examples,
+            seed=size.seed,
+            machine=machine(),
+            place=self.options.place_words,
+        )
+
+    @contextmanager
+    def begin(self, load: Callable[[], _Loaded]) -> Iterator[tuple[_Loaded, Store]]:
+        """Open a block with what a function loads, and with the store of the run.
+
+        The store is there before a box is, which hides it. A plugin that lives in this process is loaded before: it
+        may end us, and then leaves no file.
+        """
+        first = load() if self.options.isolation is Isolation.INLINE else None
+        with self._store() as store:
+            yield first or load(), store
+
+    @contextmanager
+    def _store(self) -> Iterator[Store]:
+        """Open a block with the store of the run. In it no other process uses the same journal."""
+        if self.output is None:
+            yield Store()
+            return
+        plan, outputs = self.plan(), tuple(self.files.paths.values())
+        folder = journal_folder(self.files.paths[self.output.suffix.lower()])
+        held = hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs)
+        with held as aside:
+            if aside:
+                folder_aside = self.output.parent / aside
+                echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", to_stderr=True)
+            keep_earlier(folder, outputs)
+            store = Store(plan, folder, self.sources)
+            try:
+                yield store
+            finally:
+                _print_remarks(store)
+
+
+def new_job(options: RunOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> Job:
+    """Return the job of options as they were typed. Where nothing says the seed it is the fresh one, or a new one."""
+    files = OutputFiles.check(options.out, RUN_FILES)
+    folder = picture_folder(options.pictures)
+    return Job(options.settled(fresh_seed), files, folder, read_place(options), command=command)
+
+
+def resumed_job(output: Path, typed: RunOptions, command: str = VERIFY) -> Job:
+    """Return the job that goes on with a run that was to write a report or page, and was stopped.
+
+    Beside `--resume` only `--jobs` and `--keep-going` may be typed: all other options come from the journal.
+    """
+    if output.is_dir():
+        raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
+    folder = journal_folder(output, "--resume")
+    if output.exists() and not folder.exists():
+        raise MisuseError("--resume", f"{output}, which is complete", "the report of a run that was stopped")
+    plan, nothing = read_plan(folder, "--resume"), RunOptions()
+    for name, (_, option) in declared_options(RunOptions).items():
+        if name not in _BESIDE_RESUME and getattr(typed, name) != getattr(nothing, name):
+            needed = "--jobs and --keep-going at most: all other options come from the journal"
+            raise MisuseError("--resume", f"{option.group or name} beside it", needed)
+    options = options_of(plan, command, "--resume")
+    others = [path for path in options.out if path.suffix.lower() != output.suffix.lower()]
+    jobs = options.jobs if typed.jobs is None else typed.jobs
+    keep_going = typed.keep_going or options.keep_going
+    job = new_job(replace(options, out=(output, *others), jobs=jobs, keep_going=keep_going), command=command)
+    return replace(job, sources=(folder,), resumes=True)
+
+
+def versions_of(options: RunOptions) -> dict[str, str]:
+    """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
+    versions = collect_versions() | code_digests(options.names, options.properties)
+    if options.scene_file is not None:
+        from contactverif.meshes.scene_file import digest_scene_file  # It imports meshio.
+
+        versions[f"{CODE}scene file"] = digest_scene_file(options.scene_file)
+    return versions
+
+
+def options_of(plan: Plan, command: str, argument: str) -> RunOptions:
+    """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
+    if plan.command != command:
+        raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")
+    try:
+        options = RunOptions.from_builtins(plan.options).from_folder(plan.folder)
+    except (msgspec.ValidationError, TypeError) as error:
+        raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
+    check_versions(plan.versions, versions_of(options), argument)
+    # A box or Landlock may not be had here, and the results are the same without.
+    weaker = options.isolation in (Isolation.BOX, Isolation.LANDLOCK)
+    return replace(options, isolation=None if weaker else options.isolation)
+
+
+def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
+    """Judge what a job says, show the tables and write the files; return the exit status.
+
+    With a memory, what failed in earlier runs is asked first. On a mesh or a scene of the user's there is none.
+    """
+    failures = FailureMemory() if memory and job.place is None else None
+    with watch_for_stops(job), ExitStack() as stack:
+        with worker_pool(job.jobs) as executor, Bar() as bar:
+            plugins, store = stack.enter_context(job.begin(partial(job.load, executor)))
+            if failures is not None:
+                store.failures = failures.recall(job.options.names, job.options.properties)
+            gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
+            options = job.run_options(progress=bar.show_progress, executor=executor, store=store)
+            result = run(plugins.subjects, plugins.questions, **options)
+        if failures is not None:
+            failures.update(result.rows)
+        gap = partial(find_missing, result, plugins.subjects, plugins.questions, job.sampling)
+        write = partial(write_run, result, report=job.files.names.get(REPORT))
+        end = end_run(job, store, gap, write, promises_kept=result.promises_kept)
+    _show_results(result, plugins, end, job, screen)
+    if not end.complete:
+        print_resume_hint(job)
+    return end.status
+
+
+def _show_results(result: Run, plugins: Plugins, end: End, job: Job, screen: Screen) -> None:
+    """Show the results, the names of the files, and the last line; draw the pictures."""
+    if job.pictures is not None:
+        for example in failing_examples(result):
+            subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
+            name = f"{case_id(subject.name, question.id)}.png"
+            draw_outcome(subject, question, example.outcome, job.pictures / name, argument="--pictures")
+    print_plugin_output()
+    annotate(result)
+    if not screen.quiet:
+        show_run(result, screen, end.files.names.get(REPORT))
+        if remark := result.provenance.get("drawing"):
+            show(f"{remark}.")
+        print_stored(result)
+        if job.pictures is not None:
+            show(f"pictures: {job.options.pictures}")
+        end.files.announce()
+        if REPORT not in end.files.names and not result.promises_kept and (advice := how_to_keep(result)):
+            show(advice)
+    show(f"Not complete: {end.gap}." if end.gap else summary(result, quiet=screen.quiet))
+    if not screen.quiet:
+        print_isolation(result.provenance)
+
+
+class End(NamedTuple):
+    """The files, the exit status and the gaps of a run."""
+
+    files: OutputFiles  # Those that were written.
+    gap: str  # What was not judged; empty if nothing is missing.
+    complete: bool
+    status: int  # The exit status; 0 only if nothing is missing in the run or in its files, and promises are kept.
+
+
+def end_run(
+    job: Job, store: Store, find_missing: Callable[[], str], write: Callable[[Path], None], *, promises_kept: bool
+) -> End:
+    """Write the files before anything is shown, so that nothing that was judged is lost, and remove the journal."""
+    gap = find_missing() if promises_kept else ""
+    files = job.files
+    written = files.only(
+        [suffix for suffix, path in files.paths.items() if _is_written(write, path, files.names[suffix])]
+    )
+    complete = written.paths == files.paths and not gap
+    if store.write_error:
+        _warn(f"the journal could not be written to its end: {store.write_error}")
+    if complete and store.folder is not None:
+        remove_journal(store.folder)
+    if gap:
+        return End(written, gap, complete, 1)
+    whole = complete and not store.write_error
+    return End(written, gap, complete, (0 if promises_kept else 1) if whole else _NOT_WRITTEN)
+
+
+def _is_written(write: Callable[[Path], None], path: Path, name: Path) -> bool:
+    """Write a file; return whether it is there. A line says why one is not."""
+    try:
+        write(path)
+    except MisuseError as error:
+        _warn(f"{name} is not written: {error.found.removeprefix(f'{path}: ')}")
+    except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
+        _warn(f"{name} is not written: {reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}")
+    else:
+        return True
+    return False
+
+
+@contextmanager
+def watch_for_stops(job: Job) -> Iterator[None]:
+    """Open a block in which a job is judged. After Ctrl-C it shows what was judged; if a worker dies, how to go on."""
+    try:
+        yield
+    except RunStopped as stop:
+        show(RunScreen(stop.run))
+        print_resume_hint(job)
+        raise typer.Exit(_STOPPED) from None
+    except WorkerError:
+        print_resume_hint(job)
+        raise
+
+
+def print_resume_hint(job: Job) -> None:
+    """Print the line that goes on with a run."""
+    if job.again or job.output is not None:
+        line = job.again or f"contactverif {job.command} --resume {shlex.quote(str(job.output))}"
+        typer.echo(f"what was judged is kept; to go on: {line}")
+    else:
+        typer.echo("with --out FILE.nc a run can go on where it was stopped")
+
+
+def print_isolation(provenance: Mapping[str, str]) -> None:
+    """Print in a last line whether plugins were in a box, and how to get one where they were in none.
+
+    Where plugins live in this process, the user has said so.
+    """
+    place = provenance.get("isolation", Isolation.INLINE)
+    if place.startswith(Isolation.BOX):
+        typer.echo(f"The plugins ran in a {place}.")
+    elif place != Isolation.INLINE:
+        typer.echo(f"The plugins ran in a {place} without a box: {why_no_box() or 'as --isolation says'}.")
+
+
+def print_stored(result: Run) -> None:
+    """Print how many outcomes of a run earlier processes had judged."""
+    if stored := result.provenance.get(STORED):
+        typer.echo(f"outcomes that were judged before: {stored}")
+
+
+def _print_remarks(store: Store) -> None:
+    """Name the rows whose stored outcomes do not count."""
+    for remark in store.remarks:
+        _warn(remark)
+    store.remarks.clear()
+
+
+def _warn(words: str) -> None:
+    typer.echo(f"contactverif: {' '.join(words.split())}", err=True)
+
+
+def _judge_last_failed(job: Job) -> int:
+    """Judge what failed in earlier runs, show what became of it, and return 1 if a promise is not kept, else 0."""
+    others = [
+        *(["--out"] if job.files.names and not job.resumes else []),
+        *(["--resume"] if job.resumes else []),
+        *(["a mesh or a scene"] if job.place is not None else []),
+    ]
+    if others:
+        raise MisuseError("--last-failed", f"{' and '.join(others)} beside it", "--last-failed alone")
+    asked, memory = (job.options.names, job.options.properties), FailureMemory()
+    failures = memory.recall(*asked)
+    if not failures:
+        words = f"no failure of {', '.join(map(repr, job.options.names))} in .contactverif"
+        raise MisuseError("--last-failed", words, "a run of `verify` here in which something fails")
+    plugins = job.load()
+    provenance = {"asked": "what failed in earlier runs"}
+    result = run_failures((*plugins.subjects, *plugins.questions), failures, provenance)
+    memory.update(result.rows)
+    print_plugin_output()
+    show(RunScreen(result))
+    left = len(memory.recall(*asked))  # What cannot be judged now is left, too.
+    show(f"{left} of {len(failures)} failures of earlier runs are left.")
+    return 0 if result.promises_kept else 1

@@ -1,0 +1,409 @@
+"""The options of a run, each declared once.
+
+The command line, `[tool.contactverif]` in `pyproject.toml`, the plan of a journal and `contactverif.verify` follow from
+this declaration. Every `--help` imports this file, so nothing at its top takes long to import.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
+
+from contactverif.contract.errors import MisuseError
+from contactverif.run.profiles import Profile, Shrink, profile_named
+
+if TYPE_CHECKING:
+    from contactverif.isolation.limits import Limits
+
+SAMPLING, PLACE, ISOLATION = "sampling", "place", "isolation"
+_FILE = Path("pyproject.toml")
+_TABLE = "tool.contactverif"
+_TRAITS = "traits"  # The loaders of libraries read and check this entry of the table.
+
+
+class Isolation(StrEnum):
+    """The place where plugins live."""
+
+    BOX = "box"
+    LANDLOCK = "landlock"
+    PROCESS = "process"
+    INLINE = "inline"
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """How an option is typed, and what its setting needs. A flag that is typed changes a default of True or False."""
+
+    help: str
+    metavar: str | None = None
+    flags: tuple[str, ...] = ()  # Empty for `--NAME` alone.
+    group: str = ""  # Options that a command takes together.
+    setting: str = ""  # Its name in the table of settings; empty if there is none.
+    needed: str = ""  # What an error says that the setting needs.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """The options of a run, as they are typed or as a journal has them. Those of a journal are settled."""
+
+    # `compare` names its reference first.
+    names: Annotated[
+        tuple[str, ...], Option("Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference.", "NAME")
+    ] = ()
+    engines: Annotated[
+        tuple[str, ...],
+        Option(
+            "A whole contact code, judged by the displacements that it finds. Repeatable.",
+            "NAME[:OPTIONS]",
+            ("--engine",),
+        ),
+    ] = ()
+    every: Annotated[bool, Option("Check every installed formulation that wraps no other.", flags=("--all",))] = False
+    properties: Annotated[
+        tuple[str, ...],
+        Option(
+            "Check only the properties whose id matches. Repeatable.",
+            "GLOB",
+            ("--property", "-p"),
+            setting="properties",
+            needed="a list of patterns",
+        ),
+    ] = ()
+    examples: Annotated[int | None, Option("Number of random cases of each property.", "N", group=SAMPLING)] = None
+    seed: Annotated[int | None, Option("The same seed gives the same cases.", "N", group=SAMPLING)] = None
+    profile: Annotated[
+        str | None,
+        Option(
+            "dev: 100 cases of each property, new ones in every run. ci: 100 cases, always the same. "
+            "nightly: 2000 cases, new ones in every run. (default: dev)",
+            "NAME",
+            group=SAMPLING,
+            setting="profile",
+            needed="the name of a profile",
+        ),
+    ] = None
+    shrink: Annotated[
+        Shrink | None,
+        Option(
+            "The failures whose mesh is made as small as it goes. one: the most telling one of each formulation; new: "
+            "those that neither the formulation nor --known states; the others show a witness, or the first case that "
+            "clearly fails. (default: one)",
+            group=SAMPLING,
+        ),
+    ] = None
+    out: Annotated[
+        tuple[Path, ...],
+        Option(
+            "Write the results: FILE.nc a report, FILE.html a page, FILE.json or FILE.xml (JUnit) for other programs. "
+            "Repeatable.",
+            "FILE",
+        ),
+    ] = ()
+    pictures: Annotated[Path | None, Option("Draw each counterexample into this folder.", "FOLDER")] = None
+    known: Annotated[  # {property: why its failure is known}
+        dict[str, str],
+        Option(
+            "A known failure, with its reason. Repeatable.",
+            "ID=REASON",
+            setting="known",
+            needed="a table of properties and reasons",
+        ),
+    ] = field(default_factory=dict)
+    keep_going: Annotated[
+        bool,
+        Option(
+            "Ask all properties, even if the first show an opposite sign, a crash, a breach of the contract, or "
+            "answers that depend on earlier calls."
+        ),
+    ] = False
+    last_failed: Annotated[
+        bool, Option("Ask nothing but the cases that failed in earlier runs, which `.contactverif` keeps.")
+    ] = False
+    memory: Annotated[
+        bool,
+        Option(
+            "Neither ask first what failed in earlier runs, nor keep what fails now.",
+            flags=("--no-memory",),
+            setting="memory",
+            needed="true or false",
+        ),
+    ] = True
+    mesh: Annotated[
+        Path | None,
+        Option("Check on the interface of this mesh file, and on the bodies of its cells.", "FILE", group=PLACE),
+    ] = None
+    slave: Annotated[str | None, Option("Group of the mesh's slave lines, or faces in space.", "TAG", group=PLACE)] = (
+        None
+    )
+    master: Annotated[
+        str | None, Option("Group of the mesh's master lines, or faces in space.", "TAG", group=PLACE)
+    ] = None
+    flip: Annotated[bool, Option("Exchange inside and outside of the mesh's lines.", group=PLACE)] = False
+    material: Annotated[
+        tuple[str, ...],
+        Option("Material of the body of a group of the mesh. (default: 1,0.3) Repeatable.", "TAG=E,ν", group=PLACE),
+    ] = ()
+    support: Annotated[
+        tuple[str, ...],
+        Option(
+            "Displacement imposed on a group of the mesh, each a number or free. (default: bodies are held far from "
+            "the contact, and the slave is pushed) Repeatable.",
+            "TAG=X,Y",
+            group=PLACE,
+        ),
+    ] = ()
+    scene: Annotated[
+        str | None, Option("Check on this scene: c or c:refine=2,penalty=1e4.", "NAME[:OPTIONS]", group=PLACE)
+    ] = None
+    scene_file: Annotated[
+        str | None,
+        Option(
+            "Check on the scene that this function returns. The file runs in a process of its own.",
+            "FILE.py:FUNCTION",
+            group=PLACE,
+        ),
+    ] = None
+    jobs: Annotated[
+        int | None,
+        Option(
+            "Number of processes that share the work; the results are the same. "
+            "(default: one for each 1000 planned cases, at most one for each core)",
+            "N",
+            ("--jobs", "-j"),
+            setting="jobs",
+            needed="a whole number",
+        ),
+    ] = None
+    isolation: Annotated[
+        Isolation | None,
+        Option(
+            "box: each plugin in a process of its own that can write nothing, and sees no network and no other "
+            "process; the default where the system has boxes. landlock: a process that writes no file, the default "
+            "where it can be had and a box cannot. process: without either. inline: in this process, for debugging.",
+            group=ISOLATION,
+            setting="isolation",
+            needed="box, landlock, process or inline",
+        ),
+    ] = None
+    time_limit: Annotated[
+        float, Option("Longest time of a call in a plugin's process.", "SECONDS", group=ISOLATION)
+    ] = 60.0
+    memory_limit: Annotated[int, Option("Memory that a plugin's process may take.", "MEGABYTES", group=ISOLATION)] = (
+        4096
+    )
+    opened: Annotated[  # None to leave it to the settings
+        tuple[str, ...] | None,
+        Option(
+            "What a plugin in a box may use and write: a file, a folder, a device, or network. Repeatable.",
+            "PATH",
+            ("--open",),
+            ISOLATION,
+            setting="open",
+            needed="a list of paths",
+        ),
+    ] = None
+
+    def with_settings(self) -> RunOptions:
+        """Return the options with those of the project where nothing is typed."""
+        from contactverif.plugins.registry import has_engine, matching_ids, property_ids, unknown_property_error
+
+        settings, nothing = read_settings(), RunOptions()
+        silent = [name for name in _settings().values() if getattr(self, name) == getattr(nothing, name)]
+        options = replace(self, **{name: getattr(settings, name) for name in silent})
+        ids = property_ids(engines=True)
+        for unknown in settings.known.keys() - {*ids}:
+            raise unknown_property_error("known failure", unknown, ids)
+        matching = {*matching_ids(options.properties or ("*",), engines=has_engine(self.names))} - self.known.keys()
+        known = {name: reason for name, reason in settings.known.items() if name in matching}
+        return replace(options, known=self.known | known)
+
+    def settled(self, fresh_seed: int | None = None) -> RunOptions:
+        """Return the options with all that a journal must know: ids for patterns, numbers of the profile, the place.
+
+        Where nothing says the seed it is the fresh one, or a new one. Options that are obeyed before are not kept.
+        """
+        from contactverif.plugins.registry import has_engine, matching_ids
+
+        size = profile_named(self.profile or "dev").resolve(examples=self.examples, seed=self.seed, fresh=fresh_seed)
+        isolation, opened = self.settled_isolation()
+        return replace(
+            self,
+            engines=(),
+            every=False,
+            memory=True,
+            last_failed=False,
+            properties=matching_ids(self.properties or ("*",), engines=has_engine(self.names)),
+            profile=size.name,
+            examples=size.examples,
+            seed=size.seed,
+            isolation=isolation,
+            opened=opened,
+        )
+
+    @property
+    def size(self) -> Profile:
+        """The profile of settled options, with their number of cases and their seed."""
+        assert self.profile is not None
+        assert self.examples is not None
+        return Profile(self.profile, self.examples, self.seed)
+
+    def settled_isolation(self, argument: str = "--isolation") -> tuple[Isolation, tuple[str, ...]]:
+        """Return the place of plugins and what is open to them, as the user, the project or the system says.
+
+        Without a choice of the user a plugin is in a box, or else has rules of Landlock, or else neither. Under pytest
+        it is in this process, where a test may want to look into it. `argument` is the name of the choice in an error.
+        """
+        settings = read_settings()
+        opened = _absolute((settings.opened or ()) if self.opened is None else self.opened)
+        place = self.isolation or settings.isolation
+        if place is None and "PYTEST_CURRENT_TEST" in os.environ:
+            place = Isolation.INLINE
+        if place not in (Isolation.PROCESS, Isolation.INLINE):
+            place = _strongest(place, opened, argument)
+        return place, opened
+
+    def limits(self, hidden: Iterable[Path] = (), argument: str = "--isolation") -> Limits | None:
+        """Return the limits of a plugin's process, and its box, in which some paths are not there.
+
+        None if plugins live in this process.
+        """
+        place, opened = self.settled_isolation(argument)
+        if place is Isolation.INLINE:
+            return None
+        from contactverif.isolation.box import Box
+        from contactverif.isolation.limits import Limits
+        from contactverif.isolation.process import adopt_orphans
+
+        adopt_orphans()
+        box = Box(opened, tuple(map(str, hidden)), by_rules=place is Isolation.LANDLOCK)
+        return Limits(self.time_limit, self.memory_limit, None if place is Isolation.PROCESS else box)
+
+    @property
+    def place_words(self) -> str:
+        """The options that say where a run asks, as they are typed; empty if it is on random interfaces and scenes."""
+        words = []
+        for name in group_names(PLACE):
+            value, flag = getattr(self, name), f"--{name.replace('_', '-')}"
+            values = value if isinstance(value, tuple) else [value] if value else []
+            words += [flag if entry is True else f"{flag} {entry}" for entry in values]
+        return " ".join(words)
+
+    def from_folder(self, folder: str) -> RunOptions:
+        """Return the options of a run in a folder, with names of files as they are from here."""
+        if os.getcwd() == folder:
+            return self
+        base = Path(folder)
+        return replace(
+            self,
+            out=tuple(base / path for path in self.out),
+            pictures=self.pictures and base / self.pictures,
+            mesh=self.mesh and base / self.mesh,
+            scene_file=self.scene_file and str(base / self.scene_file),
+        )
+
+    def to_builtins(self) -> dict[str, Any]:
+        """Return the options as the plan of a journal has them."""
+        import msgspec
+
+        plain: dict[str, Any] = msgspec.to_builtins(self, enc_hook=str)
+        return plain
+
+    @classmethod
+    def from_builtins(cls, plain: dict[str, Any]) -> RunOptions:
+        """Return the options of a plan; others are a `ValueError` or a `TypeError`."""
+        import msgspec
+
+        return msgspec.convert(plain, cls, dec_hook=_to_path)
+
+
+@cache
+def declared_options(group: type) -> dict[str, tuple[Any, Option]]:
+    """Return {name of a field: its type and its declaration} of a dataclass whose fields are options."""
+    hints = get_type_hints(group, include_extras=True)
+    return {name: (get_args(hint)[0], get_args(hint)[1]) for name, hint in hints.items()}
+
+
+def group_names(name: str) -> list[str]:
+    """Return the options of a group of `RunOptions`, or the one option of this name."""
+    return [each for each, (_, option) in declared_options(RunOptions).items() if name in (option.group, each)]
+
+
+@cache
+def _settings() -> dict[str, str]:
+    """Return {name of a setting: field of `RunOptions`}."""
+    return {option.setting: name for name, (_, option) in declared_options(RunOptions).items() if option.setting}
+
+
+def read_settings() -> RunOptions:
+    """Read the settings of the project in the working folder; without such a table all is left to the command line."""
+    try:
+        file: Any = tomllib.loads(_FILE.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return RunOptions()
+    except (OSError, ValueError) as error:
+        raise MisuseError(f"{_FILE}", " ".join(str(error).split()), "a file of settings that can be read") from None
+    table = file.get("tool", {}).get("contactverif", {})
+    if not isinstance(table, dict):
+        raise MisuseError(f"{_TABLE} of {_FILE}", repr(table), f"a table [{_TABLE}]")
+    return RunOptions(**_convert(table)) if table else RunOptions()
+
+
+def _convert(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields that a table of settings gives, each of the right kind."""
+    import msgspec
+
+    from contactverif.contract.names import unknown_name_error
+
+    options, values = declared_options(RunOptions), {}
+    for name in table:
+        if name not in (*_settings(), _TRAITS):
+            raise unknown_name_error(f"[{_TABLE}] of {_FILE}", name, (*_settings(), _TRAITS))
+    for name, value in table.items():
+        kind, option = (dict[str, dict[str, Any]], None) if name == _TRAITS else options[_settings()[name]]
+        try:
+            converted = msgspec.convert(value, kind)
+        except msgspec.ValidationError:
+            needed = option.needed if option else "a table of libraries and their traits"
+            raise MisuseError(f"{name} in [{_TABLE}] of {_FILE}", repr(value), needed) from None
+        if option:
+            values[_settings()[name]] = converted
+    return values
+
+
+def _to_path(kind: type, value: Any) -> Any:
+    if kind is Path and isinstance(value, str):
+        return Path(value)
+    raise TypeError(f"{kind.__name__} expected")
+
+
+def _strongest(wanted: Isolation | None, opened: tuple[str, ...], argument: str) -> Isolation:
+    """Return the place that the user wants, which must be possible, or else the safest that is."""
+    from contactverif.isolation.box import Box, why_no_box
+    from contactverif.isolation.confine import landlock_version
+
+    reason = "" if wanted is Isolation.LANDLOCK else why_no_box(Box(opened))
+    if reason and wanted is Isolation.BOX:
+        raise MisuseError(argument, f"box, but {reason}", "a system that has boxes, or process")
+    if wanted is Isolation.LANDLOCK and not landlock_version():
+        needed = "Linux with Landlock and the package landlockpy, or process"
+        raise MisuseError(argument, "landlock, which this system has not", needed)
+    if wanted is None and reason:
+        return Isolation.LANDLOCK if landlock_version() else Isolation.PROCESS
+    return wanted or Isolation.BOX
+
+
+def _absolute(opened: Iterable[str]) -> tuple[str, ...]:
+    """Return what is open by absolute paths, each of which must exist."""
+    from contactverif.isolation.confine import NETWORK
+
+    paths = tuple(path if path == NETWORK else os.path.abspath(path) for path in opened)
+    for path in paths:
+        if path != NETWORK and not os.path.exists(path):
+            raise MisuseError("--open", f"{path}, which does not exist", f"a path that exists, or {NETWORK}")
+    return paths
