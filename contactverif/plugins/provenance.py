@@ -19,8 +19,6 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 from contactverif.contract.engine_subject import ENGINE
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import parse_name
 from contactverif.plugins.registry import (
     ENGINE_PROPERTIES,
     ENGINES,
@@ -120,7 +118,7 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     """
     named = {
         FORMULATIONS: {name for text in formulations for name in names_within(text)},
-        ENGINES: {_plugin_name(text.removeprefix(ENGINE)) for text in formulations},
+        ENGINES: {text.removeprefix(ENGINE).partition(":")[0] for text in formulations},
         PROPERTIES: set(properties),
         ENGINE_PROPERTIES: set(properties),
     }
@@ -128,20 +126,9 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     for group, names in named.items():
         modules |= {entry.module for entry in metadata.entry_points(group=group) if entry.name in names}
     packages = sorted({module.partition(".")[0] for module in modules})
-    return {f"{CODE}{package}": _digest(_files_of(package)) for package in packages} | _library_digests(formulations)
-
-
-def _library_digests(formulations: Sequence[str]) -> dict[str, str]:
-    """Return the digests of the files that the names of formulations load."""
-    files = sorted({path for text in formulations for path in files_within(text)})
-    return {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
-
-
-def _plugin_name(text: str) -> str:
-    try:
-        return parse_name("formulation", text, "")[0]
-    except MisuseError:  # The registry will say what is wrong.
-        return text
+    files = sorted({path for text in formulations for path in files_within(text)})  # Those that formulations load.
+    digests = {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}
+    return digests | {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
 
 
 def _files_of(package: str) -> list[tuple[str, Path]]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import repeat
 from time import perf_counter
 
 from contactverif.contract.case import Case
@@ -14,7 +13,7 @@ from contactverif.contract.property import Outcome, Property, PropertyInfo, judg
 from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.plugins.provenance import code_digests, collect_versions, machine
-from contactverif.run.recheck import Recheck, Sample, choose_share, draw_again, judge_again
+from contactverif.run.recheck import Recheck, Sample, choose_share, draw_planned, judge_again
 from contactverif.run.rows import OpenRow, find_missing_row, open_row, verdict_of_row
 from contactverif.run.run import Driver
 from contactverif.run.scheduler import Scheduler
@@ -25,29 +24,14 @@ from contactverif.sampling.draw import Sampling
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Audit:
-    """The result of an audit.
+    """The result of an audit."""
 
-    Attributes
-    ----------
-    derived : Run
-        The run as it follows from the stored numbers and from what the formulations state today.
-    changes : tuple[str, ...]
-        The versions, digests of code and parts of the machine that are others than those of the run.
-    differences : tuple[str, ...]
-        What disagrees with the stored run, a line each.
-    n_outcomes, n_judged, n_examples : int
-        The numbers of stored outcomes, of those that were judged again, and of witnesses and counterexamples, which all
-        were.
-    seconds : float
-        The time of the audit.
-    """
-
-    derived: Run
-    changes: tuple[str, ...]
-    differences: tuple[str, ...]
-    n_outcomes: int
+    derived: Run  # The run as it follows from the stored numbers and from what the formulations state today.
+    changes: tuple[str, ...]  # Versions, digests of code and parts of the machine that are others than in the run.
+    differences: tuple[str, ...]  # What disagrees with the stored run, a line each.
+    n_outcomes: int  # The number of stored outcomes, and of those that were judged again.
     n_judged: int
-    n_examples: int
+    n_examples: int  # The number of witnesses and counterexamples, all of which were judged again.
     seconds: float
 
     def chance(self, n_forged: int) -> float:
@@ -63,26 +47,12 @@ def audit(
 ) -> Audit:
     """Derive all verdicts of a stored run again, and judge a share of each row and all counterexamples again.
 
-    Parameters
-    ----------
-    run : Run
-        The run, as a report has it.
-    subjects, questions : Sequence[Subject] or Sequence[Property]
-        The formulations and the properties of its rows.
-    sampling : Sampling
-        The size and the seed of the run, and the place where it asked.
-    share : float
-        The share of the cases of each row that is judged again.
-
-    Returns
-    -------
-    Audit
-        What differs, and how much was judged again.
+    The formulations and the properties are those of its rows, and the sampling has its size, its seed and its place.
     """
     start = perf_counter()
     changes = find_changes(run)
     rows = _open_rows(run, subjects, questions, sampling)
-    derived = list(map(_derive, run.rows, rows, repeat(sampling)))
+    derived = [_derive(row, opened, sampling) for row, opened in zip(run.rows, rows, strict=True)]
     stored = [(row, opened) for row, opened in zip(derived, rows, strict=True) if isinstance(opened, OpenRow)]
     samples = [_sample(row, opened, share) for row, opened in stored]
     scheduler = Scheduler()
@@ -90,14 +60,15 @@ def audit(
     driver.call_first()
     recheck = Recheck(samples, sampling, exact=not changes)
     scheduler.work(recheck)
-    examples = counterexamples(run)
+    examples = list(counterexamples(run).values())
+    opened_of = dict(zip(run.rows, rows, strict=True))
     differences = [
         find_missing_row(run, [subject.name for subject in subjects], [question.id for question in questions]),
-        *map(_other_property, run.rows, rows, repeat(bool(changes))),
+        *(_other_property(row, opened, bool(changes)) for row, opened in zip(run.rows, rows, strict=True)),
         *(_missing(row, opened, sampling) for row, opened in stored),
         *map(str, recheck.differences),
-        *map(_judge_example, examples.values(), repeat(subjects), repeat(questions), repeat(not changes)),
-        *([] if changes else map(_other_case, examples.values(), repeat(dict(zip(run.rows, rows, strict=True))))),
+        *(_judge_example(example, subjects, questions, not changes) for example in examples),
+        *(_other_case(example, opened_of[example.row]) for example in examples if not changes),
     ]
     n_witnesses = sum(WITNESS in sample.outcomes for sample in samples)
     return Audit(
@@ -140,19 +111,21 @@ def _open_rows(
     """Return the rows as a run of today would begin them."""
     subject_of = {subject.name: subject for subject in subjects}
     question_of = {question.id: question for question in questions}
-    pairs = [(question_of[row.property_id], subject_of[row.formulation]) for row in run.rows]
-    variants = [question.for_traits(subject.traits) for question, subject in pairs]
-    source_of = {question: sampling.source(question) for question in dict.fromkeys(variants)}
+    triples = [
+        (row, subject_of[row.formulation], question_of[row.property_id].for_traits(subject_of[row.formulation].traits))
+        for row in run.rows
+    ]
+    source_of = {question: sampling.source(question) for question in dict.fromkeys(triple[2] for triple in triples)}
     return [
         open_row(
-            subject_of[row.formulation],
+            subject,
             question,
             source_of[question],
             row.known,
             sampling,
             row.reason.removeprefix(OMITTED) if row.omitted else "",
         )
-        for row, question in zip(run.rows, variants, strict=True)
+        for row, subject, question in triples
     ]
 
 
@@ -184,8 +157,7 @@ def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str
     """Return in what a stored property is not that of today; its words may change with the version."""
     info = (opened if isinstance(opened, Row) else opened.row).info
     judged = ("id", "needs", "least_contact", "usual_undecided", "quantities")
-    names = judged if other_version else tuple(part.name for part in fields(PropertyInfo))
-    for name in names:
+    for name in judged if other_version else tuple(part.name for part in fields(PropertyInfo)):
         stored, today = getattr(row.info, name), getattr(info, name)
         if name == "quantities" and other_version:
             stored, today = ([(each.name, each.unit, each.sense) for each in every] for every in (stored, today))
@@ -196,14 +168,12 @@ def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str
 
 def _missing(row: Row, opened: OpenRow, sampling: Sampling) -> str:
     """Return what a row lacks; no more than one block of cases is drawn for it."""
-    count, name = len(row.outcomes), f"{row.formulation} {row.property_id}"
-    if opened.listed is not None:
-        planned = len(opened.listed)
-    elif count == sampling.examples:
+    planned, count, name = len(opened.listed or ()), len(row.outcomes), f"{row.formulation} {row.property_id}"
+    if opened.listed is None:
         planned = count
-    else:
-        question, number = opened.question, count // draw.BLOCK
-        planned = number * draw.BLOCK + len(draw_again(sampling, question, number).cases)
+        if count != sampling.examples:
+            number = count // draw.BLOCK
+            planned = number * draw.BLOCK + len(draw_planned(sampling, opened.question, number).cases)
     if count != planned or not count:
         return f"{name}: outcomes of {count} cases, and the run has {'more' if planned > count else planned}"
     lacks_witness = opened.witness is not None and row.witness is None
@@ -222,15 +192,14 @@ def _judge_example(
     return f"{example.id}: {words}" if words else ""
 
 
-def _other_case(example: Counterexample, rows: Mapping[Row, OpenRow | Row]) -> str:
+def _other_case(example: Counterexample, opened: OpenRow | Row) -> str:
     """Return whether a stored case with a name is another one than that of today, which measures what it measured."""
-    opened, case = rows[example.row], example.case
     if not isinstance(opened, OpenRow):
         return ""
     named = [opened.witness] if example.origin is Origin.WITNESS else list(opened.listed or ())
-    today = next((each for each in named if each is not None and each.name == case.name), None)
-    same = today is None or _bytes_of(case) == _bytes_of(today)
-    return "" if same else f"{example.id}: its mesh is not that of {case.name} today"
+    today = next((each for each in named if each is not None and each.name == example.case.name), None)
+    same = today is None or _bytes_of(example.case) == _bytes_of(today)
+    return "" if same else f"{example.id}: its mesh is not that of {example.case.name} today"
 
 
 def _bytes_of(case: Case) -> dict[str, tuple[str, bytes]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -45,22 +46,16 @@ class FailureMemory:
         return {key: case for key, case in cases.items() if case is not None}
 
     def update(self, rows: Iterable[Row]) -> None:
-        """Remember what failed, and forget what passes; what was not judged stays as it is.
-
-        A folder in which nothing can be written remembers nothing.
-        """
-        try:
+        """Remember what failed, and forget what passes; what was not judged stays as it is."""
+        with suppress(OSError):  # A folder in which nothing can be written remembers nothing.
             for row in rows:
-                self._update(row)
-        except OSError:
-            return
-
-    def _update(self, row: Row) -> None:
-        path = self._path(row.formulation, row.property_id)
-        if row.result is Result.FAILS_AS_STATED or row.verdict in _SETTLED:
-            path.unlink(missing_ok=True)
-        elif row.verdict in _FAILED and not is_remembered(row) and (example := counterexample_of(row)) is not None:
-            self._write(path, example.case, _owner(row.formulation, row.property_id))
+                path = self._path(row.formulation, row.property_id)
+                if row.result is Result.FAILS_AS_STATED or row.verdict in _SETTLED:
+                    path.unlink(missing_ok=True)
+                remembered = row.promise is not False and row.witness is not None  # Its case fails again.
+                example = counterexample_of(row) if row.verdict in _FAILED and not remembered else None
+                if example is not None:
+                    self._write(path, example.case, _owner(row.formulation, row.property_id))
 
     def _path(self, formulation: str, property_id: str) -> Path:
         return self._folder / "failures" / f"{typeable(f'{formulation}.{property_id}')}.npz"
@@ -91,11 +86,6 @@ class FailureMemory:
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
-
-
-def is_remembered(row: Row) -> bool:
-    """Return whether the witness of a row is a failure of an earlier run, and fails again."""
-    return row.promise is not False and row.witness is not None
 
 
 @cache

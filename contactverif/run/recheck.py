@@ -6,10 +6,10 @@ seed of the run, so that it cannot be known beforehand.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby, product
+from itertools import chain, groupby, product
 from math import ceil, isfinite
 from random import SystemRandom
 from typing import NamedTuple
@@ -45,12 +45,12 @@ class Difference(NamedTuple):
     words: str
 
     def __str__(self) -> str:
-        return f"{self.formulation} {self.property_id}: {self.case}: {self.words}"
+        return f"{self.formulation} {self.property_id}: {self.in_words}"
 
     @property
-    def case(self) -> str:
-        """The case in words."""
-        return "the witness" if self.number == WITNESS else f"case {self.number}"
+    def in_words(self) -> str:
+        """The case and how it differs."""
+        return f"{'the witness' if self.number == WITNESS else f'case {self.number}'}: {self.words}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +70,9 @@ class Sample:
         cases = {number: named[number] for number in outcomes if number in named}
         return cls(row.subject, row.question, outcomes, cases, row.listed is None)
 
-    @property
-    def key(self) -> tuple[str, str]:
-        """The names of formulation and property."""
-        return self.subject.name, self.question.id
+    def keys(self, numbers: Iterable[int]) -> list[tuple[str, str, int]]:
+        """Return formulation, property and number of some cases."""
+        return [(self.subject.name, self.question.id, number) for number in numbers]
 
     @property
     def missing(self) -> set[int]:
@@ -95,7 +94,7 @@ class Recheck:
     @property
     def differences(self) -> list[Difference]:
         """The outcomes that differ; an outcome of a case that the run does not have is one of them."""
-        keys = [(*sample.key, number) for sample in self._samples for number in sorted(sample.outcomes)]
+        keys = chain.from_iterable(sample.keys(sorted(sample.outcomes)) for sample in self._samples)
         return [Difference(*key, words) for key in keys if (words := self._words.get(key, _NO_CASE))]
 
     def __iter__(self) -> Iterator[Job]:
@@ -108,7 +107,7 @@ class Recheck:
             yield self._draw(group, 0)
 
     def _draw(self, group: Sequence[Sample], number: int) -> Job:
-        return Job(draw_again, (self._sampling, group[0].question, number), partial(self._add_drawn, group, number))
+        return Job(draw_planned, (self._sampling, group[0].question, number), partial(self._add_drawn, group, number))
 
     def _add_drawn(self, group: Sequence[Sample], number: int, block: PlannedCases) -> Iterator[Job]:
         """Yield the jobs to judge cases of a block, and to draw all other blocks behind the first."""
@@ -131,7 +130,7 @@ class Recheck:
 
     def _add_judged(self, sample: Sample, numbers: Sequence[int], words: Sequence[str]) -> Iterable[Job]:
         self.n_judged += len(numbers)
-        self._words |= {(*sample.key, number): text for number, text in zip(numbers, words, strict=True)}
+        self._words |= dict(zip(sample.keys(numbers), words, strict=True))
         return ()
 
 
@@ -159,18 +158,17 @@ def recheck_store(
         first, *others = differences
         count, n_again = counts[formulation, property_id]
         store.n_rechecked += count - n_again
-        remark = (
-            f"{formulation} {property_id}: {1 + len(others)} of {n_again} stored outcomes that were judged again differ"
-        )
-        words = f"{first.case}: {first.words}; all {count} are judged again"
-        store.reject(formulation, property_id, f"{remark}, {words}")
+        words = f"{1 + len(others)} of {n_again} stored outcomes that were judged again differ, {first.in_words}"
+        store.reject(formulation, property_id, f"{formulation} {property_id}: {words}; all {count} are judged again")
 
 
-def draw_again(sampling: Sampling, question: Property, number: int) -> PlannedCases:
-    """Draw a block of the cases of a property."""
-    source = sampling.source(question)
+def draw_planned(
+    sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
+) -> PlannedCases:
+    """Draw a block of the cases of a property, and of all properties with the same strategy."""
+    source, seed = sampling.source(question), sampling.key(question)
     assert source is not None
-    return draw.draw_block(source, seed=sampling.key(question), examples=sampling.examples, number=number)
+    return draw.draw_block(source, seed=seed, examples=sampling.examples, number=number, progress=count)
 
 
 def judge_again(

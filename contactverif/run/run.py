@@ -12,12 +12,12 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain, islice, product
 from operator import attrgetter
 from time import perf_counter
-from typing import TypeVar, get_args
+from typing import NamedTuple, TypeVar, get_args
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
@@ -35,7 +35,7 @@ from contactverif.run import judge
 from contactverif.run.failure_memory import Failures
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.ranking import first_failure, wrong_rows
-from contactverif.run.recheck import recheck_store
+from contactverif.run.recheck import draw_planned, recheck_store
 from contactverif.run.rows import (
     WHOLE,
     JudgedCases,
@@ -81,18 +81,14 @@ def run(
     store: Store | None = None,
     keep_going: bool = True,
 ) -> Run:
-    """Check every property of every formulation.
+    """Check every property of every formulation, and return a row for each of both.
 
     Parameters
     ----------
-    subjects : Sequence[Subject | NotLoaded]
-        The formulations, as the registry loads them. One that did not load is reported and fails the run.
-    properties : Sequence[Property | NotLoaded]
-        The properties, likewise.
-    profile : Profile | str
-        The numbers of cases and the seed.
-    examples, seed : int | None
-        Numbers that overrule those of the profile.
+    subjects, properties : Sequence
+        As the registry loads them. One that did not load is reported and fails the run.
+    profile, examples, seed : Profile | str, int | None
+        The numbers of cases and the seed, and numbers that overrule those of the profile.
     place : Interface | Case | None
         Check everything on this interface, with random states, instead of on random interfaces. Of a scene, check what
         needs bodies on it alone, and all else on its interface; a pass there breaks no statement that the formulation
@@ -105,22 +101,16 @@ def run(
         case that clearly fails.
     progress : Callable[[Progress], None] | None
         A function that is called after every case; with an executor, after every job. It gets each row as soon as
-        its cases are judged, those of cheap properties first.
+        its cases are judged.
     executor : Executor | None
-        Worker processes that do the jobs of the run, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky
-        or ``dask.distributed.Client().get_executor()``. The results are the same but for the seconds. By default this
-        process does all.
+        Worker processes that do the jobs, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky or
+        ``dask.distributed.Client().get_executor()``; None for this process. The results are the same but for seconds.
     store : Store | None
         The store into which every outcome is written, and whose outcomes are not judged again.
     keep_going : bool
         Ask all properties of a formulation, whatever the first of them show. Else a formulation is asked nothing more
         once its forces have the opposite sign, or it crashes, breaks the contract or is impure in the cases of
         `purity`.
-
-    Returns
-    -------
-    Run
-        A row for each formulation and property.
 
     Raises
     ------
@@ -379,7 +369,7 @@ class Driver:
             return
         if (listed := rows[0].listed) is not None:
             for row in rows:
-                chunks = in_chunks(listed, LIST_CHUNK)
+                chunks = _in_chunks(listed, LIST_CHUNK)
                 if self._share is None:
                     yield self._expect(row, chunks, len(listed), last=True)
                 yield from (self._judge(row, chunk) for chunk in chunks)
@@ -595,8 +585,7 @@ def _check_once(argument: str, names: Iterable[str]) -> None:
             raise MisuseError(argument, f"{name} {times} times", "each of them once")
 
 
-@dataclass(frozen=True, slots=True)
-class DrawnCases:
+class DrawnCases(NamedTuple):
     """A block of the cases of a strategy, in order."""
 
     chunks: tuple[CaseChunk, ...]
@@ -607,14 +596,12 @@ class DrawnCases:
 def draw_chunks(
     sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
 ) -> DrawnCases:
-    """Draw a block of the cases of a property, and of all properties with the same strategy."""
-    source, seed = sampling.source(question), sampling.key(question)
-    assert source is not None
-    block = draw.draw_block(source, seed=seed, examples=sampling.examples, number=number, progress=count)
-    return DrawnCases(in_chunks(block.cases, CHUNK, number * BLOCK), block.exhausted, block.last)
+    """Draw a block of the cases of a property in chunks: so they travel between processes."""
+    block = draw_planned(sampling, question, number, count)
+    return DrawnCases(_in_chunks(block.cases, CHUNK, number * BLOCK), block.exhausted, block.last)
 
 
-def in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
+def _in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
     """Return cases, of which the first has a number in its row, in chunks of a size."""
     return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
 
