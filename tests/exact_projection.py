@@ -13,7 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
-from contactverif.oracle.exact_distance import Point, Reach, integers, nearest_of, reach
+from contactverif.oracle.nearest import Point, Reach, integers, nearest_of, reach
 
 
 def subtract(a: Point, b: Point) -> Point:

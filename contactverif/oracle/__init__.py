@@ -4,19 +4,17 @@ Rule for the next editor: the judge shares no code with the judged. No plugin us
 the compiled geometry of plugins. Where it is affordable, the arithmetic is rational and thus exact.
 """
 
-from contactverif.oracle.exact_nearest import Nearest, NearSegment, nearest_segments
 from contactverif.oracle.flat_answers import (
     is_of_class,
     nodal_spring_weights,
+    nodal_surface_weights,
     uniform_pressure_weights,
     uniform_pressure_weights_exact,
-)
-from contactverif.oracle.flat_surfaces import (
-    nodal_surface_weights,
     uniform_surface_weights,
     uniform_surface_weights_exact,
 )
 from contactverif.oracle.kink_distance import default_points, kink_margin
+from contactverif.oracle.nearest import Nearest, NearSegment, nearest_segments
 from contactverif.oracle.projection_kinds import is_of_kind, kind_of
 
 __all__ = [

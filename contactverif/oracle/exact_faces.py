@@ -17,9 +17,9 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.faces import measure_heights
 from contactverif.contract.interface import Interface
-from contactverif.oracle.exact_distance import integers
 from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Ratios, roots
-from contactverif.oracle.flat_surfaces import area_of, cut_polygon
+from contactverif.oracle.flat_answers import area_of, cut_polygon
+from contactverif.oracle.nearest import integers
 
 _UNIT_TRIANGLE = [(Fraction(0), Fraction(0)), (Fraction(1), Fraction(0)), (Fraction(0), Fraction(1))]
 

@@ -1,26 +1,24 @@
-"""Points of slave segments in exact arithmetic, and what they see of a master segment by two rules.
+"""Points of slave segments in exact arithmetic: what they see of the master, and whether a choice of segment is right.
 
 All numbers are integers: the nodes stand on a lattice of one power of two, and a point is (X, Y)/W on it. A length
-needs a root, which is taken to 2^-128 of the lattice; that is the only rounding. So an error of a float is exact to
-far below its own last bit.
-
-Rule for the next editor: a point is formed from the stored nodes and its c. The position that a formulation reports is
-rounded, and nothing here reads it.
+needs a root, which is taken to 2^-128 of the lattice; that is the only rounding. A point is formed from the stored
+nodes and its c, never from the position that a formulation reports.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import isqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.oracle.exact_distance import integers
+from contactverif.oracle.nearest import Reach, integers, nearest_of, reach
 
 Integers = NDArray[Any]  # An array of Python integers of any size.
 
@@ -204,3 +202,166 @@ def _error(value: float, above: int, below: int) -> float:
         return np.nan
     numerator, denominator = value.as_integer_ratio()
     return (numerator * below - above * denominator) / (denominator * below)
+
+
+_SAFE = 2.0**-20  # Floats err by less than this share of a distance, wherever a state makes sense.
+DEEP = 2.0  # Segments that penetrate by more than this many lengths of both need not be in contact.
+
+
+def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return how much farther than the nearest closed segment the chosen ones are, and how many are nearest.
+
+    Both are (n_points,): a length ≥ 0, and the exact number of segments at the least distance. `segments` (n_points,)
+    are the master segments that were chosen.
+    """
+    point, candidate = _near_pairs(lattice, points, segments)
+    nodes, master = [tuple(node) for node in lattice.nodes.tolist()], lattice.master.tolist()
+    places, weights = [tuple(place) for place in points.place.tolist()], points.weight.tolist()
+    reaches: list[dict[int, Reach]] = [{} for _ in places]
+    for number, segment in zip(point.tolist(), candidate.tolist(), strict=True):
+        first, second = master[segment]
+        reaches[number][segment] = reach(segment, nodes[first], nodes[second], places[number], weights[number])
+    excess, ties = np.empty(len(segments)), np.empty(len(segments), dtype=np.int64)
+    for number, (choice, others) in enumerate(zip(segments.tolist(), reaches, strict=True)):
+        near = nearest_of(others.values())
+        excess[number] = _farther(others[choice], near[0], weights[number] * lattice.scale)
+        ties[number] = len(near)
+    return excess, ties
+
+
+def _farther(choice: Reach, nearest: Reach, unit: int) -> float:
+    """Return how much farther one segment is than another, a length ≥ 0; squared distances still carry unit²."""
+    a, b, c, d = choice.above, choice.squared, nearest.above, nearest.squared
+    if a * d <= c * b:
+        return 0.0
+    total = np.sqrt(a / (b * unit**2)) + np.sqrt(c / (d * unit**2))
+    return float((a * d - c * b) / (b * d * unit**2) / total)
+
+
+def _near_pairs(lattice: Lattice, points: ExactPoints, choice: IntArray) -> tuple[IntArray, IntArray]:
+    """Return points and master segments, sorted by point: all that may be the nearest, and the choice."""
+    nodes = Ratios(lattice.nodes, np.array(lattice.scale, dtype=object)).floats()
+    place = positions(lattice, points).floats()
+    first, second = nodes[lattice.master[:, 0]], nodes[lattice.master[:, 1]]
+    along = second - first
+    share = ((place[:, None] - first) * along).sum(axis=-1) / (along**2).sum(axis=-1)
+    foot = first + np.clip(share, 0, 1)[..., None] * along
+    distance = np.hypot(*np.moveaxis(place[:, None] - foot, -1, 0))
+    doubt = 64 * UNIT_ROUNDOFF * np.abs(nodes).max()
+    near = distance <= distance.min(axis=1, keepdims=True) * (1 + _SAFE) + doubt
+    near[np.arange(len(choice)), choice] = True
+    point, candidate = np.nonzero(near)
+    return point, candidate
+
+
+def seen_excess(
+    lattice: Lattice, points: ExactPoints, slave_segment: IntArray, segments: IntArray, cells: bool
+) -> FloatArray:
+    """Return how far the chosen segments are from being the nearest that the slave sees along its normal.
+
+    That is a length ≥ 0 (n_points,): how much farther the chosen segment is than the nearest, or how far the foot lies
+    past its end; infinite where it does not face the slave. With `cells` the choice may also be made in the middle of
+    the overlap of the two segments, once for all points of a cell.
+    """
+    view = slave_normal_view(lattice, points, segments)
+    past = np.maximum(np.maximum(-view.xi.floats(), view.xi.floats() - 1), 0.0) * view.master_length
+    farther = _farther_than_nearest(lattice, points, segments, view)
+    if cells and farther.any():
+        middle = _middles(lattice, slave_segment, segments)
+        in_middle = slave_normal_view(lattice, middle, segments)
+        farther = np.minimum(farther, _farther_than_nearest(lattice, middle, segments, in_middle))
+    return np.where(view.cosine > 0, np.maximum(past, farther), np.inf)
+
+
+def _farther_than_nearest(lattice: Lattice, points: ExactPoints, choice: IntArray, view: View) -> FloatArray:
+    """Return how much larger |gap| is on the chosen segments than on the nearest ones that are seen, a length ≥ 0.
+
+    Segments deeper or farther than two lengths of both need not count as contact, and so are no rivals.
+    """
+    n_master = len(lattice.master)
+    point, candidate = np.divmod(np.arange(len(choice) * n_master), n_master)
+    other = slave_normal_view(lattice, points.select(point), candidate)
+    xi, gap = other.xi.floats(), np.abs(other.gap.floats())
+    near = gap <= DEEP * (other.slave_length + other.master_length)
+    rival = (other.cosine > 0) & (xi > 0) & (xi < 1) & near
+    gaps = np.where(rival, gap, np.inf).reshape(len(choice), n_master).min(axis=1, initial=np.inf)
+    farther: FloatArray = np.maximum(np.abs(view.gap.floats()) - gaps, 0.0)
+    return farther
+
+
+def _middles(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> ExactPoints:
+    """Return the points in the middle of the overlaps of slave and master segments, seen along the slave's normal."""
+    low, high, squared = overlaps(lattice, slave_segment, segments)
+    return ExactPoints.at_ratios(lattice, slave_segment, low + high, 2 * squared)
+
+
+def overlaps(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> tuple[Integers, Integers, Integers]:
+    """Return the overlaps of slave segments with master segments that face them, seen along the slave's normal.
+
+    They are low, high and `squared` (n_pairs,): the ends c on the slave segment times `squared`, cut to the segment,
+    with high ≤ low where there is none; and the square of the slave segment's length on the lattice.
+    """
+    x_a, x_b = (lattice.nodes[lattice.slave[slave_segment, end]] for end in (0, 1))
+    x_1, x_2 = (lattice.nodes[lattice.master[segments, end]] for end in (0, 1))
+    along = x_b - x_a
+    squared = (along**2).sum(axis=1)
+    low, high = (((2 * end - x_a - x_b) * along).sum(axis=1) for end in (x_2, x_1))
+    return np.maximum(low, -squared), np.minimum(high, squared), squared
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """The part of each slave segment that sees the master along the slave's normal."""
+
+    share: Ratios  # (n_slave_segments,) The covered share of the segment's length, from 0 to 1 where it is clear.
+    # (n_slave_segments,) False where formulations may differ: master segments lie behind one another, or deeper or
+    # farther than two lengths of both.
+    clear: BoolArray
+
+    @classmethod
+    def along_slave_normals(cls, lattice: Lattice) -> Coverage:
+        """Return the coverage of a state by all master segments that face the slave."""
+        n_slave, n_master = len(lattice.slave), len(lattice.master)
+        carrier, segment = np.divmod(np.arange(n_slave * n_master), n_master)
+        low, high, squared = overlaps(lattice, carrier, segment)
+        pairs = np.flatnonzero(high > low)
+        carrier, segment, low, high = carrier[pairs], segment[pairs], low[pairs], high[pairs]
+        middle = ExactPoints.at_ratios(lattice, carrier, low + high, 2 * squared[pairs])
+        view = slave_normal_view(lattice, middle, segment)
+        facing = view.cosine > 0
+        deep = facing & (np.abs(view.gap.floats()) > DEEP * (view.slave_length + view.master_length))
+        above, below, clear = np.zeros(n_slave, dtype=object), np.ones(n_slave, dtype=object), np.ones(n_slave, bool)
+        clear[carrier[deep]] = False
+        for number in np.unique(carrier[facing]).tolist():
+            here = np.flatnonzero(facing & (carrier == number))
+            above[number], below[number] = sum((high - low)[here].tolist()), 2 * squared[pairs][here[0]]
+            clear[number] &= not _overlap(low[here], high[here])
+        return cls(Ratios(above, below), clear)
+
+
+def _overlap(low: Integers, high: Integers) -> bool:
+    """Return whether any two of some intervals have more than an end in common."""
+    order = sorted(range(len(low)), key=lambda number: (low[number], high[number]))
+    return any(high[now] > low[following] for now, following in pairwise(order))
+
+
+def lies_in_shadow(lattice: Lattice, interface: Interface) -> bool:
+    """Return whether the whole slave faces one open master chain, between its ends along the normal of each segment.
+
+    Then nothing overhangs by whatever normal of the master it is measured, and no segment of one side is seen edge-on.
+    """
+    master, order = interface.master, interface.master.chain_order
+    if (master.neighbours[order[1:], 0] != order[:-1]).any() or master.neighbours[order[0], 0] >= 0:
+        return False
+    nodes = lattice.nodes
+    along = nodes[master.segments[:, 1]] - nodes[master.segments[:, 0]]
+    against = nodes[interface.slave.segments[:, 1]] - nodes[interface.slave.segments[:, 0]]
+    points = nodes[: interface.n_slave_nodes]
+    before = points - nodes[master.segments[order[0], 0]]
+    behind = nodes[master.segments[order[-1], 1]] - points
+    return bool(
+        (along.dot(along.T) > 0).all()
+        and (along.dot(against.T) < 0).all()
+        and (before.dot(along.T) > 0).all()
+        and (behind.dot(along.T) > 0).all()
+    )

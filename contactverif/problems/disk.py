@@ -29,8 +29,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.simple_bodies import Rectangle, block, grid_cells
-from contactverif.problems.hertz import half_width, layer_half_width, solve_winkler_contact
-from contactverif.problems.line_pressure import LinePressure
+from contactverif.problems.hertz import LinePressure, half_width, layer_half_width, solve_winkler_contact
 
 # Lengths in half-widths of the contact after Hertz.
 UNIFORM = 1.6  # The foundation's elements are equally wide up to this distance from the middle.

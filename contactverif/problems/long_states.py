@@ -18,7 +18,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif.problems.flat_faces import grid, rotation
+from contactverif.problems.flat_states import grid, rotation
 
 FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0

@@ -33,9 +33,9 @@ from contactverif.contract.property import (
 )
 from contactverif.contract.result import JUDGED_SHARE, NodalForces, Row
 from contactverif.contract.subject import Subject
-from contactverif.problems.lifted_states import fit_to_traits
 from contactverif.problems.named_states import IN_SPACE, first_state, named_case
-from contactverif.sampling.blas_threads import one_thread
+from contactverif.problems.open_states import fit_to_traits
+from contactverif.sampling.hypothesis_draws import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 RAISED = "the property raised "

@@ -20,12 +20,12 @@ from contactverif.contract.cases import name_of_source
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.property import Outcome, Property
-from contactverif.sampling.blas_threads import one_thread
 from contactverif.sampling.hypothesis_draws import (
     Draw,
     draw_all,
     draw_different,
     find_difference,
+    one_thread,
     reproducible,
     shrink_choices,
     shrink_drawn,

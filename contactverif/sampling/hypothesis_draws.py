@@ -10,9 +10,10 @@ different cases, the engine draws.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from itertools import islice
 from random import Random
 from typing import Any
@@ -28,9 +29,28 @@ from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 from hypothesis.statistics import collector
 from hypothesis.strategies import SearchStrategy
+from threadpoolctl import ThreadpoolController
 
 from contactverif.contract.case import Case
-from contactverif.sampling.blas_threads import one_thread
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Return a context in which numpy and scipy compute on one thread, to judge cases and to make them.
+
+    The matrices of a case are small: threads of BLAS that share one wait for each other longer than they compute. One
+    thread also gives the same last bit on any number of cores. Exact solutions are solved once and remembered, so what
+    makes a case needs one thread, too.
+    """
+    context: AbstractContextManager[Any] = _blas().limit(limits=1, user_api="blas")
+    return context
+
+
+@cache
+def _blas() -> Any:
+    """Return what knows the libraries that are loaded; to look for them takes some milliseconds."""
+    import_module("scipy.linalg")  # It brings a BLAS of its own, which would not be found later.
+    return ThreadpoolController()
+
 
 try:
     from hypothesis.control import BuildContext

@@ -8,10 +8,9 @@ Scenes with elastic bodies are in `contactverif.strategies.solids`, which import
 """
 
 from contactverif.strategies.flat import flat_cases, normal_cases, overhung_cases, single_cases
-from contactverif.strategies.general import general_cases, smooth_cases
+from contactverif.strategies.general import general_cases, smooth_cases, tie_cases
 from contactverif.strategies.meshes import faces, interfaces, states
 from contactverif.strategies.point_projections import Projection, projections
-from contactverif.strategies.ties import tie_cases
 
 __all__ = [
     "Projection",

@@ -1,15 +1,18 @@
-"""Flat interfaces under uniform penetration, for the patch test: any meshes, and those of the paper's classes.
+"""Flat interfaces: any meshes, those of the paper's classes, and states with many bits.
 
-Each slave chain lies wholly over one master chain; ends may coincide. Meshes match or not, neighbours' lengths differ
-by up to 2^20, and up to 100 master segments lie under one slave segment. `contactverif.oracle.flat_answers` says what
-the classes are: of the slave's nodes, and of the middles of its segments, some carry a master node.
+In the first two each slave chain lies wholly over one master chain; ends may coincide. Neighbours' lengths differ by up
+to 2^20, and up to 100 master segments lie under one slave segment. `contactverif.oracle.is_of_class` says what the
+classes are: of the slave's nodes, and of the middles of its segments, some carry a master node.
+
+The last ones stand on multiples of 2^-40, or of 2^-32 if they are moved by up to 2^20, and are turned and stretched by
+a Pythagorean triple. All this is exact, but products of the turned coordinates are rounded.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache, partial
-from itertools import cycle
+from itertools import accumulate, cycle
 from typing import overload
 
 import numpy as np
@@ -21,8 +24,23 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
 from contactverif.oracle.flat_answers import is_of_class
-from contactverif.strategies import given_interface, parts
-from contactverif.strategies.panels import Panel, assemble_panels, shortest
+from contactverif.problems.flat_states import Turn, flat_master, flat_state
+from contactverif.strategies import given_interface
+from contactverif.strategies.panel_chains import Panel, assemble_panels, shortest
+from contactverif.strategies.samples import (
+    OFFSETS,
+    SEVENTHS,
+    depth_units,
+    ends_of,
+    lengths,
+    motions,
+    on_own_meshes,
+    penalties,
+    repeat_cyclically,
+    seeds,
+    shuffles,
+)
+from contactverif.strategies.translations import FINENESS, exact_shifts
 
 Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
 
@@ -58,9 +76,9 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
 def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> Case:
     """Draw meshes and push the slave into the master by the same depth everywhere; the case is that of `flat_cases`."""
     sides = draw(panels)
-    quarters, unit = draw(_DEPTHS), draw(parts.depth_units())
-    motion, penalty, seed = draw(parts.motions()), draw(parts.penalties()), draw(parts.seeds())
-    slide, shuffle = draw(_SLIDES), draw(parts.shuffles())
+    quarters, unit = draw(_DEPTHS), draw(depth_units())
+    motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
+    slide, shuffle = draw(_SLIDES), draw(shuffles())
     penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
     interface, z, along = assemble_panels([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
     parameters = {"penetration": np.array(penetration * motion.scale), "along": along, "direction": motion.direction}
@@ -71,9 +89,7 @@ def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> C
 def _panels() -> SearchStrategy[list[Sides]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
     overhang = st.integers(0, 3)
-    side = st.builds(
-        _places, _REFINEMENTS, _REPEATS, parts.lengths(), parts.lengths(), overhang, overhang, parts.SEVENTHS
-    )
+    side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
 
@@ -87,7 +103,7 @@ def _places(
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.
     """
-    slave_x = parts.ends_of([*slave] * repeats)
+    slave_x = ends_of([*slave] * repeats)
     end = slave_x[-1] + right
     master_x = [-float(left)]
     for length in cycle(master) if refinement else master:
@@ -147,7 +163,7 @@ def _cases(interface: Interface | None, *, midpoints: bool, least: int = 0) -> S
 def _class_panels(midpoints: bool, least: int) -> SearchStrategy[list[Sides]]:
     middles, overhang = _CARRIES if midpoints else st.just([0]), st.integers(least, _FURTHEST)
     side = st.builds(
-        _class_places, _CLASS_REPEATS, parts.lengths(), _CARRIES, middles, overhang, overhang, st.just(least > 0)
+        _class_places, _CLASS_REPEATS, lengths(), _CARRIES, middles, overhang, overhang, st.just(least > 0)
     )
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
@@ -167,10 +183,82 @@ def _class_places(
     on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
     """
     segments = np.array([*slave] * repeats)
-    slave_x = parts.ends_of([*slave] * repeats)
-    deal = partial(parts.repeat_cyclically, count=len(slave_x))
+    slave_x = ends_of([*slave] * repeats)
+    deal = partial(repeat_cyclically, count=len(slave_x))
     nodes = slave_x[deal(at_nodes) == 1]
     nodes = nodes[(nodes > slave_x[0]) & (nodes < slave_x[-1])] if inner else nodes
     middles = (slave_x[:-1] + segments / 2)[deal(at_middles)[:-1] == 1]
     first, last = slave_x[0] - left / 2 * segments[0], slave_x[-1] + right / 2 * segments[-1]
     return slave_x, np.unique(np.concatenate([[first], nodes, middles, [last]]))
+
+
+_TURNS: tuple[Turn, ...] = ((4, 3, 5), (12, -5, 13), (-3, 4, 5), (-5, -12, 13))
+_FINENESS_AT_REST = 40
+_COARSE = 12  # The bits of the places of a slave that is not parallel to the master.
+_ANY_TURN = st.sampled_from(_TURNS)
+_QUARTERS = st.integers(1, 7)
+_EXPONENTS, _COARSE_EXPONENTS = st.integers(6, 28), st.integers(6, 12)  # Of the penetration 2^-e.
+_RISES = st.sampled_from([1, -1, 2, -2, 3, -3])
+_SHIFTS = st.one_of(st.just(np.zeros(2)), exact_shifts())
+_LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
+
+
+@on_own_meshes
+def exact_flat_cases(draw: DrawFn) -> Case:
+    """Return states of uniform penetration, near the origin, whose exact forces are rationals.
+
+    Cases have the parameters of `contactverif.problems.flat_states.flat_state`, and "shift" (2,), a length each: a
+    translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point projects
+    inside the master.
+    """
+    turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
+    depth = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS)
+    penalty, seed, shift, offsets = _others(draw)
+    fineness = FINENESS if shift.any() else _FINENESS_AT_REST
+    slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, fineness, fineness)
+    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
+    return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
+
+
+@on_own_meshes
+def linear_flat_cases(draw: DrawFn) -> Case:
+    """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
+    turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
+    depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
+    penalty, seed, shift, offsets = _others(draw)
+    # Heights are places times a power of two, so that they need some bits more than places.
+    slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, _COARSE, FINENESS)
+    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
+    # The longest slave is 16 long, so that the penetration is 5/8 of that of the middle node or more.
+    slope = depth * rise / 128
+    (p, q, _), middle = turn, slave[len(slave) // 2]
+    positions = case.positions.copy()
+    positions[: len(slave)] += np.outer(slope * (slave - middle), [-q, p])
+    parameters = {"direction": case.parameters["direction"], "slope": np.array(slope), "shift": shift}
+    return Case(case.interface, positions.reshape(-1), penalty, parameters, seed)
+
+
+def _turn_and_lengths(draw: DrawFn) -> tuple[Turn, list[int], list[int]]:
+    return draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
+
+
+def _others(draw: DrawFn) -> tuple[float, int, FloatArray, list[int]]:
+    """Draw penalty, seed, translation and offsets."""
+    penalty, seed = draw(penalties()), draw(seeds())
+    return penalty, seed, draw(_SHIFTS), draw(OFFSETS)
+
+
+def _slave_and_master(
+    slave_lengths: list[int], master_lengths: list[int], offsets: list[int], slave_bits: int, master_bits: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the places of both surfaces' nodes along the line; the master goes beyond the slave by 1."""
+    end = float(sum(slave_lengths))
+    slave = _rounded_places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, slave_bits)
+    inside = [float(place) for place in accumulate(master_lengths, initial=0) if place < end + 1]
+    return slave, _rounded_places([-1.0, *inside, end + 1], offsets, 13, master_bits)
+
+
+def _rounded_places(places: list[float], offsets: list[int], over: int, fineness: int) -> FloatArray:
+    """Return the places, each moved by up to 1/16 and rounded to a multiple of 2^-fineness."""
+    moved = places + repeat_cyclically(offsets, len(places)) / over / 16
+    return np.round(moved * 2.0**fineness) * 2.0**-fineness

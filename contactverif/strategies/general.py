@@ -1,13 +1,14 @@
-"""Interfaces of any shape: flat, tilted, bent, circular, overhanging on either side, partly open.
+"""Interfaces of any shape: flat, tilted, bent, circular, overhanging on either side, partly open, or exactly at a tie.
 
 The master of an open panel is the graph of a broken line, with walls; the slave's nodes lie below that line by their
-penetration. So contact is there by construction, and nothing need be filtered: half of a slave segment lies over the
-master, and where the draws leave it open, the slave sinks as a whole until that half is closed (`contact.py`).
+penetration. Contact is there by construction, and nothing is filtered: half of a slave segment, from a node to the
+middle, lies over the master, and where the draws leave it open, the slave sinks as a whole until that half is closed.
+A formulation looks for contact at nodes, at points inside segments or on whole segments; half a segment has all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import cycle
@@ -21,10 +22,160 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.strategies import given_interface, parts
-from contactverif.strategies.contact import covered_start, extend_line, sink_below
-from contactverif.strategies.panels import Panel, assemble_panels, on_lattice, shortest
-from contactverif.strategies.rings import Ring, rings
+from contactverif.strategies import given_interface
+from contactverif.strategies.panel_chains import Panel, assemble_panels, on_lattice, shortest
+from contactverif.strategies.samples import (
+    OFFSETS,
+    depth_units,
+    depths,
+    draw_others,
+    ends_of,
+    lengths,
+    motions,
+    penalties,
+    repeat_cyclically,
+    seeds,
+    shifts,
+)
+
+STEEPEST = 1e-3  # An edge seen at a smaller slope than this from a point counts as seen at this slope.
+SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the largest.
+
+
+def extend_line(line: FloatArray, slave: Sequence[float], room: float) -> FloatArray:
+    """Return the broken line (n, 2), from 0 to the right, long enough for half of the first or last slave segment.
+
+    `slave` has the lengths of its segments; `room` is a length that is left free at the right end.
+    """
+    needed = max(slave[0], slave[-1]) / 2 + 2 * room
+    if line[-1, 0] >= needed:
+        return line
+    return np.vstack([line, [needed + room, line[-1, 1]]])
+
+
+def covered_start(start: float, slave: Sequence[float], width: float) -> float:
+    """Return where a slave of these lengths starts so that half of one of its segments lies between 0 and `width`.
+
+    Half of its first or last segment fits into the width. The start stays if half of some segment is covered there.
+    """
+    x = start + ends_of(slave)
+    if any(True for _ in _covered_halves(x, 0.0, width)):
+        return start
+    if start >= 0:
+        return min(start, width - slave[0] / 2)
+    total = float(sum(slave))
+    return min(max(start, slave[-1] / 2 - total), width - total)
+
+
+def sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
+    """Return the slave (n, 2), lowered as a whole until half of a segment is below the line (m, 2) by `depth` or more.
+
+    Both run from left to right.
+    """
+    heights = []
+    for left, right in _covered_halves(slave[:, 0], line[0, 0], line[-1, 0]):
+        places = np.array([left, right, *line[(line[:, 0] > left) & (line[:, 0] < right), 0]])
+        heights.append(float((np.interp(places, *slave.T) - np.interp(places, *line.T)).max()))
+    lift = min(heights, default=-depth) + depth
+    if lift <= 0:
+        return slave
+    return slave - [0.0, float(on_lattice(np.array(lift + 2.0**-20)))]
+
+
+def radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outside: bool, closed: bool) -> float:
+    """Return the factor for the distances of the slave (n, 2) from the origin by which half of a segment penetrates.
+
+    The master's polygon (m, 2) is convex and runs counter-clockwise; its body is outside of it, or inside. The factor
+    is 1 if half of a segment penetrates by `depth` already, or none can; else above 1 outside, and below 1 inside.
+    """
+    last = None if closed else -1
+    begin, along = polygon[:last], (np.roll(polygon, -1, axis=0) - polygon)[:last]
+    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+    heights = np.einsum("ij,ij->i", normals, begin)  # The distances of the edges from the centre.
+    first, second = slave[:last], np.roll(slave, -1, axis=0)[:last]
+    shares = np.array([[1.0, 0.75, 0.5], [0.5, 0.25, 0.0]])[..., None, None]  # Node, point between and middle.
+    points = shares * first + (1 - shares) * second  # (half, place, segment, 2)
+    radius = float(np.hypot(*polygon.T).max())
+    toward = np.maximum(points @ normals.T, radius * STEEPEST)  # (half, place, segment, edge)
+    if outside:  # A point is in the body if it is beyond one edge.
+        factor = float(((heights + depth) / toward).min(axis=3).max(axis=1).min())
+        return factor if 1 < factor < 1 / SMALLEST else 1.0
+    factor = float(((heights - depth) / toward).min(axis=3).min(axis=1).max())
+    return factor if SMALLEST < factor < 1 else 1.0  # A polygon beside the centre may have no place for a segment.
+
+
+def _covered_halves(x: FloatArray, begin: float, end: float) -> Iterator[tuple[float, float]]:
+    """Yield both halves of each segment between ascending places that lie between `begin` and `end`."""
+    for left, right in zip(x[:-1].tolist(), x[1:].tolist(), strict=True):
+        middle = (left + right) / 2
+        for half in ((left, middle), (middle, right)):
+            if begin <= half[0] and half[1] <= end:
+                yield half
+
+
+RADIUS = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """Two concentric polygons, or parts of them."""
+
+    slave: Sequence[int]  # Weights by which the segments share the angle.
+    master: Sequence[int]
+    degrees: int  # The angle; 360 is closed.
+    inner_slave: bool  # The slave is the disc, else the hole around it.
+    # As of `Broken`, measured along the radius. Then the slave grows or shrinks as a whole until half of a segment
+    # penetrates.
+    quarters: Sequence[int]
+    unit: float
+
+    def __call__(self, offsets: Sequence[int]) -> Panel:
+        """Return the panel, its slave nodes moved off the lattice by these numerators, 0 for none."""
+        warp = 1 + offsets[0] / 13 / 8  # no two segments at right angles, so that nothing is seen exactly edge-on
+        master = self._points(self.master, not self.inner_slave, warp)
+        reference = self._points(self.slave, self.inner_slave, 1.0)
+        length = min(shortest(master), shortest(reference))
+        depth = on_lattice(repeat_cyclically(self.quarters, len(reference)) / 4 * self.unit * length)
+        depth = np.clip(depth, -RADIUS / 2, RADIUS / 2)  # neither a hole nor a disc shrinks to a point
+        outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
+        shift = shifts(offsets, len(reference)) * length
+        slave = on_lattice(reference + outward * depth[:, None]) + shift
+        least, closed = min(self.unit * length / 4, RADIUS / 16), self.degrees == 360
+        edges = master[::-1] if self.inner_slave else master
+        factor = radial_factor(slave, edges, least, outside=self.inner_slave, closed=closed)
+        return Panel(slave * factor, master, reference, closed=closed)
+
+    def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
+        """Return points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
+        shares = ends_of(weights) / sum(weights)
+        angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares) ** warp)
+        points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
+        return points if inner else points[::-1]
+
+
+def rings() -> SearchStrategy[Ring]:
+    """Return arcs of 60° to 180°, and closed rings."""
+    weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
+    degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
+    depth = st.one_of(depths(), depths(lowest=-6))
+    return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())
+
+
+_RINGS = rings()
+
+
+def closed_cases() -> SearchStrategy[Case]:
+    """Return a closed ring in a hole, off the lattice; its seam is where the numbering, on the walk or not, begins."""
+    return _closed_cases()
+
+
+@st.composite
+def _closed_cases(draw: DrawFn) -> Case:
+    ring = replace(draw(_RINGS), degrees=360)
+    motion, penalty, seed, shuffle = draw_others(draw)
+    interface, z, _ = assemble_panels([ring(draw(OFFSETS))], motion, shuffle)
+    return Case(interface, z, penalty, {}, seed)
+
 
 _ON = st.integers(0, 7)  # Zero means no offset.
 _WALL = 5  # The kind of a step that is a wall: one step in six.
@@ -46,10 +197,10 @@ def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 @st.composite
 def _general_cases(draw: DrawFn, smooth: bool) -> Case:
     makers: list[Broken | Ring] = draw(_panels(smooth))
-    motion, penalty, seed, shuffle = parts.draw_others(draw)
+    motion, penalty, seed, shuffle = draw_others(draw)
     # Drawn last, so that the offset shrinks last.
     offset_on = smooth or draw(_ON) > 0
-    offsets = draw(parts.OFFSETS) if offset_on else [0]
+    offsets = draw(OFFSETS) if offset_on else [0]
     if not offset_on or any(isinstance(maker, Broken) and maker.upright for maker in makers):
         # A quarter turn keeps a tie a tie, and a wall upright.
         motion = replace(motion, degrees=motion.degrees // 90 * 90)
@@ -81,12 +232,12 @@ class Broken:
         if not self.upright:
             line = extend_line(line, self.slave, length / 8)
             start = covered_start(start, self.slave, line[-1, 0] - length / 8)
-        x = start + parts.ends_of(self.slave)
+        x = start + ends_of(self.slave)
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
-        shift = parts.shifts(offsets, len(x))
-        depth = (parts.repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
+        shift = shifts(offsets, len(x))
+        depth = (repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
         x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
         slave = np.column_stack([x, on_lattice(np.interp(x, *line.T)) + rise - depth])
@@ -112,16 +263,16 @@ class Broken:
 @cache
 def _broken_lines() -> SearchStrategy[Broken]:
     """Return flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
-    flat = parts.lengths().map(lambda along: [(length, 0, 0) for length in along])
+    flat = lengths().map(lambda along: [(length, 0, 0) for length in along])
     bent = st.lists(
         st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
     )
-    plain = parts.lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
-    depth = st.one_of(parts.depths(), parts.depths(lowest=-6))
+    plain = lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
+    depth = st.one_of(depths(), depths(lowest=-6))
     start = st.integers(-2, 2)
     return st.one_of(
-        st.builds(Broken, flat, st.just(0.0), parts.lengths(), start, _TILTS, depth, parts.depth_units()),
-        st.builds(Broken, bent, _BENDS, plain, start, _TILTS, depth, parts.depth_units()),
+        st.builds(Broken, flat, st.just(0.0), lengths(), start, _TILTS, depth, depth_units()),
+        st.builds(Broken, bent, _BENDS, plain, start, _TILTS, depth, depth_units()),
     )
 
 
@@ -142,9 +293,88 @@ def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
     """Return one or two panels; ledges, which are kinks, only if not smooth."""
     shapes: list[SearchStrategy[Broken | Ring]] = [_broken_lines(), _broken_lines(), _broken_lines(), rings(), rings()]
     if not smooth:
-        plain = parts.lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
-        shapes.append(
-            st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), parts.depths(), parts.depth_units())
-        )
+        plain = lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
+        shapes.append(st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), depths(), depth_units()))
     panel = st.one_of(*shapes)
     return st.one_of(st.lists(panel, min_size=1, max_size=1), st.lists(panel, min_size=1, max_size=2))
+
+
+_RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # The rise of a vertex above its neighbours, per length.
+_QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # Penetrations; 0 is a gap of exactly zero.
+_SEGMENT = st.tuples(
+    st.integers(0, 3).map(lambda k: 2.0**k), st.integers(0, 3)
+)  # The length, and the quarter under a master node.
+
+
+def tie_cases() -> SearchStrategy[Case]:
+    """Return random meshes that stand exactly on a kink, many of them on several."""
+    return _tie_cases()
+
+
+@st.composite
+def _tie_cases(draw: DrawFn) -> Case:
+    panel = draw(_PANELS)
+    motion, penalty, seed = draw(motions(exact=True)), draw(penalties()), draw(seeds())
+    interface, z, _ = assemble_panels([panel], motion)
+    return Case(interface, z, penalty, {}, seed)
+
+
+def _facing(
+    segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
+) -> Panel:
+    """Return a panel with master nodes under all slave nodes.
+
+    Under some slave segments one quarter point or the middle has a master node too (0: none).
+    """
+    slave_x, master_x = [0.0], [0.0]
+    for length, quarter in segments:
+        if quarter:
+            master_x.append(slave_x[-1] + length * quarter / 4)
+        slave_x.append(slave_x[-1] + length)
+        master_x.append(slave_x[-1])
+    heights = repeat_cyclically(rises, len(master_x)) / 4
+    return _below(np.array(slave_x), np.column_stack([master_x, heights]), quarters, unit / 4)
+
+
+def _on_bisector(
+    segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
+) -> Panel:
+    """Return a symmetric roof or valley of two segments.
+
+    A node, or the quarter of the first slave segment, lies on its bisector.
+
+    The slave is level, so that the bisector, which is upright, is met at right angles.
+    """
+    x = ends_of(length for length, _ in segments)
+    x -= segments[0][0] * segments[0][1] / 4
+    reach = 4 * x[-1]
+    line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])
+    slave = sink_below(np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)]), line, unit / 4)
+    return Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
+
+
+def _below(x: FloatArray, line: FloatArray, quarters: Sequence[int], unit: float) -> Panel:
+    """Return a panel with slave nodes at x, sunk below the broken line (n, 2)."""
+    heights = np.interp(x, *line.T)
+    depths = repeat_cyclically(quarters, len(x)) / 4 * unit
+    slave = np.column_stack([x, heights - depths])
+    if not _deepest_segment_touches(slave, line):
+        slave = sink_below(slave, line, unit / 4)
+    return Panel(slave, line[::-1], np.column_stack([x, heights]))
+
+
+def _deepest_segment_touches(slave: FloatArray, line: FloatArray) -> bool:
+    """Return whether a node and a quarter point beside it are below the line, so that a gap of zero may stay."""
+    x = slave[:, 0]
+    quarters = np.concatenate([0.75 * x[:-1] + 0.25 * x[1:], 0.25 * x[:-1] + 0.75 * x[1:]])
+    here, there = (np.interp(places, *slave.T) < np.interp(places, *line.T) for places in (x, quarters))
+    return bool(here[np.r_[: len(x) - 1, 1 : len(x)]][there].any())
+
+
+_ARGUMENTS = (
+    st.lists(_SEGMENT, min_size=1, max_size=5),
+    st.lists(_RISES, min_size=1, max_size=4),
+    _QUARTERS,
+    depth_units(),
+)
+_PANELS = st.one_of(st.builds(_facing, *_ARGUMENTS), st.builds(_on_bisector, *_ARGUMENTS))

@@ -10,8 +10,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import QUADRILATERAL, TRIANGLE
 from contactverif.contract.interface import PLANE, SPACE, Interface
-from contactverif.strategies.general import general_cases, smooth_cases
-from contactverif.strategies.rings import closed_cases
+from contactverif.strategies.general import closed_cases, general_cases, smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 
 

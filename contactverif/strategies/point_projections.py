@@ -19,7 +19,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Surface
-from contactverif.oracle.exact_nearest import Nearest, nearest_segments
+from contactverif.oracle.nearest import Nearest, nearest_segments
 
 _TOLERANCE = 4  # The error that roundoff explains, in units of u (L + |P − A|).
 

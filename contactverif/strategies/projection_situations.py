@@ -1,17 +1,22 @@
-"""Cases by kind of projection: one strategy for each way in which a slave point can face the master.
+"""Cases by kind of projection: a few segments drawn by hand, with one slave point that faces the master in that way.
 
-`Case.kind` names the kind, so that a run can count how many cases of each kind it judged. The parameters
-"probe_segment" and "probe_c" name the slave point that the case is about; its other points are where they happen to be.
+`Case.kind` names the kind; the parameters "probe_segment" and "probe_c" name the slave point. Every kind is
+constructed, and none is filtered; `contactverif.oracle.is_of_kind` says whether a case is of its kind, and a test asks.
 
-Every kind is constructed, and none is filtered. Where exactness is the point (a hit node, a tie), coordinates are exact
-in binary and stay so under the motion. The other cases have full mantissas: sevenths, any rotation, offsets to 2^20.
-The oracle says whether a case is of its kind (`contactverif.oracle.is_of_kind`), and a test asks it.
+A sketch stands on a lattice so coarse that `ExactTurn` moves it without rounding, even to an offset of 2^20.
+Coordinates are below 2^8 and multiples of 2^-32, so what a sketch shows exactly (a tie, a hit node) stays exact. Only a
+sketch whose kind survives rounding may set `exact` to False; it gets a full mantissa.
+
+The segment of a sketch lies on the x-axis, its left node at the origin, and the slave is above. Of a vertex or a tie,
+the vertex or the slave point is the origin.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache
-from math import ldexp
+from math import cos, floor, hypot, ldexp, log2, radians, sin
 from typing import overload
 
 import numpy as np
@@ -22,37 +27,445 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.oracle.projection_kinds import TAU, kind_of
-from contactverif.strategies import sketch_kinds
 from contactverif.strategies.given_interface import touches
-from contactverif.strategies.parts import penalties, seeds
-from contactverif.strategies.sketches import ROUND_PLACES, Sketch, gaps, sketch_cases
+from contactverif.strategies.panel_chains import Chain, assemble_chains
+from contactverif.strategies.samples import Motion, motions, penalties, seeds, shuffles
+
+_PAST = float(TAU)  # Formulations may still see contact past a free end by this share of the segment.
+FURTHEST = 2**20  # The largest offset, in units of the lattice.
+NODES_AND_OTHERS = (-1.0, 1.0, -0.5, 0.5, 0.0, -1.0, 1.0)  # Places c; every other one is a node.
+ROUND_PLACES = (*NODES_AND_OTHERS, -(3**-0.5), 3**-0.5, 0.75)  # Gauss points too, which are not on the lattice.
+TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # The slope of a slave segment.
+_SIZES = st.integers(1, 28), st.sampled_from([1.0, 0.75])  # The draws e and part of a gap 2^-e × part.
+_TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
+_STRETCHES = st.sampled_from([1.0, 2.0, 0.5, 0.75])  # The slave's reference over its present length.
+_COUNTS = st.integers(0, 2)
+# Whether a second pair of chains is in contact. Hypothesis draws the simplest value more often than others, so two
+# draws decide.
+_COMPANY = st.tuples(*[st.sampled_from([False, True, True, True])] * 2).map(any)
+_LENGTHS = st.sampled_from([1.0, 2.0, 0.5, 0.25, 4.0])
+
+
+@dataclass(frozen=True, slots=True)
+class ExactTurn:
+    """A similarity x → 2^k (W x + shift), whose turn W is a Pythagorean one, so that lattice points are not rounded."""
+
+    turn: tuple[int, int] = (1, 0)  # The first column of W = [[a, −b], [b, a]]; a² + b² is a square.
+    shift: tuple[int, int] = (0, 0)  # In units of the lattice.
+    exponent: int = 0
+
+    @property
+    def scale(self) -> float:
+        """The factor of all lengths, an integer × 2^k."""
+        return ldexp(hypot(*self.turn), self.exponent)
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, 2), moved."""
+        (a, b), (x, y) = self.turn, points.T
+        moved: FloatArray = np.column_stack([a * x - b * y, b * x + a * y]) + self.shift
+        return np.ldexp(moved, self.exponent)
+
+
+@cache
+def exact_turns() -> SearchStrategy[ExactTurn | Motion]:
+    """Return rest, or exact similarities with offsets up to 2^20."""
+    place = st.one_of(st.integers(-64, 64), st.integers(-FURTHEST + 2**12, FURTHEST - 2**12))
+    exponent = st.one_of(st.just(0), st.integers(-20, 20))
+    turns = st.builds(ExactTurn, st.sampled_from(_TURNS), st.tuples(place, place), exponent)
+    return st.one_of(st.just(ExactTurn()), turns, turns)
+
+
+@cache
+def _any_motions() -> SearchStrategy[ExactTurn | Motion]:
+    return st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """Slave and master chains, and the slave point that they are about."""
+
+    kind: str  # The kind of projection.
+    # The master's chains, the body on the left: a master on the x-axis runs in −x, a slave above it in +x.
+    masters: Sequence[Chain]
+    slave: Chain
+    segment: int  # The number of the slave segment that carries the point, on the walk.
+    c: float  # The place of the point on its segment, from −1 to 1.
+    exact: bool = False  # Rounding would spoil the kind.
+    ordered: bool = False  # The numbers of nodes on the walk matter.
+    mirrored: bool = True  # The mirror image is of the same kind.
+
+    def mirror(self) -> Sketch:
+        """Return the mirror image in the y-axis, every chain walked the other way."""
+        n_segments = len(self.slave.points) - (not self.slave.closed)
+        # A closed chain keeps its joint between the last node and the first.
+        segment = n_segments - 1 if self.slave.closed else n_segments - 1 - self.segment
+        masters = [_mirror(chain) for chain in self.masters]
+        return replace(self, masters=masters, slave=_mirror(self.slave), segment=segment, c=-self.c)
+
+
+def _mirror(chain: Chain) -> Chain:
+    return replace(chain, points=chain.points[::-1] * [-1, 1] + 0.0)
+
+
+@st.composite
+def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
+    """Draw a sketch and put it somewhere; parameters "probe_segment" and "probe_c" name the point that it is about.
+
+    Many kinds are open, edge-on or past an end. So most cases have company: beside the sketch stands a slave segment in
+    contact with a master segment.
+    """
+    sketch = draw(sketches)
+    if sketch.mirrored and draw(st.booleans()):
+        sketch = sketch.mirror()
+    motion = draw(exact_turns() if sketch.exact else _any_motions())
+    penalty, seed = draw(penalties()), draw(seeds())
+    stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(shuffles())
+    reference = replace(sketch.slave, points=sketch.slave.points * stretch)
+    slaves, masters, references = [sketch.slave], list(sketch.masters), [reference]
+    if draw(_COMPANY):  # Drawn last, so that it goes first.
+        slave, master = _company(np.vstack([chain.points for chain in (*slaves, *masters)]))
+        slaves, masters, references = [*slaves, slave], [*masters, master], [*references, slave]
+    interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
+    current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
+    first = int(np.flatnonzero(order == sketch.segment)[0])
+    (segment,) = np.flatnonzero(interface.slave.segments[:, 0] == first)
+    parameters = {"probe_segment": np.array(float(segment)), "probe_c": np.array(sketch.c)}
+    return Case(interface, motion(current).reshape(-1), penalty, parameters, seed, kind=sketch.kind)
+
+
+def _company(points: FloatArray) -> tuple[Chain, Chain]:
+    """Return a slave segment that penetrates a master segment, to the right of a sketch's points (n, 2).
+
+    They are upside down: the slave is below and runs in −x, the master above in +x. So no slave of a sketch, which runs
+    in +x, faces that master, and none is near it.
+    """
+    low, high = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
+    x, y = high[0] + (high - low).max(), low[1]
+    master = Chain(np.array([[x, y], [x + 2.0, y]]))
+    return Chain(np.array([[x + 1.5, y + 0.125], [x + 0.5, y + 0.125]])), master
+
+
+@cache
+def gaps() -> SearchStrategy[float]:
+    """Return gaps in units of a segment: 1e-9 to 1/2, half of them in penetration, some exactly zero."""
+    return st.builds(_gap, *_SIZES, st.sampled_from([-1, 1, -1, 1, -1, 0]))
+
+
+@cache
+def nonzero_gaps() -> SearchStrategy[float]:
+    """Return gaps as `gaps` does, without zero."""
+    return st.builds(_gap, *_SIZES, st.sampled_from([-1, 1]))
+
+
+def _gap(exponent: int, part: float, sign: int) -> float:
+    # All gaps take as many draws, or hypothesis would count zero as the simplest one.
+    return ldexp(sign * part, -exponent)
+
+
+def upper_side(left_to_right: Sequence[tuple[float, float]]) -> Chain:
+    """Return the chain of a body below these points, which go from left to right."""
+    return Chain(np.array(left_to_right, dtype=np.float64)[::-1])
+
+
+@st.composite
+def slave_steps(draw: DrawFn, unit: float) -> tuple[list[tuple[float, float]], int]:
+    """Draw the vectors of slave segments from left to right, and the number of the segment that carries the point."""
+    before, after = draw(_COUNTS), draw(_COUNTS)
+    length = unit * draw(_LENGTHS)
+    steps = [(length, length * draw(TILTS)) for _ in range(before + 1 + after)]
+    return steps, before
+
+
+def slave_through(point: tuple[float, float], c: float, steps: Sequence[tuple[float, float]], segment: int) -> Chain:
+    """Return the open chain with these vectors whose segment of this number has the point at c."""
+    vectors = np.array(steps, dtype=np.float64)
+    nodes = np.concatenate([np.zeros((1, 2)), np.cumsum(vectors, axis=0)])
+    start = np.array(point) - nodes[segment] - (1 + c) / 2 * vectors[segment]
+    return Chain(nodes + start)
+
+
+Points = list[tuple[float, float]]
+_WHOLE_LENGTHS = st.integers(1, 8).map(float)
+_NEIGHBOURS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 0.5, 3.0]), TILTS), max_size=2)  # (length, slope)
+_FINEST = 31  # Distances from a bisector go down to 2^-31 and 0.
+_SIDES = st.sampled_from([1.0, 2.0, 4.0, 3.0])
+_SLOPES = st.sampled_from([0.0, 0.125, 0.5, 1.0])
+_ENDS = st.lists(st.sampled_from([1.0, 2.0]), max_size=1)
+
+
+@st.composite
+def inside(draw: DrawFn) -> Sketch:
+    """Draw a foot inside a segment, whose neighbours are bent by up to 45°."""
+    length, point = draw(_feet_inside())
+    c = draw(st.sampled_from(ROUND_PLACES))
+    steps, segment = draw(slave_steps(length))
+    return Sketch("inside a segment", [_graph(draw, length)], slave_through(point, c, steps, segment), segment, c)
+
+
+@st.composite
+def angle(draw: DrawFn, kind: str, degrees: float) -> Sketch:
+    """Draw a foot inside a segment; the slave segment is turned against the master by this angle, either way."""
+    exact = {90.0: (0.0, 1.0), 180.0: (-1.0, 0.0)}
+    length, point = draw(_feet_inside(exact=degrees in exact))
+    c, size = draw(st.sampled_from(NODES_AND_OTHERS)), length * draw(st.sampled_from([1.0, 0.5, 2.0]))
+    along, across = exact.get(degrees, (cos(radians(degrees)), sin(radians(degrees))))
+    steps = [(size * along, size * across * draw(st.sampled_from([1.0, -1.0])))] * draw(st.integers(1, 3))
+    segment = draw(st.integers(0, len(steps) - 1))
+    slave = slave_through(point, c, steps, segment)
+    return Sketch(kind, [_graph(draw, length)], slave, segment, c, exact=degrees in exact)
+
+
+@st.composite
+def one_of_several(draw: DrawFn, role: str) -> Sketch:
+    """Draw a slave segment over three to six master segments; its point is over the first, the last, or another.
+
+    The order is that of the master, which runs in −x.
+    """
+    width, place = (
+        draw(_WHOLE_LENGTHS),
+        {"first": (0.5, 1.0), "intermediate": (0.0, -0.5, 0.5), "last": (-0.5, -1.0)}[role],
+    )
+    c = draw(st.sampled_from(place))
+    # Master nodes lie at odd sixteenths of the slave segment, and the point at an eighth.
+    here = round(8 * (1 + c))
+    left = draw(st.lists(st.integers(0, here // 2 - 1), min_size=2, max_size=3, unique=True)) if role == "first" else []
+    right = draw(st.lists(st.integers(here // 2, 7), min_size=2, max_size=3, unique=True)) if role == "last" else []
+    if role == "intermediate":
+        left = draw(st.lists(st.integers(0, here // 2 - 1), min_size=1, max_size=2, unique=True))
+        right = draw(st.lists(st.integers(here // 2, 7), min_size=1, max_size=2, unique=True))
+    beyond = draw(st.tuples(st.sampled_from([0.25, 1.0]), st.sampled_from([0.25, 1.0])))
+    nodes = [-beyond[0], *((2 * k + 1) / 16 for k in sorted(left + right)), 1 + beyond[1]]
+    line: Points = [(node * width, 0.0) for node in nodes]
+    before, after = draw(st.integers(0, 1)), draw(st.integers(0, 1))
+    tilt = draw(st.sampled_from([0.0, 0.125, -0.125, 0.25]))
+    point = ((1 + c) / 2 * width, draw(gaps()) * width / 8)
+    slave = slave_through(point, c, [(width, tilt * width)] * (before + 1 + after), before)
+    return Sketch(f"{role} of several segments", [upper_side(line)], slave, before, c, mirrored=False)
+
+
+@st.composite
+def past_end(draw: DrawFn, kind: str) -> Sketch:
+    """Draw a point past the free left end of the master by somewhat less, or somewhat more, than τ of its segment."""
+    length, c = draw(_WHOLE_LENGTHS), draw(st.sampled_from(ROUND_PLACES))
+    if "inside" in kind:
+        past = _PAST * (1 - ldexp(1.0, -draw(st.integers(1, 20))))
+    else:
+        past = _PAST * (1 + ldexp(1.0, -draw(st.integers(-7, 20))))
+    steps, segment = draw(slave_steps(length))
+    slave = slave_through((-past * length, draw(gaps()) * length), c, steps, segment)
+    return Sketch(kind, [_graph(draw, length, left=False)], slave, segment, c)
+
+
+@st.composite
+def free_end(draw: DrawFn) -> Sketch:
+    """Draw a point whose foot is exactly the free left end of the master."""
+    length, c = draw(_WHOLE_LENGTHS), draw(st.sampled_from(NODES_AND_OTHERS))
+    steps, segment = draw(slave_steps(length))
+    slave = slave_through((0.0, draw(gaps()) * length), c, steps, segment)
+    return Sketch("free end hit exactly", [_graph(draw, length, left=False)], slave, segment, c, exact=True)
+
+
+@st.composite
+def small_overlap(draw: DrawFn) -> Sketch:
+    """Draw a slave whose last node is 2^-k of a master segment inside the master's free end, the rest outside."""
+    length, overlap = draw(_WHOLE_LENGTHS), ldexp(1.0, -draw(st.integers(2, 30)))
+    steps, segment = draw(slave_steps(2 * length))
+    slave = slave_through((overlap * length, draw(gaps()) * length * 0.5), 1.0, steps[: segment + 1], segment)
+    masters = [_graph(draw, length, left=False)]
+    return Sketch("overlap going to zero", masters, slave, segment, 1.0, exact=True)
+
+
+@st.composite
+def closing_segment(draw: DrawFn) -> Sketch:
+    """Draw a disc or a hole, and a point over the segment that joins its last node to the first.
+
+    The slave is open, or a closed box whose own closing segment carries the point.
+    """
+    length, (x, y) = draw(_feet_inside())
+    height = length * draw(st.sampled_from([-1.0, 1.0, -2.0, 2.0]))  # Below the x-axis is a disc, above it a hole.
+    between = draw(st.sampled_from([[], [0.5], [0.25, 0.75]]))
+    nodes = [(0.0, 0.0), (0.0, height), *((length * part, height) for part in between), (length, height), (length, 0.0)]
+    master = Chain(np.array(nodes), closed=True)
+    c, point = draw(st.sampled_from(ROUND_PLACES)), (x, y / 2)
+    steps, segment = draw(slave_steps(length / 4))
+    if draw(st.booleans()):
+        size = length / 4
+        (left, right) = slave_through(point, c, [(size, 0.0)], 0).points
+        box = np.array([right, right + [0, size], left + [0, size], left])
+        return Sketch("closing segment", [master], Chain(box, closed=True), 3, c, ordered=True)
+    slave = slave_through(point, c, steps, segment)
+    return Sketch("closing segment", [master], slave, segment, c, ordered=True)
+
+
+@st.composite
+def second_body(draw: DrawFn) -> Sketch:
+    """Draw another chain of the master behind the first; the point may even be nearer to the second."""
+    length, part = draw(_WHOLE_LENGTHS), draw(st.integers(1, 7)) / 8
+    behind = length * draw(st.sampled_from([1.0, 0.25, 0.0625]))
+    gap = draw(gaps()) * behind
+    if draw(st.sampled_from([False, False, False, True])) and gap < 0:
+        gap = -behind - gap
+    c = draw(st.sampled_from(ROUND_PLACES))
+    steps, segment = draw(slave_steps(length / 8))
+    first = _graph(draw, length, slopes=False)
+    cuts = draw(st.sampled_from([[], [0.5625], [0.3125, 0.6875]]))  # Odd sixteenths: the point is at an eighth.
+    second = upper_side([(x * length, -behind) for x in (-0.5, *cuts, 1.5)])
+    if draw(st.booleans()):  # The second chain faces away: it is the lower side of the first body.
+        second = Chain(second.points[::-1])
+    slave = slave_through((part * length, gap), c, steps, segment)
+    return Sketch("second body behind", [first, second], slave, segment, c)
+
+
+@st.composite
+def other_node(draw: DrawFn) -> Sketch:
+    """Draw a point over the middle of a long segment, nearer to the tip of a hook than to both ends of it."""
+    length, c = 16.0, draw(st.sampled_from(ROUND_PLACES))
+    tip = (8.0 + draw(st.integers(0, 2)), draw(st.sampled_from([3.0, 4.0, -3.0, -4.0])))
+    steps, segment = draw(slave_steps(0.25))
+    slave = slave_through((8.0, 2 * draw(gaps())), c, steps, segment)
+    hook = upper_side([(0.0, 0.0), (length, 0.0), tip])
+    return Sketch("nearest node not on nearest segment", [hook], slave, segment, c)
+
+
+@st.composite
+def node_hit(draw: DrawFn) -> Sketch:
+    """Draw a point whose foot on the nearest segment is exactly a node between two segments.
+
+    The left segment is collinear, or bent to the side where the node stays nearest.
+    """
+    gap, right, left = draw(nonzero_gaps()), draw(_SIDES), draw(_SIDES)
+    slope = draw(_SLOPES) * (1 if gap < 0 else -1)
+    line: Points = [(-left, slope * left), (0.0, 0.0), (right, 0.0)]
+    line += [(right + length, 0.0) for length in draw(_ENDS)]
+    c = draw(st.sampled_from(NODES_AND_OTHERS))
+    steps, segment = draw(slave_steps(1.0))
+    return Sketch(
+        "node hit exactly", [upper_side(line)], slave_through((0.0, gap), c, steps, segment), segment, c, True
+    )
+
+
+@st.composite
+def coincident_nodes(draw: DrawFn) -> Sketch:
+    """Draw matching meshes: each slave node stands over a master node, at the same place if the gap is zero."""
+    steps = draw(st.lists(st.tuples(_SIDES, _SLOPES, st.sampled_from([1, -1])), min_size=1, max_size=4))
+    level, gap = draw(st.sampled_from([True, False])), draw(gaps())
+    line: Points = [(0.0, 0.0)]
+    for length, slope, sign in steps:
+        line.append((line[-1][0] + length, line[-1][1] + (0.0 if level else sign * slope * length)))
+    gap = gap if level else 0.0
+    more = [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
+    segment, c = draw(st.integers(0, len(steps) - 1)), draw(st.sampled_from([-1.0, 1.0]))
+    slave = upper_side([(x, y + gap) for x, y in line[::-1]])
+    return Sketch("coincident nodes", [upper_side(line + more)], slave, segment, c, True)
+
+
+@st.composite
+def vertex(draw: DrawFn, kind: str) -> Sketch:
+    """Draw a point near the bisector of a vertex, on it, or off it by 2^-k, on either side of the master.
+
+    Where the vertex sticks out, a penetrating point may be nearest to two segments, and an open one to the node alone;
+    where it sticks in, it is the other way round.
+    """
+    if kind == "master angle below 90°":
+        up, steep = draw(st.sampled_from([-1, 1])), draw(st.sampled_from([2.0, 4.0, 8.0]))
+    else:
+        up, steep = (-1 if kind == "convex vertex" else 1), draw(st.sampled_from([1.0, 0.5, 0.25, 0.125]))
+    left, right = draw(_SIDES), draw(_SIDES)
+    line: Points = [(-left, up * steep * left), (0.0, 0.0), (right, up * steep * right)]
+    line += [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
+    gap = draw(nonzero_gaps())
+    c = draw(st.sampled_from(NODES_AND_OTHERS))
+    steps, segment = draw(slave_steps(1.0))
+    point = (draw(_off_the_bisector(abs(gap) * min(steep, 1.0))), gap)
+    return Sketch(kind, [upper_side(line)], slave_through(point, c, steps, segment), segment, c, True)
+
+
+@st.composite
+def _off_the_bisector(draw: DrawFn, reach: float) -> float:
+    """Draw a distance from the bisector, below the reach: 0 or a power of two, on either side."""
+    nearest = 1
+    while ldexp(1.0, -nearest) >= reach:
+        nearest += 1
+    if nearest > _FINEST:
+        return 0.0
+    size = st.integers(nearest, _FINEST).map(lambda k: ldexp(1.0, -k))
+    return draw(st.one_of(st.just(0.0), size, size.map(lambda distance: -distance)))
+
+
+@st.composite
+def three_segments(draw: DrawFn) -> Sketch:
+    """Draw the centre of a groove or of a rib: three segments are equally near."""
+    width, wall = draw(_SIDES), draw(st.sampled_from([1.0, 0.5, 2.0]))
+    groove: Points = [(-width, wall * width), (-width, -width), (width, -width), (width, wall * width)]
+    rib: Points = [(-width, -wall * width), (-width, width), (width, width), (width, -wall * width)]
+    return _at_origin(draw, "equidistant from three segments", groove, rib)
+
+
+@st.composite
+def three_nodes(draw: DrawFn) -> Sketch:
+    """Draw a point to which three tips of the master, or three bottoms of its grooves, are equally near."""
+    end = draw(st.sampled_from([8.0, 6.0]))
+    tips = [(-5.0, -end), (-3.0, -4.0), (-2.0, -end), (0.0, -5.0), (2.0, -end), (3.0, -4.0), (5.0, -end)]
+    return _at_origin(draw, "equidistant from three nodes", tips, [(x, -y) for x, y in tips])
+
+
+def _at_origin(draw: DrawFn, kind: str, above: Points, below: Points) -> Sketch:
+    """Return a sketch whose slave point is the origin: the master is below it, or it penetrates the master."""
+    line = above if draw(st.booleans()) else below
+    c = draw(st.sampled_from(NODES_AND_OTHERS))
+    steps, segment = draw(slave_steps(0.5))
+    return Sketch(kind, [upper_side(line)], slave_through((0.0, 0.0), c, steps, segment), segment, c, True)
+
+
+@st.composite
+def _feet_inside(draw: DrawFn, *, exact: bool = False) -> tuple[float, tuple[float, float]]:
+    """Draw a length, and a point over the inside of a segment of that length, no farther from it than from its ends."""
+    length, denominator = draw(_WHOLE_LENGTHS), 8 if exact else draw(st.sampled_from([8, 7]))
+    part = draw(st.integers(1, denominator - 1)) / denominator
+    room = 2.0 ** floor(log2(2 * min(part, 1 - part)))
+    return length, (part * length, draw(gaps()) * room * length)
+
+
+def _graph(draw: DrawFn, length: float, *, left: bool = True, slopes: bool = True) -> Chain:
+    """Draw a master that is a graph with slopes up to 45° besides the segment from (0, 0) to (length, 0).
+
+    A point over that segment, no farther from it than from its ends, is nearer to it than to all others.
+    """
+    right_to_left: Points = [(length, 0.0), (0.0, 0.0)]
+    for size, slope in draw(_NEIGHBOURS):
+        x, y = right_to_left[0]
+        right_to_left.insert(0, (x + size, y + size * slope * slopes))
+    for size, slope in draw(_NEIGHBOURS) if left else ():
+        x, y = right_to_left[-1]
+        right_to_left.append((x - size, y + size * slope * slopes))
+    return Chain(np.array(right_to_left))
+
 
 _SKETCHES: dict[str, SearchStrategy[Sketch]] = {
-    "inside a segment": sketch_kinds.inside(),
-    "first of several segments": sketch_kinds.one_of_several("first"),
-    "intermediate of several segments": sketch_kinds.one_of_several("intermediate"),
-    "last of several segments": sketch_kinds.one_of_several("last"),
-    "node hit exactly": sketch_kinds.node_hit(),
-    "coincident nodes": sketch_kinds.coincident_nodes(),
-    "convex vertex": sketch_kinds.vertex("convex vertex"),
-    "concave vertex": sketch_kinds.vertex("concave vertex"),
-    "master angle below 90°": sketch_kinds.vertex("master angle below 90°"),
-    "equidistant from three segments": sketch_kinds.three_segments(),
-    "equidistant from three nodes": sketch_kinds.three_nodes(),
-    "free end hit exactly": sketch_kinds.free_end(),
-    "past a free end, inside τ": sketch_kinds.past_end("past a free end, inside τ"),
-    "past a free end, outside τ": sketch_kinds.past_end("past a free end, outside τ"),
-    "overlap going to zero": sketch_kinds.small_overlap(),
-    "edge-on, 89.9°": sketch_kinds.angle("edge-on, 89.9°", 89.9),
-    "edge-on, 90°": sketch_kinds.angle("edge-on, 90°", 90.0),
-    "from behind": sketch_kinds.angle("from behind", 180.0),
-    "second body behind": sketch_kinds.second_body(),
-    "closing segment": sketch_kinds.closing_segment(),
-    "nearest node not on nearest segment": sketch_kinds.other_node(),
+    "inside a segment": inside(),
+    "first of several segments": one_of_several("first"),
+    "intermediate of several segments": one_of_several("intermediate"),
+    "last of several segments": one_of_several("last"),
+    "node hit exactly": node_hit(),
+    "coincident nodes": coincident_nodes(),
+    "convex vertex": vertex("convex vertex"),
+    "concave vertex": vertex("concave vertex"),
+    "master angle below 90°": vertex("master angle below 90°"),
+    "equidistant from three segments": three_segments(),
+    "equidistant from three nodes": three_nodes(),
+    "free end hit exactly": free_end(),
+    "past a free end, inside τ": past_end("past a free end, inside τ"),
+    "past a free end, outside τ": past_end("past a free end, outside τ"),
+    "overlap going to zero": small_overlap(),
+    "edge-on, 89.9°": angle("edge-on, 89.9°", 89.9),
+    "edge-on, 90°": angle("edge-on, 90°", 90.0),
+    "from behind": angle("from behind", 180.0),
+    "second body behind": second_body(),
+    "closing segment": closing_segment(),
+    "nearest node not on nearest segment": other_node(),
 }
 KINDS = tuple(_SKETCHES)
 _NEAR = st.integers(1, 20).map(lambda k: ldexp(1.0, -k))
-_PAST = float(TAU)
 _FEET = st.one_of(  # ξ on the master segment: inside, at a node, near one, and past one by less or more than τ.
     st.integers(1, 6).map(lambda sevenths: sevenths / 7),
     st.just(0.0),

@@ -23,7 +23,7 @@ from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.problems.blocks import is_uniform, overhangs, two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY
-from contactverif.strategies.parts import Motion, ends_of, lengths, motions, repeat_cyclically, seeds
+from contactverif.strategies.samples import Motion, ends_of, lengths, motions, repeat_cyclically, seeds
 
 UNIFORM = "a known uniform pressure"
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")

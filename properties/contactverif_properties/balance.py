@@ -17,8 +17,8 @@ from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
-from contactverif.strategies.sliding import sliding_cases
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
+from contactverif.strategies.translations import sliding_cases
 from contactverif_properties import roundoff
 from contactverif_properties.exact_forces import COMPONENTS
 from contactverif_properties.kinks import excuse_barrier, find_kink, measure_jump

@@ -23,7 +23,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, traction_forces
 from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.arcs import Arcs
-from contactverif.problems.hertz_studies import HERTZ_STUDIES
+from contactverif.problems.hertz_boxes import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies
 from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
 from contactverif_properties import applicability

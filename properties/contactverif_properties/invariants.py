@@ -32,10 +32,10 @@ from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
 from contactverif.mechanics.solving import solve_by_engine
 from contactverif.oracle import default_points, nearest_segments
 from contactverif.strategies import smooth_cases
-from contactverif.strategies.rings import closed_cases
+from contactverif.strategies.general import closed_cases
 from contactverif.strategies.solids import closed_cases as closed_scenes
-from contactverif.strategies.straight import bent_end_cases, cases_over_a_body
-from contactverif.strategies.surfaces import plane_cases_by_a_plate, smooth_surface_cases, surface_cases
+from contactverif.strategies.straight import bent_end_cases, cases_over_a_body, plane_cases_by_a_plate
+from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif_properties import roundoff
 from contactverif_properties.applicability import refuse_unstated_penalty
 from contactverif_properties.exact_forces import worst_force

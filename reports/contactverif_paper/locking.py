@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.columns import Group
 from contactverif.mechanics.newton import solve
-from contactverif.problems.wave_blocks import (
+from contactverif.problems.refined_blocks import (
     COLUMNS,
     LENGTH,
     MEAN_PRESSURE,

@@ -14,8 +14,8 @@ from contactverif.contract.faces import turns_of
 from contactverif.meshes.mesh_file import read_interface, read_sides
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.given_interface import close_surfaces, node_directions
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
-from contactverif.strategies.surfaces.given_surfaces import close_surfaces, node_directions
 
 LOWER = [[-1, -1, 0], [3, -1, 0], [3, 2, 0], [-1, 2, 0]]
 UPPER = [[0, 0, 0.5], [1, 0, 0.5], [1, 1, 0.75], [0, 1, 0.75]]

@@ -7,14 +7,16 @@ import pytest
 from exact_projection import project_point
 
 from contactverif.contract.interface import Interface, Surface
-from contactverif.oracle.exact_choices import closest_excess, seen_excess
-from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
 from contactverif.oracle.exact_points import (
+    Coverage,
     ExactPoints,
     Lattice,
+    closest_excess,
     closest_view,
+    lies_in_shadow,
     positions,
     run_against,
+    seen_excess,
     slave_normal_view,
 )
 from contactverif.sampling.draw import draw_cases

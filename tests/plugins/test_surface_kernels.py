@@ -10,8 +10,7 @@ from contactverif import Case, Interface, Pairing, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.oracle.exact_faces import FaceLattice, covered_shares
 from contactverif.sampling.draw import draw_cases
-from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
-from contactverif.strategies.surfaces.space_motions import SpaceMotion
+from contactverif.strategies.surfaces import SpaceMotion, flat_surface_cases, smooth_surface_cases, surface_cases
 from contactverif_surfaces import vts_cell_3d
 
 

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.problems.half_plane import displacements, stresses, surface_displacements
-from contactverif.problems.line_pressure import LinePressure, hertz_pressure, layer_contact
+from contactverif.problems.hertz import (
+    LinePressure,
+    displacements,
+    hertz_pressure,
+    layer_contact,
+    stresses,
+    surface_displacements,
+)
 
 YOUNG, POISSON = 2.0, 0.3
 PRESSURES = {"Hertz": hertz_pressure(1.0, 1.0), "layer": layer_contact(1.0, 1.0, 2.0, 20.0)}

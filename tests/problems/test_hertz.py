@@ -8,8 +8,7 @@ from scipy.integrate import quad
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.problems import hertz
-from contactverif.problems.hertz import solve_winkler_contact
-from contactverif.problems.line_pressure import layer_contact, logarithm_integrals
+from contactverif.problems.hertz import layer_contact, logarithm_integrals, solve_winkler_contact
 
 FORCE, RADIUS, PENALTY = 1e6, 10.0, 1e9
 STIFFNESS = 1 / (1 / 1e8 + 1 / 1e9)

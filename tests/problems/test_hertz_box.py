@@ -5,7 +5,7 @@ import pytest
 from subjects import load_subject
 
 from contactverif import MisuseError, solve
-from contactverif.problems.hertz_box import COARSEST, HertzBox, exact_displacements, hertz_body, hertz_box, mesh_lines
+from contactverif.problems.hertz_boxes import COARSEST, HertzBox, exact_displacements, hertz_body, hertz_box, mesh_lines
 
 BOX = HertzBox()
 MESHES = (16, 23, 24, 33, 48, 54)

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from contactverif.contract.errors import MisuseError
-from contactverif.problems.line_pressure import TERMS, hertz_contact, hertz_pressure, layer_contact, logarithm_integrals
+from contactverif.problems.hertz import TERMS, hertz_contact, hertz_pressure, layer_contact, logarithm_integrals
 
 # Relative shortfalls of the peak over E*/(ε̂ a), for values of E*/(ε̂ a), with the half-width a of Hertz.
 SHORTFALLS = {0.01: 0.317, 0.03: 0.313, 0.1: 0.301}

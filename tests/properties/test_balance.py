@@ -12,7 +12,7 @@ from textbook_cells import ClippedCells, WeightedGaps
 from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
 from contactverif.sampling.draw import draw_cases
-from contactverif.strategies.sliding import _opens_at_once, sliding_cases
+from contactverif.strategies.translations import _opens_at_once, sliding_cases
 from contactverif_properties.balance import N_STEPS, continuity, find_jumps
 
 

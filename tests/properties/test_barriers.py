@@ -11,12 +11,12 @@ from contactverif import Case, Interface, Rules, Subject, Traits, Verdict, judge
 from contactverif.contract.case import ACTIVATION, LEAST_GAP
 from contactverif.contract.property import CLOSED_CHAIN, Property
 from contactverif.plugins.registry import property_ids
-from contactverif.problems.lifted_states import LARGEST, LEAST, fit_to_traits, least_distance
+from contactverif.problems.open_states import LARGEST, LEAST, fit_to_traits, least_distance
 from contactverif.run.judge import FirstCall, call_first
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, smooth_cases
-from contactverif.strategies.rings import closed_cases
+from contactverif.strategies.general import closed_cases
 
 BARRIER = Traits(rules=Rules(enforcement="barrier", activation=0.5))
 FOR_BARRIERS = {

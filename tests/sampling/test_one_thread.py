@@ -13,7 +13,7 @@ from contactverif.sampling.draw import Sampling, draw_cases, shrink
 
 # A run that judged something before scipy's own BLAS was there.
 LATE = """
-from contactverif.sampling.blas_threads import one_thread
+from contactverif.sampling.hypothesis_draws import one_thread
 with one_thread():
     pass
 import scipy.linalg

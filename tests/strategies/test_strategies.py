@@ -19,8 +19,8 @@ from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import NAMED, named_case
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, general_cases, smooth_cases, tie_cases
-from contactverif.strategies.parts import lengths
-from contactverif.strategies.rings import Ring
+from contactverif.strategies.general import Ring
+from contactverif.strategies.samples import lengths
 from contactverif.strategies.solids import block_cases, dead_zone_cases, variant_cases
 
 FIXED = settings(derandomize=True, database=None, deadline=None)

@@ -12,13 +12,13 @@ from contactverif import Case
 from contactverif.contract.arrays import FloatArray
 from contactverif.oracle import nodal_surface_weights, uniform_surface_weights_exact
 from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.straight import tilted_plane_cases
 from contactverif.strategies.surfaces import (
     flat_surface_cases,
     matched_surface_cases,
     overhung_surface_cases,
     smooth_surface_cases,
     surface_cases,
-    tilted_plane_cases,
 )
 
 STRATEGIES: list[Callable[[], SearchStrategy[Case]]] = [flat_surface_cases, surface_cases, smooth_surface_cases]  # type: ignore[list-item]

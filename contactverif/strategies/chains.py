@@ -11,7 +11,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
-from contactverif.strategies.parts import Motion
+from contactverif.strategies.samples import Motion
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,8 @@
-"""The small draws that all cases are made of: lengths, depths of penetration, rigid motions, penalties, seeds.
+"""The small samples that all cases are made of: lengths, depths of penetration, rigid motions, penalties, seeds.
 
-Lengths are small integers × 2^k, so that coordinates are exact in binary. No strategy here filters, and each shrinks
-to the simplest thing: length 1, a quarter of a segment of penetration, no motion, scale 1.
-Strategies are cached because hypothesis validates each new one anew, which takes longer than drawing from it.
+Lengths are small integers × 2^k, so that coordinates are exact in binary. Each strategy shrinks to the simplest thing:
+length 1, a quarter of a segment of penetration, no motion, scale 1. Strategies are cached because hypothesis validates
+each new one anew, which takes longer than drawing from it.
 """
 
 from __future__ import annotations

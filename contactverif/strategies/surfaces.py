@@ -1,0 +1,398 @@
+"""Interfaces in 3-D: a grid of triangles or quadrilaterals over another one, larger and turned, or on the same square.
+
+The slave lies over the square [0, 1]², and every coordinate of the grids is a multiple of 2^-20, so that oracles in
+rationals see the numbers that a formulation sees. A stretch multiplies all coordinates across by a power of two. All
+shrink to one square on one square, each cut in two, without any motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import ldexp
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.case import Case
+from contactverif.contract.cases import random_source
+from contactverif.contract.faces import QUADRILATERAL, TRIANGLE
+from contactverif.contract.interface import Interface, Surface
+from contactverif.problems.flat_states import rotation
+from contactverif.strategies.given_interface import given_surface_states
+from contactverif.strategies.panel_chains import on_lattice
+from contactverif.strategies.samples import OFFSETS, depth_units, penalties, repeat_cyclically, seeds
+from contactverif.strategies.translations import FINENESS, FURTHEST
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceMotion:
+    """A rigid motion after a scaling. The rotation is that of a quaternion of integers."""
+
+    quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
+    shift: tuple[int, int, int] = (0, 0, 0)  # In units of the lattice.
+    exponent: int = 0
+
+    @property
+    def scale(self) -> float:
+        """The factor 2^k of all lengths."""
+        return ldexp(1.0, self.exponent)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The rotation Q (3, 3), each entry a rational rounded once."""
+        rows, size = rotation(self.quaternion)
+        return np.array(rows) / size
+
+    @property
+    def normal(self) -> FloatArray:
+        """The unit vector (3,) that the z-axis becomes."""
+        return self.matrix[:, 2].copy()
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
+        rows, size = rotation(self.quaternion)
+        turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
+        moved = turned / np.longdouble(size) + np.array(self.shift, dtype=np.longdouble)
+        return (moved * self.scale).astype(np.float64)
+
+
+REST = SpaceMotion()
+
+
+@cache
+def space_motions(*, furthest: int = 64, exponents: int = 20) -> SearchStrategy[SpaceMotion]:
+    """Return rest or any rigid motion, with translations up to `furthest` and scales 2^±`exponents`."""
+    part, place = st.integers(-4, 4), st.integers(-furthest, furthest)
+    quaternion = st.tuples(st.integers(1, 5), part, part, part)
+    exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))
+    return st.one_of(st.just(REST), st.builds(SpaceMotion, quaternion, st.tuples(place, place, place), exponent))
+
+
+MOST_CELLS = 6  # The most cells along a side.
+FURTHEST_MOVE = 14  # The largest move in 64ths of a cell; at 16 a triangle could lose its area.
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceGrid:
+    """A grid on the unit square."""
+
+    columns: int
+    rows: int
+    moves: Sequence[int]  # The moves of the nodes along and across in 64ths of a cell, dealt out in turn.
+    diagonals: Sequence[int]  # The diagonal of each cell, 0 or 1, dealt out in turn.
+    corners: int = TRIANGLE  # The corners of a face: 4 leaves the cells whole.
+    straight: bool = False  # Whole lines of nodes move, so that all cells are rectangles.
+
+    def points(self) -> FloatArray:
+        """Return the nodes (n, 2); those on the border stay on it."""
+        shape = (self.columns + 1, self.rows + 1)
+        move = repeat_cyclically(self.moves, 2 * shape[0] * shape[1]).reshape(*shape, 2) / 64
+        if self.straight:
+            move[..., 0], move[..., 1] = move[:, :1, 0], move[:1, :, 1]
+        move[[0, -1], :, 0] = move[:, [0, -1], 1] = 0.0
+        place = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) + move
+        return on_lattice((place / [self.columns, self.rows]).reshape(-1, 2))
+
+    @property
+    def choices(self) -> IntArray:
+        """The diagonal of each cell (n_cells,)."""
+        return repeat_cyclically(self.diagonals, self.columns * self.rows).astype(np.int64)
+
+    def with_ring(self) -> SurfaceGrid:
+        """Return a grid with one more cell on each side, in which the cells of this grid keep their diagonals."""
+        choices = np.pad(self.choices.reshape(self.columns, self.rows), 1).reshape(-1)
+        return replace(self, columns=self.columns + 2, rows=self.rows + 2, diagonals=choices.tolist())
+
+    def faces(self) -> IntArray:
+        """Return the faces (n_faces, corners), counter-clockwise in the plane."""
+        return self.triangles() if self.corners == TRIANGLE else self.quadrilaterals()
+
+    def triangles(self) -> IntArray:
+        """Return the faces (2 · n_cells, 3), counter-clockwise in the plane."""
+        a, b, c, d = self.quadrilaterals().T
+        choice = self.choices[:, None] == 0
+        first = np.where(choice, np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
+        second = np.where(choice, np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
+        return np.stack([first, second], axis=1).reshape(-1, 3)
+
+    def quadrilaterals(self) -> IntArray:
+        """Return the cells (n_cells, 4), counter-clockwise in the plane."""
+        n = np.arange((self.columns + 1) * (self.rows + 1)).reshape(self.columns + 1, -1)
+        return np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+
+@cache
+def surface_grids(
+    *, most: int = MOST_CELLS, faces: tuple[int, ...] = (TRIANGLE,), straight: bool = False
+) -> SearchStrategy[SurfaceGrid]:
+    """Return grids of 1 × 1 to `most` × `most` cells; they shrink to one cell that is cut along its first diagonal.
+
+    `faces` are the numbers of corners that a face may have. Quadrilaterals are rectangles if they are `straight`.
+    """
+    cells = st.integers(1, most)
+    moves = st.lists(st.integers(-FURTHEST_MOVE, FURTHEST_MOVE), min_size=1, max_size=12)
+    diagonals = st.lists(st.integers(0, 1), min_size=1, max_size=8)
+    if faces == (TRIANGLE,):
+        return st.builds(SurfaceGrid, cells, cells, moves, diagonals)
+    kinds = st.sampled_from([(corners, straight and corners != TRIANGLE) for corners in faces])
+    return st.builds(
+        lambda kind, columns, rows, moves, diagonals: SurfaceGrid(columns, rows, moves, diagonals, *kind),
+        *(kinds, cells, cells, moves, diagonals),
+    )
+
+
+_SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+_STRETCHES = st.sampled_from([0] * 7 + [1, 2, 4, 6, 8, 12])  # Exponents of the aspect ratio.
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacePair:
+    """A slave grid and a master grid, at rest in the plane z = 0."""
+
+    slave: SurfaceGrid
+    master: SurfaceGrid
+    same_domain: bool  # The master covers the slave's square exactly; else [−1/2, 3/2]², turned about its middle.
+    degrees: int  # The turn of a larger master.
+    stretch: int  # Coordinates across are multiplied by 2^-stretch.
+    shuffle: int  # The numbering of nodes and faces; 0 for that of the grids.
+
+    def lay_out(self) -> tuple[Interface, FloatArray, FloatArray]:
+        """Return the interface, the plane coordinates (n_nodes, 2) of its nodes, and the corners of the slave's domain.
+
+        The slave's body is above, so that its faces are seen from below.
+        """
+        factors = np.array([1.0, 2.0**-self.stretch])
+        slave, master = self.slave.points(), self._master_points()
+        plane = np.vstack([slave, master]) * factors
+        faces = [self.slave.faces()[:, ::-1], self.master.faces() + len(slave)]
+        plane, faces = self._renumber(plane, faces, len(slave))
+        nodes = np.column_stack([plane, np.zeros(len(plane))])
+        return Interface(nodes, Surface(faces[0]), Surface(faces[1])), plane, _SQUARE * factors
+
+    def _master_points(self) -> FloatArray:
+        """Return the master's nodes (n, 2) before the stretch."""
+        points = self.master.points()
+        if self.same_domain:
+            return points
+        angle = np.deg2rad(self.degrees)
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        return on_lattice((2 * points - 1) @ turn + 0.5)
+
+    def _renumber(self, plane: FloatArray, faces: list[IntArray], n_slave: int) -> tuple[FloatArray, list[IntArray]]:
+        """Return places (n_nodes, 2) and faces of both sides in other numbers, as the shuffle says."""
+        if not self.shuffle:
+            return plane, faces
+        random = np.random.default_rng(self.shuffle)
+        order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(len(plane) - n_slave)])
+        number = np.argsort(order)  # The new number of each node.
+        return plane[order], [
+            np.array([_start(row, random) for row in random.permutation(number[side])]) for side in faces
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class MatchedPair(SurfacePair):
+    """A slave grid and a master grid with the same faces, and with a ring of more faces unless the domain is the same.
+
+    So each master node over the slave lies on a slave node.
+    """
+
+    def _master_points(self) -> FloatArray:
+        """Return the master's nodes (n, 2) before the stretch."""
+        points = self.slave.points()
+        if self.same_domain:
+            return points
+        points = np.pad(points.reshape(self.slave.columns + 1, -1, 2), ((1, 1), (1, 1), (0, 0)), mode="edge")
+        points[[0, -1], :, 0] = [[-0.5], [1.5]]
+        points[:, [0, -1], 1] = [-0.5, 1.5]
+        return points.reshape(-1, 2)
+
+
+def _start(face: IntArray, random: np.random.Generator) -> IntArray:
+    """Return the corners of a face from another one on."""
+    return np.roll(face, int(random.integers(len(face))))
+
+
+@cache
+def surface_pairs(
+    *,
+    same_domain: bool | None = None,
+    most: int = 6,
+    stretched: bool = True,
+    faces: tuple[int, ...] = (TRIANGLE,),
+    straight: bool = False,
+) -> SearchStrategy[SurfacePair]:
+    """Return pairs of grids; unless `same_domain` says which, half of them share their domain and half do not.
+
+    `faces` and `straight` are those of `surface_grids`. The border of a slave may cut a triangle of a larger master,
+    but no straight quadrilateral, whose forces would have no exact answer.
+    """
+    same = st.booleans().map(lambda larger: not larger) if same_domain is None else st.just(same_domain)
+    grids = surface_grids(most=most, faces=faces, straight=straight)
+    shuffle = st.one_of(st.just(0), st.integers(0, 255))
+    stretches = _STRETCHES if stretched else st.just(0)
+
+    def pair(slave: SurfaceGrid, master: SurfaceGrid, same: bool, *others: int) -> SurfacePair:
+        return SurfacePair(slave, master, same or master.straight, *others)
+
+    return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, shuffle)
+
+
+@cache
+def matched_pairs() -> SearchStrategy[SurfacePair]:
+    """Return pairs with master nodes on slave nodes; half of them share their domain, and half do not."""
+    shuffle = st.one_of(st.just(0), st.integers(0, 255))
+
+    def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
+        return MatchedPair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number)
+
+    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, shuffle)
+
+
+_QUARTERS = st.integers(1, 8)  # The penetration, in quarters of a unit of the least height of a face.
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.flat_surface_cases")
+def flat_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
+    """Return cases of uniform penetration in space; the master covers the slave.
+
+    Their parameters are "penetration" (|g| > 0, a length), "plane" (n_nodes, 2) (coordinates of the nodes in the plane
+    of the interface, before any rigid motion), "domain" (4, 2) (the corners of the slave's domain there) and "normal"
+    (3,) (the unit vector out of the master). Quadrilaterals are rectangles. There are no cases on an interface of the
+    user.
+    """
+    return _flat_states(surface_pairs(faces=faces, straight=True)) if interface is None else None
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.skewed_surface_cases")
+def skewed_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (QUADRILATERAL,)
+) -> SearchStrategy[Case] | None:
+    """Return cases as `flat_surface_cases` does, on the same domain, with quadrilaterals of any convex shape."""
+    return _flat_states(surface_pairs(same_domain=True, faces=faces)) if interface is None else None
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")
+def matched_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return cases as `flat_surface_cases` does, with each master node over the slave on a slave node."""
+    return _flat_states(matched_pairs()) if interface is None else None
+
+
+@random_source("contactverif.strategies.surfaces.uniform_surfaces.overhung_surface_cases")
+def overhung_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+    """Return cases as `flat_surface_cases` does, with a master that goes beyond the slave on all sides."""
+    return _flat_states(surface_pairs(same_domain=False)) if interface is None else None
+
+
+@st.composite
+def _flat_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
+    pair = draw(pairs)
+    quarters, unit = draw(_QUARTERS), draw(depth_units())
+    motion, penalty, seed = draw(space_motions()), draw(penalties()), draw(seeds())
+    interface, plane, domain = pair.lay_out()
+    heights = [side.heights(interface.nodes).min() for side in (interface.slave, interface.master)]
+    penetration = quarters / 4 * unit * 2.0 ** np.floor(np.log2(min(heights)))
+    current = interface.nodes.copy()
+    current[: interface.n_slave_nodes, 2] -= penetration
+    parameters = {
+        "penetration": np.array(penetration * motion.scale),
+        "plane": plane * motion.scale,
+        "domain": domain * motion.scale,
+        "normal": motion.normal,
+    }
+    reference = interface.at(interface.nodes * motion.scale)
+    return Case(reference, motion(current).reshape(-1), penalty, parameters, seed)
+
+
+_MIDDLE_QUARTERS = st.integers(1, 8)  # The depth of the middle in quarters of a unit of the least height.
+_SLOPES = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])
+_FINENESS = FINENESS + 1  # One bit more: far away all 53 are full, so that the middle of an edge is rounded.
+_PLACES = st.integers(-(2**FURTHEST) + 2**6, 2**FURTHEST - 2**6)
+_WARPS = st.lists(st.integers(-4, 4), min_size=1, max_size=9)  # Moves across in sixteenths of the least height.
+
+
+@random_source("contactverif.strategies.surfaces.tilted_surfaces.surface_cases")
+def surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
+    """Return tilted and warped states, of which half have surfaces on the same domain, with all its ties.
+
+    On an interface of the user they are states of this.
+    """
+    if interface is not None:
+        return given_surface_states(interface, smooth=False)
+    return _tilted_states(surface_pairs(faces=faces), smooth=False)
+
+
+@random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
+def smooth_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
+    """Return tilted and warped states off the lattice, over a larger master: for derivatives.
+
+    On an interface of the user they are states of this.
+    """
+    if interface is not None:
+        return given_surface_states(interface, smooth=True)
+    return _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
+
+
+@random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
+def translated_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
+    """Return turned states near the origin that a translation by the parameter "shift" (3,) moves exactly.
+
+    State and reference are rounded to multiples of 2^-33, and the translation goes up to 2^20.
+    """
+    pairs = surface_pairs(same_domain=False, stretched=False, most=3, faces=faces)
+    return _translated_states(pairs) if interface is None else None
+
+
+@st.composite
+def _translated_states(draw: DrawFn, pair: SearchStrategy[SurfacePair]) -> Case:
+    case = draw(_tilted_states(pair, smooth=True, motions=space_motions(furthest=0, exponents=0)))
+    shift = np.array([draw(_PLACES), draw(_PLACES), draw(_PLACES)], dtype=np.float64)
+    nodes, z = (
+        np.ldexp(np.round(np.ldexp(values, _FINENESS)), -_FINENESS) for values in (case.interface.nodes, case.z)
+    )
+    return replace(case, interface=case.interface.at(nodes), z=z, parameters={"shift": shift})
+
+
+@st.composite
+def _tilted_states(
+    draw: DrawFn,
+    pairs: SearchStrategy[SurfacePair],
+    smooth: bool,
+    motions: SearchStrategy[SpaceMotion] | None = None,
+) -> Case:
+    pair = draw(pairs)
+    quarters, unit = draw(_MIDDLE_QUARTERS), draw(depth_units())
+    slopes, warps = (draw(_SLOPES), draw(_SLOPES)), (draw(_WARPS), draw(_WARPS))
+    motion, penalty, seed = draw(space_motions() if motions is None else motions), draw(penalties()), draw(seeds())
+    offsets = draw(OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
+    interface, _, domain = pair.lay_out()
+    least = float(min(side.heights(interface.nodes).min() for side in (interface.slave, interface.master)))
+    n_slave, current = interface.n_slave_nodes, interface.nodes.copy()
+    current[:n_slave] += _offsets(offsets, n_slave) * least
+    current[:n_slave, 2] += (current[:n_slave, :2] - domain.mean(axis=0)) @ slopes - quarters / 4 * unit * least
+    for part, warp in zip((slice(n_slave), slice(n_slave, None)), warps, strict=True):
+        current[part, 2] += _warp(warp, len(current[part])) * unit * least
+    scaled = interface.at(interface.nodes * motion.scale)
+    return Case(scaled, motion(current).reshape(-1), penalty, {}, seed)
+
+
+def _offsets(offsets: Sequence[int], count: int) -> FloatArray:
+    """Return shifts (count, 3) of slave nodes by 0 to 1/16, on lattices that are coprime to the powers of two."""
+    return repeat_cyclically(offsets, 3 * count).reshape(-1, 3) / [7.0, 11.0, 13.0] / 16
+
+
+def _warp(warps: Sequence[int], count: int) -> FloatArray:
+    """Return moves across (count,), a quarter at most, dealt out in turn."""
+    return repeat_cyclically(warps, count) / 16
