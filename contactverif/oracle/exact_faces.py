@@ -17,7 +17,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.faces import measure_heights
 from contactverif.contract.interface import Interface
-from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Ratios, roots
+from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Ratios, as_integers, dot, roots
 from contactverif.oracle.flat_answers import area_of, cut_polygon
 from contactverif.oracle.nearest import integers
 
@@ -37,7 +37,7 @@ class FaceLattice:
     def from_state(cls, interface: Interface, z: FloatArray) -> FaceLattice:
         """Return the lattice of a state z (n_unknowns + …,), whose numbers count as the rationals that they are."""
         values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
-        return cls(_objects(values, (-1, 3)), scale, interface.slave.faces, interface.master.faces)
+        return cls(as_integers(values).reshape(-1, 3), scale, interface.slave.faces, interface.master.faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ class ExactFacePoints:
         The first shape function is what the others leave of 1, so that a point is on its face.
         """
         values, below = integers(shape[:, 1:].reshape(-1))
-        shares = _objects(values, (-1, 2))
+        shares = as_integers(values).reshape(-1, 2)
         first, second, third = np.moveaxis(lattice.nodes[lattice.slave[face]], 1, 0)
         arms = second - first, third - first
         place = below * first + shares[:, :1] * arms[0] + shares[:, 1:] * arms[1]
@@ -88,19 +88,21 @@ class FaceView:
         direction = -outward if closest else points.outward
         weight = points.weight
         arms = weight[:, None, None] * nodes - points.place[:, None, :]  # (n_points, 3, 3), from the points.
-        facing = _dot(outward, direction)  # Negative where the faces look at each other.
+        facing = dot(outward, direction)  # Negative where the faces look at each other.
         sign = np.where(facing < 0, -1, 1).astype(object)
         below = sign * facing + (facing == 0)
         parts = np.stack(
-            [_dot(direction, _cross(arms[:, k - 2], arms[:, k - 1])) for k in range(3)], axis=1
+            [dot(direction, _cross(arms[:, k - 2], arms[:, k - 1])) for k in range(3)], axis=1
         )  # Twice the areas under the foot, seen along the direction.
-        length = roots(_dot(direction, direction))
-        height = sign * _dot(outward, arms[:, 0])
+        length = roots(dot(direction, direction))
+        height = sign * dot(outward, arms[:, 0])
+        # Lengths may be beyond floats.
+        cosine = Ratios(-facing << ROOT_SHIFT, roots(dot(outward, outward) * dot(direction, direction)))
         return cls(
             shape=Ratios(sign[:, None] * parts, (weight**2 * below)[:, None]),
             gap=Ratios(height * length, weight * below * lattice.scale << ROOT_SHIFT),
             normal=Ratios(-direction << ROOT_SHIFT, length[:, None]),
-            cosine=np.ones(len(faces)) if closest else _cosines(outward, direction),
+            cosine=np.ones(len(faces)) if closest else cosine.floats(),
             corners=Ratios(arms, (weight * lattice.scale)[:, None, None]).floats(),
         )
 
@@ -120,28 +122,11 @@ def _outward(corners: Integers) -> Integers:
     return _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def _cosines(outward: Integers, direction: Integers) -> FloatArray:
-    """Return the cosines (n,) of the angles between vectors −a and b, whose lengths may be beyond floats."""
-    squares = _dot(outward, outward) * _dot(direction, direction)
-    return Ratios(-_dot(outward, direction) << ROOT_SHIFT, roots(squares)).floats()
-
-
 def _cross(a: Integers, b: Integers) -> Integers:
     x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return np.stack([x, y, z], axis=-1)
-
-
-def _dot(a: Integers, b: Integers) -> Integers:
-    product: Integers = (a * b).sum(axis=-1)
-    return product
-
-
-def _objects(values: list[int], shape: tuple[int, ...]) -> Integers:
-    array = np.empty(len(values), dtype=object)
-    array[:] = values
-    return array.reshape(shape)
 
 
 def covered_shares(lattice: FaceLattice) -> list[Fraction]:
@@ -152,10 +137,10 @@ def covered_shares(lattice: FaceLattice) -> list[Fraction]:
     shares, front = [], _outward(lattice.nodes[lattice.master])
     for face, normal in zip(lattice.slave, _outward(lattice.nodes[lattice.slave]), strict=True):
         first, second, third = lattice.nodes[face]
-        arms, whole = lattice.nodes[lattice.master] - first, _dot(normal, normal)
+        arms, whole = lattice.nodes[lattice.master] - first, dot(normal, normal)
         # The corners of the master in the plane of the triangle: 0 to `whole` along its first and its last edge.
-        along, up = _dot(_cross(arms, third - first), normal), _dot(_cross(second - first, arms), normal)
-        near = _dot(front, normal) < 0
+        along, up = dot(_cross(arms, third - first), normal), dot(_cross(second - first, arms), normal)
+        near = dot(front, normal) < 0
         near &= (along.min(axis=1) < whole) & (up.min(axis=1) < whole) & (along.max(axis=1) > 0) & (up.max(axis=1) > 0)
         share = Fraction(0)
         for corners in np.stack([along, up], axis=-1)[near][:, ::-1].tolist():

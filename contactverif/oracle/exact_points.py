@@ -55,7 +55,10 @@ class ExactPoints:
         """Return the points at c (n_points,), from −1 at the first to +1 at the second node of a slave segment."""
         ratios = [value.as_integer_ratio() for value in c.tolist()]
         return cls.at_ratios(
-            lattice, slave_segment, _objects([above for above, _ in ratios]), _objects([below for _, below in ratios])
+            lattice,
+            slave_segment,
+            as_integers([above for above, _ in ratios]),
+            as_integers([below for _, below in ratios]),
         )
 
     @classmethod
@@ -81,7 +84,11 @@ class Ratios:
         """Return values − above/below in their shape, each rounded once; NaN where a value is not finite."""
         above, below = np.broadcast_arrays(self.above, self.below)
         triples = zip(values.reshape(-1).tolist(), above.reshape(-1).tolist(), below.reshape(-1).tolist(), strict=True)
-        return np.array([_error(*triple) for triple in triples], dtype=np.float64).reshape(values.shape)
+        errors = []
+        for value, a, b in triples:
+            n, d = value.as_integer_ratio() if np.isfinite(value) else (0, 0)
+            errors.append((n * b - a * d) / (d * b) if d else np.nan)
+        return np.array(errors, dtype=np.float64).reshape(values.shape)
 
     def floats(self) -> FloatArray:
         """Return the numbers as floats, each rounded once."""
@@ -112,10 +119,10 @@ class View:
 def closest_view(lattice: Lattice, points: ExactPoints, segments: IntArray) -> View:
     """Return what points see of master segments (n_points,) along the normals of these segments."""
     arm, along = _arm_and_along(lattice, points, segments)
-    squared = _dot(along, along)
+    squared = dot(along, along)
     length = roots(squared)
     return View(
-        xi=Ratios(_dot(arm, along), points.weight * squared),
+        xi=Ratios(dot(arm, along), points.weight * squared),
         gap=Ratios(_cross(arm, along) << ROOT_SHIFT, points.weight * length * lattice.scale),
         normal=Ratios(np.stack([along[:, 1], -along[:, 0]], axis=1) << ROOT_SHIFT, length[:, None]),
         lengths=_lengths(lattice, points, arm, along),
@@ -131,14 +138,14 @@ def slave_normal_view(lattice: Lattice, points: ExactPoints, segments: IntArray)
     A segment that is seen edge-on has its ξ and gap divided by 1 in place of 0; its cosine tells.
     """
     arm, along = _arm_and_along(lattice, points, segments)
-    advance = -_dot(along, points.along)  # It is positive where the segments face each other.
+    advance = -dot(along, points.along)  # It is positive where the segments face each other.
     sign = np.where(advance < 0, -1, 1).astype(object)
     size = abs(advance) + (advance == 0)
-    slave_length = roots(_dot(points.along, points.along))
+    slave_length = roots(dot(points.along, points.along))
     master_length, slave_float = _sizes(along, lattice.scale), _sizes(points.along, lattice.scale)
     cosine = Ratios(advance, np.full(len(segments), lattice.scale**2, dtype=object)).floats()
     return View(
-        xi=Ratios(-sign * _dot(arm, points.along), points.weight * size),
+        xi=Ratios(-sign * dot(arm, points.along), points.weight * size),
         gap=Ratios(sign * slave_length * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
         normal=Ratios(np.stack([-points.along[:, 1], points.along[:, 0]], axis=1) << ROOT_SHIFT, slave_length[:, None]),
         lengths=_lengths(lattice, points, arm, along),
@@ -151,7 +158,7 @@ def slave_normal_view(lattice: Lattice, points: ExactPoints, segments: IntArray)
 def run_against(lattice: Lattice, points: ExactPoints, segments: IntArray) -> BoolArray:
     """Return whether master segments (n_points,) run against the slave segments of points, and so face them."""
     _, along = _arm_and_along(lattice, points, segments)
-    return (_dot(along, points.along) < 0).astype(np.bool_)
+    return (dot(along, points.along) < 0).astype(np.bool_)
 
 
 def positions(lattice: Lattice, points: ExactPoints) -> Ratios:
@@ -176,8 +183,9 @@ def _sizes(vectors: Integers, scale: Any) -> FloatArray:
     return np.hypot(parts[:, 0], parts[:, 1])
 
 
-def _dot(a: Integers, b: Integers) -> Integers:
-    product: Integers = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
+def dot(a: Integers, b: Integers) -> Integers:
+    """Return the products (n,) of vectors (n, dim)."""
+    product: Integers = (a * b).sum(axis=-1)
     return product
 
 
@@ -188,20 +196,14 @@ def _cross(a: Integers, b: Integers) -> Integers:
 
 def roots(squares: Integers) -> Integers:
     """Return 2^128 times the roots of integers, rounded down."""
-    return _objects([isqrt(square << 2 * ROOT_SHIFT) for square in squares.tolist()])
+    return as_integers([isqrt(square << 2 * ROOT_SHIFT) for square in squares.tolist()])
 
 
-def _objects(values: Sequence[int]) -> Integers:
+def as_integers(values: Sequence[int]) -> Integers:
+    """Return an array (n,) of Python integers."""
     array = np.empty(len(values), dtype=object)
     array[:] = values
     return array
-
-
-def _error(value: float, above: int, below: int) -> float:
-    if not np.isfinite(value):
-        return np.nan
-    numerator, denominator = value.as_integer_ratio()
-    return (numerator * below - above * denominator) / (denominator * below)
 
 
 _SAFE = 2.0**-20  # Floats err by less than this share of a distance, wherever a state makes sense.
@@ -224,18 +226,14 @@ def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) ->
     excess, ties = np.empty(len(segments)), np.empty(len(segments), dtype=np.int64)
     for number, (choice, others) in enumerate(zip(segments.tolist(), reaches, strict=True)):
         near = nearest_of(others.values())
-        excess[number] = _farther(others[choice], near[0], weights[number] * lattice.scale)
+        excess[number] = 0.0
         ties[number] = len(near)
+        a, b, c, d = others[choice].above, others[choice].squared, near[0].above, near[0].squared
+        if a * d > c * b:  # Squared distances still carry unit².
+            unit = weights[number] * lattice.scale
+            total = np.sqrt(a / (b * unit**2)) + np.sqrt(c / (d * unit**2))
+            excess[number] = float((a * d - c * b) / (b * d * unit**2) / total)
     return excess, ties
-
-
-def _farther(choice: Reach, nearest: Reach, unit: int) -> float:
-    """Return how much farther one segment is than another, a length ≥ 0; squared distances still carry unit²."""
-    a, b, c, d = choice.above, choice.squared, nearest.above, nearest.squared
-    if a * d <= c * b:
-        return 0.0
-    total = np.sqrt(a / (b * unit**2)) + np.sqrt(c / (d * unit**2))
-    return float((a * d - c * b) / (b * d * unit**2) / total)
 
 
 def _near_pairs(lattice: Lattice, points: ExactPoints, choice: IntArray) -> tuple[IntArray, IntArray]:
@@ -267,7 +265,8 @@ def seen_excess(
     past = np.maximum(np.maximum(-view.xi.floats(), view.xi.floats() - 1), 0.0) * view.master_length
     farther = _farther_than_nearest(lattice, points, segments, view)
     if cells and farther.any():
-        middle = _middles(lattice, slave_segment, segments)
+        low, high, squared = overlaps(lattice, slave_segment, segments)
+        middle = ExactPoints.at_ratios(lattice, slave_segment, low + high, 2 * squared)
         in_middle = slave_normal_view(lattice, middle, segments)
         farther = np.minimum(farther, _farther_than_nearest(lattice, middle, segments, in_middle))
     return np.where(view.cosine > 0, np.maximum(past, farther), np.inf)
@@ -287,12 +286,6 @@ def _farther_than_nearest(lattice: Lattice, points: ExactPoints, choice: IntArra
     gaps = np.where(rival, gap, np.inf).reshape(len(choice), n_master).min(axis=1, initial=np.inf)
     farther: FloatArray = np.maximum(np.abs(view.gap.floats()) - gaps, 0.0)
     return farther
-
-
-def _middles(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> ExactPoints:
-    """Return the points in the middle of the overlaps of slave and master segments, seen along the slave's normal."""
-    low, high, squared = overlaps(lattice, slave_segment, segments)
-    return ExactPoints.at_ratios(lattice, slave_segment, low + high, 2 * squared)
 
 
 def overlaps(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> tuple[Integers, Integers, Integers]:
@@ -335,14 +328,9 @@ class Coverage:
         for number in np.unique(carrier[facing]).tolist():
             here = np.flatnonzero(facing & (carrier == number))
             above[number], below[number] = sum((high - low)[here].tolist()), 2 * squared[pairs][here[0]]
-            clear[number] &= not _overlap(low[here], high[here])
+            order = sorted(here.tolist(), key=lambda pair: (low[pair], high[pair]))
+            clear[number] &= all(high[now] <= low[following] for now, following in pairwise(order))
         return cls(Ratios(above, below), clear)
-
-
-def _overlap(low: Integers, high: Integers) -> bool:
-    """Return whether any two of some intervals have more than an end in common."""
-    order = sorted(range(len(low)), key=lambda number: (low[number], high[number]))
-    return any(high[now] > low[following] for now, following in pairwise(order))
 
 
 def lies_in_shadow(lattice: Lattice, interface: Interface) -> bool:

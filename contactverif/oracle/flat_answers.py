@@ -81,19 +81,14 @@ def nodal_spring_weights(interface: Interface, along: ArrayLike, *, both_surface
     passes = [(interface.slave, interface.master), (interface.master, interface.slave)]
     for surface, other in passes if both_surfaces else passes[:1]:
         for node in np.unique(surface.segments).tolist():
-            _add_spring(forces, node, other, places)
+            for first, second in other.segments.tolist():
+                span, arm = places[second] - places[first], places[node] - places[first]
+                if 0 <= Fraction(arm, span) <= 1:
+                    forces[node] += 1
+                    forces[second] += Fraction(arm, span)
+                    forces[first] += 1 - Fraction(arm, span)
+                    break
     return np.array([float(force) for force in forces])
-
-
-def _add_spring(forces: list[Fraction], node: int, other: Surface, places: list[int]) -> None:
-    """Add the unit force of a spring at a node, and its shares on the first segment that is opposite."""
-    for first, second in other.segments.tolist():
-        span, arm = places[second] - places[first], places[node] - places[first]
-        if 0 <= Fraction(arm, span) <= 1:
-            forces[node] += 1
-            forces[second] += Fraction(arm, span)
-            forces[first] += 1 - Fraction(arm, span)
-            return
 
 
 def is_of_class(interface: Interface, along: ArrayLike, *, midpoints: bool) -> bool:
@@ -196,7 +191,7 @@ def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
     """Return ∫ of each shape function of a face over its part in the domain."""
     edges = list(zip(border, border[1:] + border[:1], strict=True))
     if all(_turn(start, end, corner) >= 0 for start, end in edges for corner in corners):
-        return _whole_triangle(corners) if len(corners) == _TRIANGLE else _whole_quadrilateral(corners)
+        return [_turn(*corners) / 6] * 3 if len(corners) == _TRIANGLE else _whole_quadrilateral(corners)
     if len(corners) != _TRIANGLE:
         raise MisuseError(
             "plane", "a quadrilateral partly outside of the domain", "triangles, or none cut by the border"
@@ -206,8 +201,18 @@ def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
 
 def cut_polygon(polygon: Polygon, border: Polygon) -> Polygon:
     """Return the part of a convex polygon in another one, at most empty."""
-    for start, end in zip(border, border[1:] + border[:1], strict=True):
-        polygon = _cut(polygon, start, end)
+    for start, end in zip(border, border[1:] + border[:1], strict=True):  # Keep what is to the left of each edge.
+        part: Polygon = []
+        sides = [_turn(start, end, corner) for corner in polygon]
+        for k, (corner, side) in enumerate(zip(polygon, sides, strict=True)):
+            following, there = polygon[(k + 1) % len(polygon)], sides[(k + 1) % len(polygon)]
+            if side >= 0:
+                part.append(corner)
+            if side * there < 0:
+                share = side / (side - there)
+                x, y = (now + share * (then - now) for now, then in zip(corner, following, strict=True))
+                part.append((x, y))
+        polygon = part
     return polygon
 
 
@@ -215,25 +220,6 @@ def area_of(polygon: Polygon) -> Fraction:
     """Return the area of a polygon."""
     corners = polygon[1:]
     return sum((_turn(polygon[0], *pair) for pair in pairwise(corners)), Fraction(0)) / 2
-
-
-def _cut(polygon: Polygon, start: Point, end: Point) -> Polygon:
-    """Return the part of a convex polygon to the left of a line."""
-    part: Polygon = []
-    sides = [_turn(start, end, corner) for corner in polygon]
-    for k, (corner, side) in enumerate(zip(polygon, sides, strict=True)):
-        following, there = polygon[(k + 1) % len(polygon)], sides[(k + 1) % len(polygon)]
-        if side >= 0:
-            part.append(corner)
-        if side * there < 0:
-            share = side / (side - there)
-            x, y = (now + share * (then - now) for now, then in zip(corner, following, strict=True))
-            part.append((x, y))
-    return part
-
-
-def _whole_triangle(corners: Polygon) -> Sequence[Fraction]:
-    return [_turn(*corners) / 6] * 3
 
 
 def _triangle_over(corners: Polygon, part: Polygon) -> Sequence[Fraction]:

@@ -31,8 +31,8 @@ from contactverif.run import judge
 from contactverif.run.judge import badness
 from contactverif.run.scheduler import CaseChunk
 from contactverif.run.store import Writer
-from contactverif.sampling.blas_threads import one_thread
 from contactverif.sampling.draw import CaseSource, Sampling, draw_cases, shrink
+from contactverif.sampling.hypothesis_draws import one_thread
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
 FAILURES = 100  # The failures behind them that stay as they are.

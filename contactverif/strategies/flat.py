@@ -211,9 +211,9 @@ def exact_flat_cases(draw: DrawFn) -> Case:
     translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point projects
     inside the master.
     """
-    turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
+    turn, slave_lengths, master_lengths = draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
     depth = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS)
-    penalty, seed, shift, offsets = _others(draw)
+    penalty, seed, shift, offsets = draw(penalties()), draw(seeds()), draw(_SHIFTS), draw(OFFSETS)
     fineness = FINENESS if shift.any() else _FINENESS_AT_REST
     slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, fineness, fineness)
     case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
@@ -223,9 +223,9 @@ def exact_flat_cases(draw: DrawFn) -> Case:
 @on_own_meshes
 def linear_flat_cases(draw: DrawFn) -> Case:
     """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
-    turn, slave_lengths, master_lengths = _turn_and_lengths(draw)
+    turn, slave_lengths, master_lengths = draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
     depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
-    penalty, seed, shift, offsets = _others(draw)
+    penalty, seed, shift, offsets = draw(penalties()), draw(seeds()), draw(_SHIFTS), draw(OFFSETS)
     # Heights are places times a power of two, so that they need some bits more than places.
     slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, _COARSE, FINENESS)
     case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
@@ -236,16 +236,6 @@ def linear_flat_cases(draw: DrawFn) -> Case:
     positions[: len(slave)] += np.outer(slope * (slave - middle), [-q, p])
     parameters = {"direction": case.parameters["direction"], "slope": np.array(slope), "shift": shift}
     return Case(case.interface, positions.reshape(-1), penalty, parameters, seed)
-
-
-def _turn_and_lengths(draw: DrawFn) -> tuple[Turn, list[int], list[int]]:
-    return draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
-
-
-def _others(draw: DrawFn) -> tuple[float, int, FloatArray, list[int]]:
-    """Draw penalty, seed, translation and offsets."""
-    penalty, seed = draw(penalties()), draw(seeds())
-    return penalty, seed, draw(_SHIFTS), draw(OFFSETS)
 
 
 def _slave_and_master(

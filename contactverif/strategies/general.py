@@ -42,17 +42,6 @@ STEEPEST = 1e-3  # An edge seen at a smaller slope than this from a point counts
 SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the largest.
 
 
-def extend_line(line: FloatArray, slave: Sequence[float], room: float) -> FloatArray:
-    """Return the broken line (n, 2), from 0 to the right, long enough for half of the first or last slave segment.
-
-    `slave` has the lengths of its segments; `room` is a length that is left free at the right end.
-    """
-    needed = max(slave[0], slave[-1]) / 2 + 2 * room
-    if line[-1, 0] >= needed:
-        return line
-    return np.vstack([line, [needed + room, line[-1, 1]]])
-
-
 def covered_start(start: float, slave: Sequence[float], width: float) -> float:
     """Return where a slave of these lengths starts so that half of one of its segments lies between 0 and `width`.
 
@@ -164,13 +153,9 @@ def rings() -> SearchStrategy[Ring]:
 _RINGS = rings()
 
 
-def closed_cases() -> SearchStrategy[Case]:
-    """Return a closed ring in a hole, off the lattice; its seam is where the numbering, on the walk or not, begins."""
-    return _closed_cases()
-
-
 @st.composite
-def _closed_cases(draw: DrawFn) -> Case:
+def closed_cases(draw: DrawFn) -> Case:
+    """Return a closed ring in a hole, off the lattice; its seam is where the numbering, on the walk or not, begins."""
     ring = replace(draw(_RINGS), degrees=360)
     motion, penalty, seed, shuffle = draw_others(draw)
     interface, z, _ = assemble_panels([ring(draw(OFFSETS))], motion, shuffle)
@@ -230,7 +215,9 @@ class Broken:
         length = min(shortest(line), min(self.slave))
         start = float(self.start)
         if not self.upright:
-            line = extend_line(line, self.slave, length / 8)
+            needed = max(self.slave[0], self.slave[-1]) / 2 + 2 * (length / 8)
+            if line[-1, 0] < needed:
+                line = np.vstack([line, [needed + length / 8, line[-1, 1]]])
             start = covered_start(start, self.slave, line[-1, 0] - length / 8)
         x = start + ends_of(self.slave)
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
@@ -306,13 +293,13 @@ _SEGMENT = st.tuples(
 )  # The length, and the quarter under a master node.
 
 
-def tie_cases() -> SearchStrategy[Case]:
-    """Return random meshes that stand exactly on a kink, many of them on several."""
-    return _tie_cases()
-
-
 @st.composite
-def _tie_cases(draw: DrawFn) -> Case:
+def tie_cases(draw: DrawFn) -> Case:
+    """Return random meshes that stand exactly on a kink, where none of the choices of a formulation is wrong.
+
+    Slave nodes over master nodes, quarter points over master nodes, points on the bisector of a vertex, ends at ends,
+    gaps of exactly zero. Motions are quarter turns and whole numbers, so that a tie stays one bit for bit.
+    """
     panel = draw(_PANELS)
     motion, penalty, seed = draw(motions(exact=True)), draw(penalties()), draw(seeds())
     interface, z, _ = assemble_panels([panel], motion)
@@ -332,43 +319,27 @@ def _facing(
             master_x.append(slave_x[-1] + length * quarter / 4)
         slave_x.append(slave_x[-1] + length)
         master_x.append(slave_x[-1])
-    heights = repeat_cyclically(rises, len(master_x)) / 4
-    return _below(np.array(slave_x), np.column_stack([master_x, heights]), quarters, unit / 4)
+    x, line = np.array(slave_x), np.column_stack([master_x, repeat_cyclically(rises, len(master_x)) / 4])
+    heights = np.interp(x, *line.T)
+    slave = np.column_stack([x, heights - repeat_cyclically(quarters, len(x)) / 4 * (unit / 4)])
+    # A gap of zero may stay if a node and a quarter point beside it are below the line.
+    beside = np.concatenate([0.75 * x[:-1] + 0.25 * x[1:], 0.25 * x[:-1] + 0.75 * x[1:]])
+    here, there = (np.interp(places, *slave.T) < np.interp(places, *line.T) for places in (x, beside))
+    if not here[np.r_[: len(x) - 1, 1 : len(x)]][there].any():
+        slave = sink_below(slave, line, unit / 4 / 4)
+    return Panel(slave, line[::-1], np.column_stack([x, heights]))
 
 
 def _on_bisector(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
 ) -> Panel:
-    """Return a symmetric roof or valley of two segments.
-
-    A node, or the quarter of the first slave segment, lies on its bisector.
-
-    The slave is level, so that the bisector, which is upright, is met at right angles.
-    """
+    """Return a symmetric roof or valley, with a node or quarter point of a level slave on its upright bisector."""
     x = ends_of(length for length, _ in segments)
     x -= segments[0][0] * segments[0][1] / 4
     reach = 4 * x[-1]
     line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])
     slave = sink_below(np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)]), line, unit / 4)
     return Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
-
-
-def _below(x: FloatArray, line: FloatArray, quarters: Sequence[int], unit: float) -> Panel:
-    """Return a panel with slave nodes at x, sunk below the broken line (n, 2)."""
-    heights = np.interp(x, *line.T)
-    depths = repeat_cyclically(quarters, len(x)) / 4 * unit
-    slave = np.column_stack([x, heights - depths])
-    if not _deepest_segment_touches(slave, line):
-        slave = sink_below(slave, line, unit / 4)
-    return Panel(slave, line[::-1], np.column_stack([x, heights]))
-
-
-def _deepest_segment_touches(slave: FloatArray, line: FloatArray) -> bool:
-    """Return whether a node and a quarter point beside it are below the line, so that a gap of zero may stay."""
-    x = slave[:, 0]
-    quarters = np.concatenate([0.75 * x[:-1] + 0.25 * x[1:], 0.25 * x[:-1] + 0.75 * x[1:]])
-    here, there = (np.interp(places, *slave.T) < np.interp(places, *line.T) for places in (x, quarters))
-    return bool(here[np.r_[: len(x) - 1, 1 : len(x)]][there].any())
 
 
 _ARGUMENTS = (

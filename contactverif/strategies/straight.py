@@ -19,6 +19,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
+from contactverif.problems.flat_states import rotation
 from contactverif.strategies.panel_chains import Chain, assemble_chains, on_lattice
 from contactverif.strategies.projection_situations import exact_turns
 from contactverif.strategies.samples import (
@@ -86,7 +87,10 @@ def bent_end_cases(draw: DrawFn) -> Case:
     """
     slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
     slave, master, reference, reach = _layout(draw, slope)
-    ends = [_turn_end(corner, side, reach, draw(_BENDS)) for corner, side in ((master[0], 1.0), (master[-1], -1.0))]
+    ends = []
+    for corner, side in ((master[0], 1.0), (master[-1], -1.0)):
+        bend = draw(_BENDS)
+        ends.append(on_lattice(corner + reach * np.array([side * np.cos(bend), -np.sin(bend)])))
     straight = np.vstack([master[0] + [reach, 0.0], master, master[-1] - [reach, 0.0]])
     bent = np.vstack([ends[0], master, ends[1]])
     return _place(draw, slave, straight, reference, bent=np.vstack([slave, bent]))
@@ -131,11 +135,6 @@ def _cover(steps: Sequence[float], start: float, end: float) -> FloatArray:
     return np.array([*places, end])
 
 
-def _turn_end(corner: FloatArray, side: float, length: float, bend: float) -> FloatArray:
-    """Return the free node (2,) of an end segment that is turned by `bend` about its corner, down if positive."""
-    return on_lattice(corner + length * np.array([side * np.cos(bend), -np.sin(bend)]))
-
-
 def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, reference: FloatArray, **others: FloatArray) -> Case:
     """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
     motion, penalty, seed, shuffle = draw(exact_turns()), draw(penalties()), draw(seeds()), draw(shuffles())
@@ -171,20 +170,12 @@ class ExactSpaceTurn:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the points (n, 3), moved."""
-        a, b, c, d = self.quaternion
-        turn = np.array(
-            [
-                [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-                [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-                [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
-            ],
-            dtype=np.float64,
-        )
-        return np.ldexp(points @ turn.T + self.shift, self.exponent)
+        rows, _ = rotation(self.quaternion)
+        return np.ldexp(points @ np.array(rows, dtype=np.float64).T + self.shift, self.exponent)
 
 
 @cache
-def exact_space_turns() -> SearchStrategy[ExactSpaceTurn]:
+def _exact_space_turns() -> SearchStrategy[ExactSpaceTurn]:
     """Return rest, or exact similarities with offsets up to 2^16 and scales 2^±20."""
     place = st.one_of(st.integers(-64, 64), st.integers(-(2**16), 2**16))
     exponent = st.one_of(st.just(0), st.integers(-20, 20))
@@ -217,7 +208,7 @@ def _tilted_plane(draw: DrawFn) -> tuple[Case, ExactSpaceTurn]:
     """Return a case, and the similarity that took it where it is."""
     pair = draw(surface_pairs(same_domain=False, stretched=False, most=4))
     slopes, quarters = (draw(_SLOPES), draw(_SLOPES)), draw(_SIXTEENTHS_OF_DEPTH)
-    turn, penalty, seed = draw(exact_space_turns()), draw(penalties()), draw(seeds())
+    turn, penalty, seed = draw(_exact_space_turns()), draw(penalties()), draw(seeds())
     interface, plane, domain = pair.lay_out()
     n_slave, current = interface.n_slave_nodes, interface.nodes.copy()
     depth = (abs(slopes[0]) + abs(slopes[1])) / 2 + quarters / 16

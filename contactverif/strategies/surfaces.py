@@ -24,7 +24,7 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.problems.flat_states import rotation
 from contactverif.strategies.given_interface import given_surface_states
 from contactverif.strategies.panel_chains import on_lattice
-from contactverif.strategies.samples import OFFSETS, depth_units, penalties, repeat_cyclically, seeds
+from contactverif.strategies.samples import OFFSETS, depth_units, penalties, repeat_cyclically, seeds, shuffles
 from contactverif.strategies.translations import FINENESS, FURTHEST
 
 
@@ -109,20 +109,15 @@ class SurfaceGrid:
 
     def faces(self) -> IntArray:
         """Return the faces (n_faces, corners), counter-clockwise in the plane."""
-        return self.triangles() if self.corners == TRIANGLE else self.quadrilaterals()
-
-    def triangles(self) -> IntArray:
-        """Return the faces (2 · n_cells, 3), counter-clockwise in the plane."""
-        a, b, c, d = self.quadrilaterals().T
+        n = np.arange((self.columns + 1) * (self.rows + 1)).reshape(self.columns + 1, -1)
+        cells = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+        if self.corners != TRIANGLE:
+            return cells
+        a, b, c, d = cells.T
         choice = self.choices[:, None] == 0
         first = np.where(choice, np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
         second = np.where(choice, np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
         return np.stack([first, second], axis=1).reshape(-1, 3)
-
-    def quadrilaterals(self) -> IntArray:
-        """Return the cells (n_cells, 4), counter-clockwise in the plane."""
-        n = np.arange((self.columns + 1) * (self.rows + 1)).reshape(self.columns + 1, -1)
-        return np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
 
 
 @cache
@@ -190,7 +185,8 @@ class SurfacePair:
         order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(len(plane) - n_slave)])
         number = np.argsort(order)  # The new number of each node.
         return plane[order], [
-            np.array([_start(row, random) for row in random.permutation(number[side])]) for side in faces
+            np.array([np.roll(row, int(random.integers(len(row)))) for row in random.permutation(number[side])])
+            for side in faces
         ]
 
 
@@ -212,11 +208,6 @@ class MatchedPair(SurfacePair):
         return points.reshape(-1, 2)
 
 
-def _start(face: IntArray, random: np.random.Generator) -> IntArray:
-    """Return the corners of a face from another one on."""
-    return np.roll(face, int(random.integers(len(face))))
-
-
 @cache
 def surface_pairs(
     *,
@@ -233,24 +224,22 @@ def surface_pairs(
     """
     same = st.booleans().map(lambda larger: not larger) if same_domain is None else st.just(same_domain)
     grids = surface_grids(most=most, faces=faces, straight=straight)
-    shuffle = st.one_of(st.just(0), st.integers(0, 255))
     stretches = _STRETCHES if stretched else st.just(0)
 
     def pair(slave: SurfaceGrid, master: SurfaceGrid, same: bool, *others: int) -> SurfacePair:
         return SurfacePair(slave, master, same or master.straight, *others)
 
-    return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, shuffle)
+    return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, shuffles())
 
 
 @cache
 def matched_pairs() -> SearchStrategy[SurfacePair]:
     """Return pairs with master nodes on slave nodes; half of them share their domain, and half do not."""
-    shuffle = st.one_of(st.just(0), st.integers(0, 255))
 
     def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
         return MatchedPair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number)
 
-    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, shuffle)
+    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, shuffles())
 
 
 _QUARTERS = st.integers(1, 8)  # The penetration, in quarters of a unit of the least height of a face.
@@ -380,19 +369,10 @@ def _tilted_states(
     interface, _, domain = pair.lay_out()
     least = float(min(side.heights(interface.nodes).min() for side in (interface.slave, interface.master)))
     n_slave, current = interface.n_slave_nodes, interface.nodes.copy()
-    current[:n_slave] += _offsets(offsets, n_slave) * least
+    # Offsets of 0 to 1/16, on lattices that are coprime to the powers of two.
+    current[:n_slave] += repeat_cyclically(offsets, 3 * n_slave).reshape(-1, 3) / [7.0, 11.0, 13.0] / 16 * least
     current[:n_slave, 2] += (current[:n_slave, :2] - domain.mean(axis=0)) @ slopes - quarters / 4 * unit * least
     for part, warp in zip((slice(n_slave), slice(n_slave, None)), warps, strict=True):
-        current[part, 2] += _warp(warp, len(current[part])) * unit * least
+        current[part, 2] += repeat_cyclically(warp, len(current[part])) / 16 * unit * least
     scaled = interface.at(interface.nodes * motion.scale)
     return Case(scaled, motion(current).reshape(-1), penalty, {}, seed)
-
-
-def _offsets(offsets: Sequence[int], count: int) -> FloatArray:
-    """Return shifts (count, 3) of slave nodes by 0 to 1/16, on lattices that are coprime to the powers of two."""
-    return repeat_cyclically(offsets, 3 * count).reshape(-1, 3) / [7.0, 11.0, 13.0] / 16
-
-
-def _warp(warps: Sequence[int], count: int) -> FloatArray:
-    """Return moves across (count,), a quarter at most, dealt out in turn."""
-    return repeat_cyclically(warps, count) / 16

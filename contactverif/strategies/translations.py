@@ -46,6 +46,8 @@ _DEPTHS = st.integers(7, 20)  # Exponents of the penetration 2^-e.
 _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 _QUARTERS = st.lists(st.integers(1, 8), min_size=1, max_size=4)
 _RISES = st.lists(st.sampled_from([1, -1, 2, -2, 0]), min_size=1, max_size=4)  # Eighths
+_ANY_ANGLE = st.integers(1, 359)
+_LEVEL_OR_ANY = st.one_of(st.just(0), _ANY_ANGLE)
 _TILTS = st.sampled_from([0.25, -0.25, 0.0625, -0.0625])  # Slopes of a slave that deepens towards one end
 
 
@@ -68,23 +70,23 @@ def _translated_cases(draw: DrawFn) -> Case:
     quarters, depth = draw(_QUARTERS), 2.0 ** -draw(_DEPTHS)
     rises = draw(_RISES) if kind == "kinked" else [0]
     tilt = draw(_TILTS) if kind == "slave tilted" else 0.0
-    degrees = 0 if kind == "plain" else draw(_angles(at_least=int(kind == "turned")))
+    angles = _ANY_ANGLE if kind == "turned" else _LEVEL_OR_ANY
+    degrees = 0 if kind == "plain" else draw(angles)
     penalty, seed, shift = draw(penalties()), draw(seeds()), draw(exact_shifts())
     offsets = draw(OFFSETS)
     covers, several = kind != "overhang", len(slave_lengths) > 1
     line = _master_line(master_lengths, sum(slave_lengths), rises, offsets, covers=covers, several=several)
-    slave = _slave_below(line, slave_lengths, offsets)
-    moves = repeat_cyclically(quarters, len(slave)) / 4 * depth + tilt * _way_to_the_end(slave, tilt)
+    x = ends_of(slave_lengths)
+    x = x + shifts(offsets, len(x))[:, 0]
+    slave = np.column_stack([x, np.interp(x, *line.T)])  # On the line, or on the continuation of its end.
+    # A tilt leaves one end in its place, so that tilt × way ≥ 0.
+    moves = repeat_cyclically(quarters, len(slave)) / 4 * depth + tilt * (x - (x[0] if tilt >= 0 else x[-1]))
     current = slave - moves[:, None] * [0.0, 1.0]
-    reference, positions = (_turn_onto_lattice(points, degrees) for points in (slave, current))
-    master = _turn_onto_lattice(line[::-1], degrees)
+    reference, positions, master = (
+        _onto_lattice(Motion(degrees)(points), -FINENESS) for points in (slave, current, line[::-1])
+    )
     interface = Interface.from_chains(reference, master)
     return Case(interface, np.vstack([positions, master]).reshape(-1), penalty, {"shift": shift}, seed, kind=kind)
-
-
-@cache
-def _angles(*, at_least: int) -> SearchStrategy[int]:
-    return st.integers(1, 359) if at_least else st.one_of(st.just(0), st.integers(1, 359))
 
 
 @cache
@@ -107,25 +109,6 @@ def _master_line(
     shift = repeat_cyclically(offsets, len(x)) / 13 / 16
     heights = ends_of(repeat_cyclically(rises, len(x) - 1)) / 8
     return np.column_stack([x + shift, heights])
-
-
-def _slave_below(line: FloatArray, lengths: Sequence[int], offsets: Sequence[int]) -> FloatArray:
-    """Return the slave's points (n, 2) on the master's line, or on the continuation of its end."""
-    x = ends_of(lengths)
-    x = x + shifts(offsets, len(x))[:, 0]
-    return np.column_stack([x, np.interp(x, *line.T)])
-
-
-def _way_to_the_end(slave: FloatArray, tilt: float) -> FloatArray:
-    """Return the signed way of each node from the end that a tilt leaves in its place, so that tilt × way ≥ 0."""
-    x = slave[:, 0]
-    way: FloatArray = x - (x[0] if tilt >= 0 else x[-1])
-    return way
-
-
-def _turn_onto_lattice(points: FloatArray, degrees: int) -> FloatArray:
-    """Return the points turned about the origin, each coordinate rounded to a multiple of 2^-32."""
-    return _onto_lattice(Motion(degrees)(points), -FINENESS)
 
 
 def _onto_lattice(points: FloatArray, exponent: int) -> FloatArray:

@@ -26,9 +26,8 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import exact_points
-from contactverif.oracle.exact_choices import DEEP, closest_excess, seen_excess
-from contactverif.oracle.exact_coverage import Coverage, lies_in_shadow
 from contactverif.oracle.exact_faces import ExactFacePoints, FaceLattice, FaceView, covered_shares
+from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lies_in_shadow, seen_excess
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases

@@ -35,7 +35,7 @@ from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
-from contactverif.problems import block_scenes, flat_faces, flat_states, hard_corner_states
+from contactverif.problems import block_scenes, flat_states, hard_corner_states
 from contactverif.problems.blocks import pressure_of
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif_properties import exact_forces, patch_solved
@@ -112,7 +112,7 @@ _define_flat = partial(
     id="hard.offset",
     rank=420,
     cases=Cases.from_list(flat_states.offset_states),
-    cases_in_space=Cases.from_list(flat_faces.offset_face_states),
+    cases_in_space=Cases.from_list(flat_states.offset_face_states),
 )
 def hard_offset(case: Case, subject: Subject) -> Measurement:
     """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
@@ -141,7 +141,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     id="hard.deep",
     rank=380,
     cases=Cases.from_list(flat_states.deep_states),
-    cases_in_space=Cases.from_list(flat_faces.deep_face_states),
+    cases_in_space=Cases.from_list(flat_states.deep_face_states),
 )
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
@@ -164,7 +164,7 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
     id="hard.node-hit",
     rank=410,
     cases=Cases.from_list(flat_states.node_hit_states),
-    cases_in_space=Cases.from_list(flat_faces.node_hit_face_states),
+    cases_in_space=Cases.from_list(flat_states.node_hit_face_states),
 )
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
@@ -188,7 +188,7 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     id="hard.search",
     rank=390,
     cases=Cases.from_list(flat_states.search_states),
-    cases_in_space=Cases.from_list(flat_faces.search_face_states),
+    cases_in_space=Cases.from_list(flat_states.search_face_states),
 )
 def hard_search(case: Case, subject: Subject) -> Measurement:
     """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
@@ -394,7 +394,7 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
     family="hard",
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
     cases=Cases.from_list(flat_states.touching_states),
-    cases_in_space=Cases.from_list(flat_faces.touching_face_states),
+    cases_in_space=Cases.from_list(flat_states.touching_face_states),
     promise=lambda traits: True,
 )
 def hard_touch(case: Case, subject: Subject) -> Measurement:

@@ -24,11 +24,10 @@ from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import nodal_spring_weights, nodal_surface_weights
-from contactverif.problems.flat_faces import equal_area_states
-from contactverif.problems.flat_states import equal_length_states
+from contactverif.problems.flat_states import equal_area_states, equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
-from contactverif.strategies.straight import steep_cases, tilted_cases
+from contactverif.strategies.straight import steep_cases, tilted_cases, tilted_plane_cases
 from contactverif_properties import exact_forces, roundoff
 from contactverif_properties.applicability import may_act_twice, promise_normal, promise_single, refuse_unknown_total
 from contactverif_properties.kinks import explain_by_kink
@@ -524,7 +523,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
     family="patch",
     quantities=(OFF_NORMAL, TILTED_TOTAL),
     cases=Cases.by_kind(resultant_cases),
-    cases_in_space=Cases.random(surfaces.tilted_plane_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
     applicable=lambda traits: (
@@ -595,7 +594,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
     family="patch",
     quantities=(TILTED_NODAL,),
     cases=Cases.random(tilted_cases),
-    cases_in_space=Cases.random(surfaces.tilted_plane_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
     applicable=refuse_unknown_integral,
 )

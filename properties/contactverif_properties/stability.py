@@ -25,10 +25,10 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
 from contactverif.oracle import uniform_pressure_weights_exact
-from contactverif.problems import wave_blocks
+from contactverif.problems import refined_blocks
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.stability_states import stability_scenes, stability_states
-from contactverif.strategies.exact_flats import exact_flat_cases, linear_flat_cases
+from contactverif.strategies.flat import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.surfaces import translated_surface_cases
 from contactverif.strategies.translations import translated_cases
 from contactverif_properties import exact_forces, roundoff
@@ -507,7 +507,7 @@ def _conditioning(state: FrozenState, scene: Scene) -> roundoff.Conditioning:
     family="stability",
     quantities=(DRIFT, ROUGHNESS),
     needs=frozenset({"pair"}),
-    cases=Cases.from_list(wave_blocks.wave_cases),
+    cases=Cases.from_list(refined_blocks.wave_cases),
     promise=lambda traits: None if traits.promises.locks is None else not traits.promises.locks,
     applicable=refuse_unknown_pressure,
     bodies=True,
@@ -557,17 +557,17 @@ def measure_locking(
     answer = answer_at(columns, case.parameter("stiffness"))
     if answer is None:
         return Measurement(undecided=unsolved)
-    smooth = wave_blocks.matching_answer(n_slave, case.penalty).pressure_range
+    smooth = refined_blocks.matching_answer(n_slave, case.penalty).pressure_range
     by_forces, by_points = answer.force_range / smooth, answer.point_range / smooth
     values = {ROUGHNESS: float(np.fmax(by_forces, by_points))}
     details = {"roughness of nodal forces": by_forces}
     if np.isfinite(by_points):
         details["roughness of reported pressures"] = by_points
     if subject.traits.rules.enforcement == "penalty":
-        soft = answer_at(columns, wave_blocks.SOFT)
+        soft = answer_at(columns, refined_blocks.SOFT)
         if soft is None:
             return Measurement(undecided=unsolved)
-        at_soft = wave_blocks.wave_blocks(*columns, wave_blocks.SOFT, wave=0.0).penalty
+        at_soft = refined_blocks.wave_blocks(*columns, refined_blocks.SOFT, wave=0.0).penalty
         factor = soft.stiffness / at_soft  # Springs may act twice.
         share = answer.compliance / mean_of_matching(columns, factor * case.penalty)
         values[DRIFT] = 1 - share * mean_of_matching(columns, factor * at_soft) / soft.compliance
@@ -578,7 +578,9 @@ def measure_locking(
 
 def mean_of_matching(columns: tuple[int, int], distributed: float) -> float:
     """Return the mean compliance of matching meshes with the segments of the slave and with those of the master."""
-    answers: list[wave_blocks.WaveAnswer] = [wave_blocks.matching_answer(number, distributed) for number in columns]
+    answers: list[refined_blocks.WaveAnswer] = [
+        refined_blocks.matching_answer(number, distributed) for number in columns
+    ]
     return sum(answer.compliance for answer in answers) / len(answers)
 
 
@@ -603,7 +605,7 @@ class InterfaceAnswer:
 
 def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> InterfaceAnswer | None:
     """Solve two blocks with the wave and without it."""
-    uniform, wavy = (wave_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, wave_blocks.WAVE))
+    uniform, wavy = (refined_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, refined_blocks.WAVE))
     formulation = subject.for_case(uniform.case())
     systems = System(uniform, formulation), System(wavy, formulation)
     start = _uniform_state(systems[0], subject)
@@ -624,7 +626,7 @@ def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -
 
 def answer_of_code(columns: tuple[int, int], penalty: float, subject: EngineSubject) -> InterfaceAnswer | None:
     """Let a whole code solve two blocks with the wave and without it."""
-    uniform, wavy = (wave_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, wave_blocks.WAVE))
+    uniform, wavy = (refined_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, refined_blocks.WAVE))
     before, after = (solve_by_engine(scene, subject, linear=True)[0] for scene in (uniform, wavy))
     if before.no_solution or after.no_solution:
         return None
@@ -638,9 +640,9 @@ def _interface_answer(
     """Return the answer of two solutions (n_free,), and the forces (n_nodes, 2) that the wave adds at the interface."""
     total = -float((uniform.bodies[0].load * uniform.displacements(before)[0]).sum())
     bodies = float(uniform.facts["compliance"].sum())
-    springs = abs(total) / (wave_blocks.MEAN_PRESSURE**2 * wave_blocks.LENGTH) - bodies
+    springs = abs(total) / (refined_blocks.MEAN_PRESSURE**2 * refined_blocks.LENGTH) - bodies
     return InterfaceAnswer(
-        compliance=wave_blocks.wave_work(uniform, wavy, before, after),
+        compliance=refined_blocks.wave_work(uniform, wavy, before, after),
         stiffness=1 / max(springs, _LEAST_SHARE * bodies),
         force_range=_force_range(uniform.interface, forces[:, 1]),
     )
@@ -650,11 +652,11 @@ def _uniform_state(system: System, subject: Subject) -> FloatArray:
     """Return the unknowns, and the multipliers behind them, of the exact uniform pressure."""
     scene = system.scene
     if not system.n_multipliers:
-        return exact_unknowns(scene, wave_blocks.MEAN_PRESSURE, scene.penalty)
-    exact = exact_unknowns(scene, wave_blocks.MEAN_PRESSURE, np.inf)
+        return exact_unknowns(scene, refined_blocks.MEAN_PRESSURE, scene.penalty)
+    exact = exact_unknowns(scene, refined_blocks.MEAN_PRESSURE, np.inf)
     state = replace(scene.case(), z=scene.positions(exact))
     return np.append(
-        exact, exact_forces.exact_multipliers(state, subject, system.formulation, wave_blocks.MEAN_PRESSURE)
+        exact, exact_forces.exact_multipliers(state, subject, system.formulation, refined_blocks.MEAN_PRESSURE)
     )
 
 
@@ -665,7 +667,7 @@ def _force_range(interface: Interface, across: FloatArray) -> float:
         (interface.master, slice(interface.n_slave_nodes, None)),
     )
     lengths = [(shape_integrals(surface, interface.nodes), nodes) for surface, nodes in sides]
-    return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / wave_blocks.WAVE
+    return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / refined_blocks.WAVE
 
 
 def _point_range(before: FrozenState, after: FrozenState) -> float:
@@ -673,7 +675,7 @@ def _point_range(before: FrozenState, after: FrozenState) -> float:
     if pressures[0].shape != pressures[1].shape:
         return np.nan  # A formulation without a pairing may have other points.
     change = pressures[1] - pressures[0]
-    return float(np.ptp(change[np.isfinite(change)])) / wave_blocks.WAVE
+    return float(np.ptp(change[np.isfinite(change)])) / refined_blocks.WAVE
 
 
 def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
@@ -708,7 +710,7 @@ def _iterate(system: System, start: FloatArray, pairing: Pairing | None) -> Floa
     id="engine.locking",
     family="engine",
     quantities=(DRIFT, ROUGHNESS),
-    cases=Cases.from_list(wave_blocks.wave_cases),
+    cases=Cases.from_list(refined_blocks.wave_cases),
     promise=lambda traits: None,
     needs=frozenset({SOLVE}),
     bodies=True,

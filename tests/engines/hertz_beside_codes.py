@@ -14,7 +14,7 @@ from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.plugins.registry import the_subject
-from contactverif.problems.hertz_studies import HERTZ_STUDIES, HertzStudy
+from contactverif.problems.hertz_boxes import HERTZ_STUDIES, HertzStudy
 from contactverif.problems.problem import FORCES
 
 SECONDS = 120.0  # The most for one mesh.

@@ -13,8 +13,15 @@ from wave_strangers import Heights
 import contactverif_nts
 from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
 from contactverif.mechanics.solving import solve_for_accuracy
-from contactverif.problems.hertz_box import COARSEST, mesh_lines
-from contactverif.problems.hertz_studies import BOX, HERTZ_STUDIES, PENALTIES, HertzStudy, hertz_cases
+from contactverif.problems.hertz_boxes import (
+    BOX,
+    COARSEST,
+    HERTZ_STUDIES,
+    PENALTIES,
+    HertzStudy,
+    hertz_cases,
+    mesh_lines,
+)
 from contactverif.problems.problem import FORCES, PRESSURE, Errors
 from contactverif.problems.wavy import LOWER, MESHES, UPPER, WAVY_STUDIES, WavyStudy
 from contactverif.run.run import run

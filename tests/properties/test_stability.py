@@ -30,8 +30,7 @@ from contactverif import (
 )
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import uniform_pressure_weights
-from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
-from contactverif.problems.wave_blocks import (
+from contactverif.problems.refined_blocks import (
     COLUMNS,
     PENALTIES,
     WAVE,
@@ -40,6 +39,7 @@ from contactverif.problems.wave_blocks import (
     wave_blocks,
     wave_cases,
 )
+from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.translations import KINDS
