@@ -1,4 +1,4 @@
-"""A sample of the random command lines; the long campaign is `python tests/hostile/command_lines.py 5000`."""
+"""A sample of the random command lines; the long campaign is `python evidence/hostile/command_lines.py 5000`."""
 
 import random
 from pathlib import Path

@@ -1,6 +1,6 @@
 """Forge and damage journals, go on with them, and count what is believed of them.
 
-`python tests/hostile/forged_journals.py COUNT SEED` prints a table by kind. A run that goes on must come to what it
+`python evidence/hostile/forged_journals.py COUNT SEED` prints a table by kind. A run that goes on must come to what it
 would have come to without the forgery, name the rows that differ, and never end in a traceback. Here all stored
 outcomes are judged again, and not only a random share of them, which meets a single forged one by chance alone.
 """
@@ -149,5 +149,5 @@ def main(count: int, seed: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.path.append(str(Path(__file__).parents[1]))
+    sys.path.append(str(Path(__file__).parents[2] / "tests"))
     sys.exit(main(*(int(word) for word in [*sys.argv[1:], "1000", "1"][:2])))

@@ -1,6 +1,6 @@
 """Run the campaigns of this folder and keep what they print in `reports/trust`, for the page.
 
-`python tests/hostile/run_campaigns.py [COUNT ...]` takes a number of attempts for each, in the
+`python evidence/hostile/run_campaigns.py [COUNT ...]` takes a number of attempts for each, in the
 order of `CAMPAIGNS`.
 """
 
@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parents[1] / "trust"))
+sys.path += [str(Path(__file__).parents[2] / folder / "trust") for folder in ("tests", "evidence")]
 
 from tables import FOLDER, keep_commit
 

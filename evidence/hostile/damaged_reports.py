@@ -1,6 +1,6 @@
 """Damage reports in every way, and count how the commands that read them end.
 
-`python tests/hostile/damaged_reports.py COUNT SEED` makes that many damaged files and prints the table; a file that
+`python evidence/hostile/damaged_reports.py COUNT SEED` makes that many damaged files and prints the table; a file that
 does harm is kept in the folder damaged/. An ending is good if the file is read, or refused in one line with exit status
 2.
 """

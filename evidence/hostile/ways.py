@@ -1,6 +1,6 @@
 """Run the same seed in all ways that there are, and compare the reports bit by bit.
 
-`python tests/hostile/ways.py EXAMPLES KILLS` prints a table: how many arrays the report of each way has, and which
+`python evidence/hostile/ways.py EXAMPLES KILLS` prints a table: how many arrays the report of each way has, and which
 differ from those of the first. Times stand in a group that is left out; where plugins lived, and how many outcomes have
 a proof, is an attribute of the file. Without isolation there is no second process that `purity` could ask: one of its
 numbers is missing there, and the table says so.

@@ -1,6 +1,6 @@
 """Forge reports, audit them, and count what is seen.
 
-`python tests/hostile/forged_reports.py COUNT SEED` prints a table by kind. An audit must see each verdict, count or
+`python evidence/hostile/forged_reports.py COUNT SEED` prints a table by kind. An audit must see each verdict, count or
 counterexample that disagrees with the stored numbers. It must see forged numbers that agree with all else as often as
 it says; the last line compares the two.
 """

@@ -1,7 +1,7 @@
 """Damage mesh files of many formats, and count how reading them ends.
 
-`python tests/hostile/damaged_meshes.py COUNT SEED` makes that many damaged files and prints the table; a file that does
-harm is kept in the folder damaged/. An ending is good if the file is read, or refused in one line.
+`python evidence/hostile/damaged_meshes.py COUNT SEED` makes that many damaged files and prints the table; a file that
+does harm is kept in the folder damaged/. An ending is good if the file is read, or refused in one line.
 """
 
 import os
@@ -19,7 +19,7 @@ from damage import BYTES, GOOD, Ending, Table, run_command
 
 from contactverif import MisuseError, read_interface
 
-PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
+PUNCH = Path(__file__).parents[2] / "tests" / "data" / "punch.msh"
 # {file: (format of meshio, options of its writer, the groups)}, without those that need a further package.
 NAMES, BY_NUMBER = ("punch", "base"), ("-1", "2")
 FORMATS = {

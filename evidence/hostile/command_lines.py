@@ -1,4 +1,4 @@
-"""Random command lines, and what comes of them: `python tests/hostile/command_lines.py 5000 --seed 1`.
+"""Random command lines, and what comes of them: `python evidence/hostile/command_lines.py 5000 --seed 1`.
 
 Options, nonsense, huge numbers, foreign names, files that are missing, damaged or loops, closed streams: every command
 gets them, in a forked process of its own with a limit on its time. A line may end with 0, 1, 2, or 130 after Ctrl-C. A
@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # Where the script runs, not pytest.
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))  # Where the script runs, not pytest.
 from foreign_texts import TEXTS, hidden_characters
 
 TIME_LIMIT = 60.0  # Seconds of a line; one of those here takes a few at most.
@@ -69,7 +69,7 @@ class Files:
         from contactverif.contract.interface import Interface
         from contactverif_reports.netcdf.write import write
 
-        sys.path.insert(0, str(Path(__file__).parents[1] / "cli"))
+        sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "cli"))
         from handmade_run import run_with
 
         interface = Interface.from_chains(slave=[[0, 0], [1, 0]], master=[[2, 0], [-1, 0]])
@@ -83,7 +83,7 @@ class Files:
         (folder / "loop.nc").symlink_to("loop.nc")
         (folder / "folder.nc").mkdir()
         (folder / TEXTS["escape"].replace("/", "")).write_text("a stranger's file\n")
-        mesh = Path(__file__).parents[1] / "data" / "punch.msh"
+        mesh = Path(__file__).parents[2] / "tests" / "data" / "punch.msh"
         if mesh.exists():
             (folder / "punch.msh").write_bytes(mesh.read_bytes())
         return cls(folder)

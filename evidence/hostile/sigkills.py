@@ -1,7 +1,7 @@
 """Kill runs of the command line with SIGKILL at random moments, resume them, and count what was lost.
 
-`python tests/hostile/sigkills.py 100` kills 100 times; `… 3 verify` kills `verify` three times. The moments come from a
-seed. Half of the kills hit the whole process group, half the first process alone.
+`python evidence/hostile/sigkills.py 100` kills 100 times; `… 3 verify` kills `verify` three times. The moments come
+from a seed. Half of the kills hit the whole process group, half the first process alone.
 
 Cases that are asked again after a kill were lost. A plugin notes the states that it is asked about, so that they are
 counted without a look into the journal: each job may lose the chunk that it was judging.
