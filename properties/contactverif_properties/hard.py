@@ -75,7 +75,10 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     exact = _flat_forces(case)
     slave = exact_forces.pushing_forces(exact_forces.uniform_state(case, subject))[: case.interface.n_slave_nodes]
     normal = exact_forces.normal_of(case)
-    numbers = [ALONG.check(ratio(_force_along(case, slave), float(np.abs(slave).sum())), tolerance)]
+    # In space the force along the surface has two components.
+    tangents = case.parameters["direction" if case.interface.dim == PLANE else "directions"]
+    along = float(np.hypot.reduce(np.abs(np.atleast_1d((slave @ tangents.T).sum(axis=0)))))
+    numbers = [ALONG.check(ratio(along, float(np.abs(slave).sum())), tolerance)]
     push, whole = float((slave @ normal).sum()), float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken, finding = "" if push > 0 else "nothing pushes the slave out of the master", None
     if knows_total(traits):
@@ -88,12 +91,6 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
         if numbers[-1].ratio > 1:
             finding = exact_forces.worst_force(case.interface, forces, exact)
     return Measurement(numbers, broken=broken, finding=finding)
-
-
-def _force_along(case: Case, forces: FloatArray) -> float:
-    """Return the size of the sum of forces (n, dim) along the surface, in space over both tangents."""
-    tangents = case.parameters["direction" if case.interface.dim == PLANE else "directions"]
-    return float(np.hypot.reduce(np.abs(np.atleast_1d((forces @ tangents.T).sum(axis=0)))))
 
 
 def _flat_forces(case: Case) -> FloatArray:

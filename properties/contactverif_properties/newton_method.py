@@ -129,12 +129,6 @@ ORDER = Quantity(
 )
 
 
-def history(trace: Trace) -> dict[str, FloatArray]:
-    """Return the series of a solution by iterate, under the names of SERIES."""
-    columns = (trace.residuals, trace.energies, trace.changes.astype(np.float64), trace.conditions)
-    return dict(zip(SERIES, columns, strict=True))
-
-
 _define = partial(
     Property.define,
     family="newton",
@@ -173,7 +167,9 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
             break
         trace = solve(system.scene, system.formulation, load_steps=load_steps)
         undecided = _find_excuse(system, trace)
-    details, series = solution_details(trace), history(trace)
+    details = solution_details(trace)
+    columns = (trace.residuals, trace.energies, trace.changes.astype(np.float64), trace.conditions)
+    series = dict(zip(SERIES, columns, strict=True))
     if undecided:
         return Measurement(details=details, series=series, undecided=undecided)
     begin = _first_final_iterate(system, trace)

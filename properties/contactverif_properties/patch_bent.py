@@ -180,7 +180,8 @@ def _measure(study: RingStudy, coarser: int, subject: Subject, quarters: Literal
         means.append(np.stack([_mean_errors(solution, fit, study.slave, quarters * pi / 2) for fit in fits]))
         bare = max(bare, count_bare(solution.interface, solution.forces))
         details[f"E_F at refine = {refine}"] = instance.errors(solution)[FORCES[0]]
-    coarse, fine = _nearest(*means)
+    nearest = np.abs(4 * means[1] - means[0])[:, :2].max(axis=1).argmin()  # The fit that the forces come nearest to.
+    coarse, fine = means[0][nearest], means[1][nearest]
     details |= {
         f"e_{refine}": float(mean[0]) for refine, mean in zip((coarser, 2 * coarser), (coarse, fine), strict=True)
     }
@@ -204,12 +205,6 @@ def count_bare(interface: Interface, forces: FloatArray) -> int:
     shares = shape_integrals(interface.slave, interface.nodes)[:n_slave]
     sizes = np.linalg.norm(forces[:n_slave], axis=1)
     return int((sizes < sizes.sum() / shares.sum() * shares / 10).sum())
-
-
-def _nearest(coarse: FloatArray, fine: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the errors (3,) on both meshes by the fit of several (n_fits, 3) that the forces come nearest to."""
-    fit = np.abs(4 * fine - coarse)[:, :2].max(axis=1).argmin()
-    return coarse[fit], fine[fit]
 
 
 def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role, angle: float) -> FloatArray:
@@ -283,12 +278,6 @@ def kinked_cases() -> tuple[Case, ...]:
     )
 
 
-def _kinked_forces(case: Case) -> FloatArray:
-    """Return the exact forces (n_nodes, 2), for pictures."""
-    problem, _ = patch_of(case)
-    return uniform_forces(case.interface, problem.pressure)
-
-
 @Property.define(
     id="patch.kinked",
     rank=500,
@@ -297,7 +286,7 @@ def _kinked_forces(case: Case) -> FloatArray:
     cases=Cases.from_list(kinked_cases),
     promise=lambda traits: traits.promises.patch.kinked,
     bodies=True,
-    exact=_kinked_forces,
+    exact=lambda case: uniform_forces(case.interface, patch_of(case)[0].pressure),
 )
 def patch_kinked(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays exact on an interface with a kink.

@@ -408,10 +408,15 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
     u = exact_unknowns(scene, pressure_of(case, case.penalty), case.penalty)
     pairing = subject.for_case(case).pair(scene.interface, _system(case, subject, case.penalty).state(u))
     try:
-        for penalty in _penalties(case):
+        modulus = max(body.young for body in scene.bodies)
+        n_steps = max(0, math.ceil(math.log(case.penalty / modulus, GROWTH)))
+        for penalty in [case.penalty / GROWTH**n for n in range(n_steps, -1, -1)]:
             system = _system(case, subject, penalty)
             u, matrix = _solve(system, pairing, u)
-        if np.abs(system.residual(u, pairing)).max() > _settled_residual(case):
+        rounding = SETTLED_ROUNDINGS * UNIT_ROUNDOFF * case.penalty * case.largest_coordinate
+        mean_segment = float(case.interface.slave.lengths(case.interface.nodes).mean())
+        settled = (SETTLED_SHARE * pressure_of(case, case.penalty) + rounding) * mean_segment
+        if np.abs(system.residual(u, pairing)).max() > settled:
             return Measurement(undecided="Newton's method does not settle on the frozen pairing")
         turned = _TurnedSystem(system, motion, scene.interface.at(motion.move(scene.interface.nodes)), pairing)
         u_turned = _nearest_to_balance(turned, matrix, u)
@@ -451,13 +456,6 @@ def _nearest_to_balance(turned: _TurnedSystem, matrix: FloatArray, u: FloatArray
     return states[int(np.argmin([np.abs(residual).max() for residual in residuals]))]
 
 
-def _settled_residual(case: Case) -> float:
-    """Return the largest force out of balance once Newton's method has settled."""
-    lengths = case.interface.slave.lengths(case.interface.nodes)
-    rounding = SETTLED_ROUNDINGS * UNIT_ROUNDOFF * case.penalty * case.largest_coordinate
-    return (SETTLED_SHARE * pressure_of(case, case.penalty) + rounding) * float(lengths.mean())
-
-
 class _SingularMatrix(Exception):
     """The end of Newton's method: the matrix has no inverse in floats. It never leaves this file."""
 
@@ -467,13 +465,6 @@ def _step(system: System, matrix: FloatArray, residual: FloatArray) -> FloatArra
     if change is None:
         raise _SingularMatrix
     return change
-
-
-def _penalties(case: Case) -> list[float]:
-    """Return the penalties ε̂ of the solutions, one after the other, up to that of the case."""
-    modulus = max(body.young for body in scene_of(case).bodies)
-    n_steps = max(0, math.ceil(math.log(case.penalty / modulus, GROWTH)))
-    return [case.penalty / GROWTH**n for n in range(n_steps, -1, -1)]
 
 
 def _system(case: Case, subject: Subject, penalty: float) -> System:

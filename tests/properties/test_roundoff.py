@@ -30,14 +30,11 @@ def test_the_mean_penetration_is_the_uniform_one_that_the_same_forces_need() -> 
     assert roundoff.mean_penetration(case(), forces) == 1 / 8
 
 
-def test_the_tolerance_of_a_gap_is_the_formula() -> None:
-    """X = 2 and N = 3."""
-    assert roundoff.gap_tolerance(case(), 1 / 8) == pytest.approx(U * (8 * 2 / (1 / 8) + 4 * 3 + 128), rel=1e-15)
-    assert roundoff.gap_tolerance(case(), 1e-9) > 1e6 * roundoff.gap_tolerance(case(), 1e-2)
-
-
-def test_where_nothing_penetrates_no_gap_is_rounded() -> None:
-    assert roundoff.gap_tolerance(case(), 0.0) == U * (4 * 3 + 128)
+@pytest.mark.parametrize("penetration", [1 / 8, 1e-2, 1e-9, 0.0])
+def test_the_tolerance_of_a_gap_is_the_formula(penetration: float) -> None:
+    """X = 2 and N = 3. Where nothing penetrates, no gap is rounded."""
+    rounding = 8 * 2 / penetration if penetration else 0.0
+    assert roundoff.gap_tolerance(case(), penetration) == pytest.approx(U * (rounding + 4 * 3 + 128), rel=1e-15)
 
 
 def test_a_stable_formulation_rounds_at_the_diameter_and_any_other_at_its_distance() -> None:
@@ -49,12 +46,12 @@ def test_a_stable_formulation_rounds_at_the_diameter_and_any_other_at_its_distan
     assert roundoff.gap_tolerance(far, 0.1, stable) < 1e-4 * roundoff.gap_tolerance(far, 0.1)
 
 
-def test_a_share_of_nothing() -> None:
-    assert roundoff.ratio(1.0, 4.0) == 0.25
-    assert roundoff.ratio(0.0, 0.0) == 0.0
-    assert roundoff.ratio(1e-300, 0.0) == np.inf
-    assert np.isnan(roundoff.ratio(np.nan, 0.0)) or roundoff.ratio(np.nan, 0.0) == np.inf
-    assert np.isnan(roundoff.ratio(np.nan, 1.0))
+@pytest.mark.parametrize(
+    ("part", "whole", "ratio"), [(1.0, 4.0, 0.25), (0.0, 0.0, 0.0), (1e-300, 0.0, np.inf), (np.nan, 1.0, np.nan)]
+)
+def test_a_ratio_to_nothing_is_infinite_or_0(part: float, whole: float, ratio: float) -> None:
+    assert roundoff.ratio(part, whole) == pytest.approx(ratio, nan_ok=True)
+    assert not roundoff.ratio(np.nan, 0.0) < np.inf
 
 
 def bent_case() -> Case:
