@@ -38,7 +38,7 @@ BESIDE_RUN = ("plugins", "sampling")
 RUN = (*BESIDE_RUN, "run")
 REPORTS = (
     "reports",
-    *(f"reports.{name}" for name in ("netcdf", "draw", "html", "compare", "stability", "bench", "exchange")),
+    *(f"reports.{name}" for name in ("netcdf", "plot", "html", "exchange")),
 )
 ROOMS = {
     # A room of contactverif/ may import those above it in this table, never those below it.
@@ -114,20 +114,10 @@ ROOMS = {
         QUIET,
     ),
     "reports": Room(("contract",), ("numpy", "psutil", "rich")),
-    "reports.bench": Room(("contract", "reports"), ("numpy",)),
-    "reports.netcdf": Room(
-        ("contract", "isolation", "reports", "reports.bench"), ("numpy", "xarray", "netCDF4", "msgspec")
-    ),
-    "reports.draw": Room(
-        ("contract", "reports", "reports.stability", "reports.bench"), ("numpy", "matplotlib", "meshio")
-    ),
-    "reports.compare": Room(("contract", "reports"), ("numpy",)),
-    "reports.stability": Room(("contract", "reports"), ("numpy",)),
-    "reports.html": Room(
-        ("contract", "reports", "reports.draw", "reports.compare", "reports.bench"),
-        ("numpy", "matplotlib", "jinja2", "markupsafe"),
-    ),
-    "reports.exchange": Room(("contract", "reports", "reports.draw"), ("msgspec",)),
+    "reports.netcdf": Room(("contract", "isolation", "reports"), ("numpy", "xarray", "netCDF4", "msgspec")),
+    "reports.plot": Room(("contract", "reports"), ("numpy", "matplotlib", "meshio")),
+    "reports.html": Room(("contract", "reports", "reports.plot"), ("numpy", "matplotlib", "jinja2", "markupsafe")),
+    "reports.exchange": Room(("contract", "reports", "reports.plot"), ("msgspec",)),
     "paper": Room(
         (*BELOW_RUN, *RUN, "studies", *REPORTS),
         ("numpy", "scipy", "xarray", "matplotlib", "jinja2", "markupsafe", "hypothesis"),
@@ -234,9 +224,9 @@ WRONG_IMPORTS = {
         ("import hypothesis.strategies", "contactverif_nts may not import hypothesis.strategies"),
         ("open('x')", "contactverif_nts may not use open"),
     ],
-    "contactverif_reports.draw.a": [
-        ("from contactverif import oracle", "reports.draw may not import oracle"),
-        ("import contactverif_reports.html.b", "reports.draw may not import reports.html"),
+    "contactverif_reports.plot.a": [
+        ("from contactverif import oracle", "reports.plot may not import oracle"),
+        ("import contactverif_reports.html.b", "reports.plot may not import reports.html"),
     ],
     "contactverif.contract.a": [
         ("from ..meshes.b import read", "contract may not import meshes"),

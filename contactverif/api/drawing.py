@@ -44,8 +44,8 @@ class Drawing:
         MisuseError
             If the name has another suffix, or the file cannot be written.
         """
-        from contactverif_reports.draw.case_figure import SUFFIXES, save
         from contactverif_reports.files import checked_name
+        from contactverif_reports.plot.case_figures import SUFFIXES, save
 
         save(self.figure, checked_name(path, SUFFIXES))
 
@@ -58,7 +58,7 @@ class Drawing:
 
 def make_drawing(subject: Subject, question: Property, outcome: Outcome) -> Drawing:
     """Return the picture of an outcome's case, with the forces of the formulation and, where known, the exact ones."""
-    from contactverif_reports.draw.case_figure import make_case_figure  # It brings matplotlib, which is slow.
+    from contactverif_reports.plot.case_figures import make_case_figure  # It brings matplotlib, which is slow.
 
     title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
     forces = forces_to_draw(question, outcome.case, subject)
@@ -70,7 +70,7 @@ def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: P
     """Draw the case of an outcome to a picture, or write a case in space for ParaView."""
     try:
         if path.suffix.lower() == SURFACES:
-            from contactverif_reports.draw.surface_vtu import write_surfaces
+            from contactverif_reports.plot.vtu import write_surfaces
 
             write_surfaces(outcome.case, forces_to_draw(question, outcome.case, subject), path)
             return

@@ -200,7 +200,7 @@ class Report(Run):
 
     def _repr_html_(self) -> str:
         """Return the table of what fails, and the mesh of the first failure."""
-        from contactverif_reports.html.notebook import run_view
+        from contactverif_reports.html.report_page import run_view
 
         rows, failures = _failing_rows(self), self.failures
         return run_view(self, rows, _remarks(self), failures[0] if failures else None)

@@ -35,7 +35,6 @@ COMMANDS: dict[str, Callable[..., int | None]] = {
     "replay": commands.replay,
     "audit": commands.audit,
     "draw": commands.draw,
-    "stability": commands.stability,
     "bench": commands.bench,
     "paper": commands.paper,
     "scenes": commands.scenes,

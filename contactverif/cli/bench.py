@@ -18,22 +18,18 @@ from contactverif.isolation.confine import ONE_THREAD
 from contactverif.plugins.registry import load_formulation
 from contactverif.run.journal import journal_folder, remove_journal
 from contactverif.run.run_options import RunOptions
-from contactverif.studies.bench.bench_plan import BenchPlan, make_plan
-from contactverif.studies.bench.bench_study import run_bench
-from contactverif_reports.bench.bench_text import bench_markdown
-from contactverif_reports.bench.changes import Change, changes
-from contactverif_reports.bench.cost_tables import (
+from contactverif.studies.bench_plan import BenchPlan, make_plan
+from contactverif.studies.bench_study import run_bench
+from contactverif_reports.bench_costs import (
+    BenchChange,
+    bench_markdown,
+    compare_benches,
     cost_sentences,
-    costs_at,
-    format_seconds,
-    format_share,
-    ratios_at,
+    overview_table,
 )
-from contactverif_reports.bench.costs import REFERENCE
-from contactverif_reports.bench.results import RULE, BenchResults, Outcome
+from contactverif_reports.bench_results import BenchResults, Outcome
 from contactverif_reports.files import whole
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
-from contactverif_reports.tables import Column, Table, numbers
 
 _LONG_CALLS = 10  # A state of a large mesh, or all states of differences, may take so many times the limit of a call.
 
@@ -59,10 +55,10 @@ def bench(
     else:
         plan = make_plan(scenes, quick=quick, instances=instances, processes=processes)
         results = _run(options, plan, files)
-    since = () if old is None else changes(results, old)
+    since = () if old is None else compare_benches(results, old)
     _write(results, since, files, pictures, file)
     for scene in results.scenes:
-        show(_costs_table(results, scene).terminal(dense=True))
+        show(overview_table(results, scene).terminal(dense=True))
     if any(results.uses_differences(name, scene) for name in results.formulations for scene in results.scenes):
         show("* with differences of forces where there is no tangent, or it did not help")
     for scene in results.scenes:
@@ -93,16 +89,16 @@ def _run(options: RunOptions, plan: BenchPlan, files: OutputFiles) -> BenchResul
 
 
 def _write(
-    results: BenchResults, since: Sequence[Change], files: OutputFiles, pictures: Path | None, file: str
+    results: BenchResults, since: Sequence[BenchChange], files: OutputFiles, pictures: Path | None, file: str
 ) -> None:
     """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
     if REPORT in files.paths:
         write_bench(results, files.paths[REPORT])
         remove_journal(journal_folder(files.paths[REPORT]))
     if pictures is not None:
-        from contactverif_reports.draw.bench_figures import draw_bench  # It imports matplotlib, which is slow.
+        from contactverif_reports.plot.bench_figures import plot_bench  # It imports matplotlib, which is slow.
 
-        draw_bench(results, pictures)
+        plot_bench(results, pictures)
     if PAGE in files.paths:
         from contactverif_reports.html.bench_page import bench_page
         from contactverif_reports.html.pages import write_page
@@ -112,23 +108,3 @@ def _write(
         report = (files.names.get(REPORT) or Path(file)).name
         with whole(files.paths[MARKDOWN]) as part:
             part.write_text(bench_markdown(results, report, pictures is not None), encoding="utf-8")
-
-
-def _costs_table(results: BenchResults, scene: str) -> Table:
-    """Return what the largest target of a scene costs, and how many of all runs failed."""
-    target = results.targets[scene][0]
-    title = f"{scene}: {results.label(scene)}\nto an error of {format_share(target)} in the forces, at {RULE.label}"
-    heads = ("reached", "evaluation", f"over {REFERENCE}", "systems", "factor", "failed")
-    table = Table([Column("formulation", wrap=True), *numbers(*heads)], title)
-    ratios = ratios_at(results, scene, target, "evaluation")
-    for name, cost in costs_at(results, scene, target).items():
-        differences = "*" if results.uses_differences(name, scene) else ""
-        reached = f"{int(cost.reached.sum())}/{len(cost.reached)}"
-        systems = f"{cost.middle('systems'):.0f}" if cost.is_usual else "∞"
-        seconds = [format_seconds(cost.middle(number)) for number in ("evaluation", "factorisation")]
-        ratio = ratios[name].text if name in ratios else ""
-        failed = results.failures(name, scene)
-        table.add(
-            f"{name}{differences}", reached, seconds[0], ratio, systems, seconds[1], f"{failed.sum()}/{failed.size}"
-        )
-    return table

@@ -18,7 +18,6 @@ from contactverif.cli.options import (
     formulation_option,
     output_option,
 )
-from contactverif.contract.errors import MisuseError
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, RunOptions
 
 Isolated = Annotated[RunOptions, Takes([ISOLATION])]
@@ -408,43 +407,6 @@ def draw(
     return draw(report, case, scene, formulation or [], out or (), options)
 
 
-def stability(
-    *,
-    options: Annotated[
-        RunOptions, Takes(["names", "every", "out", ISOLATION], {"names": _FORMULATIONS, "every": _EVERY})
-    ],
-    out: Annotated[
-        list[Path] | None,
-        output_option(
-            "Write the results: FILE.nc the numbers, FILE.svg or FILE.png the figure, FILE.md a page. Repeatable."
-        ),
-    ] = None,
-) -> int:
-    """Draw error against condition number, to tell bad conditioning from bad rounding.
-
-    The states have gaps down to 1e-12, segments down to 1e-9, offsets up
-    to 1e9 and penalties up to 1e12 E/h. The error of a stable formulation
-    is at most 4 u × condition number, the line of the figure. The error of
-    one that rounds positions far from the origin is above that line. The
-    properties fail from 16 u × condition number on.
-
-    \bExit status
-      0  no promise is broken: what says that it is stable under
-         translations stays below 16 u × condition number
-      1  a promise is broken, a property could not be judged, or a plugin
-         does not load
-      2  the command line is wrong; one line says what is needed
-
-    \bExamples
-      contactverif stability vts-ppt mortar --out stability.svg
-      contactverif stability mine --out mine.nc --out mine.png
-      contactverif replay mine.nc --case mine.stability.sweep.offset-1e6-a
-    """
-    from contactverif.cli.stability_command import stability
-
-    return stability(options, out or ())
-
-
 def bench(
     *,
     options: Annotated[
@@ -482,9 +444,6 @@ def bench(
         list[Path] | None,
         output_option("Write the results: FILE.nc all instances, FILE.html or FILE.md a page. Repeatable."),
     ] = None,
-    jobs: Annotated[
-        int, typer.Option("--jobs", "-j", help="1: solutions side by side would disturb their times.", metavar="N")
-    ] = 1,
 ) -> int:
     """Measure speed against error, on scenes whose exact solution is known.
 
@@ -508,8 +467,6 @@ def bench(
       contactverif bench vts-ppt --quick --against bench.nc
       contactverif bench bench.nc --out bench.html
     """
-    if jobs != 1:
-        raise MisuseError("--jobs", str(jobs), "1: solutions side by side would disturb their times")
     from contactverif.cli.bench import bench
 
     return bench(

@@ -41,9 +41,9 @@ from contactverif.run.rows import find_missing
 from contactverif.run.run_options import ISOLATION, RunOptions, declared_options
 from contactverif.run.scheduler import begin_loading
 from contactverif.run.worker_pool import worker_pool
-from contactverif.studies.comparison_study import Study, run_comparison
+from contactverif.studies.comparison import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
-from contactverif_reports.compare.comparison import Differing
+from contactverif_reports.comparisons import Differing
 from contactverif_reports.html.comparison_page import Drawing, comparison_page
 from contactverif_reports.html.pages import write_page
 
@@ -194,12 +194,12 @@ def _draw_pictures(
 ) -> None:
     """Draw the bodies as both solve them, or the case with the forces of each."""
     if has_bodies(differing.case):
-        from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
+        from contactverif_reports.plot.scene_figures import plot_scene  # importing matplotlib is slow
 
         scene = solve_scene(differing.case, [candidate, reference])
         name = f"{case_id(candidate.name, differing.info.id)}.png"
         if scene.solutions:
-            draw_scene(scene, folder / name, title=f"{differing.info.id}, case {differing.number}")
+            plot_scene(scene, folder / name, title=f"{differing.info.id}, case {differing.number}")
         return
     for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
         name = f"{case_id(subject.name, differing.info.id)}.png"

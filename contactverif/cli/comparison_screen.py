@@ -12,14 +12,13 @@ from math import isfinite, isnan
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.cli.comparison_tables import number
 from contactverif.cli.console import fold, line
 from contactverif.cli.run_tables import headline
 from contactverif.contract.result import Result
 from contactverif.run.ranking import by_rank
-from contactverif.studies.comparison_study import Study
-from contactverif_reports.compare.cells import Cell
-from contactverif_reports.tables import PLAIN_STYLE, STYLES
+from contactverif.studies.comparison import Study
+from contactverif_reports.comparisons import RowNumbers
+from contactverif_reports.tables import PLAIN_STYLE, STYLES, short_number
 
 _MOST_ROWS = 7  # The properties with another verdict, and those with the same one, that have a line each.
 _ERROR = 7  # Columns of an error over its tolerance.
@@ -55,7 +54,7 @@ class ComparisonScreen:
         yield from self._iterations(name, width)
         yield from self._time(name, width)
 
-    def _pairs(self, name: str) -> list[tuple[Cell, Cell]]:
+    def _pairs(self, name: str) -> list[tuple[RowNumbers, RowNumbers]]:
         """Return the cells of a candidate, and of the reference beside them."""
         comparison = self.study.comparison
         keys = [(name, id_) for id_ in comparison.properties if (comparison.reference, id_) in comparison.cells]
@@ -81,19 +80,19 @@ class ComparisonScreen:
         for (other, n), seconds in totals.items():
             if other == name and isfinite(seconds):
                 ratio = seconds / totals[reference, n]  # NaN where the reference could not be timed.
-                words.append(f"{1e6 * seconds:.0f} µs on {n} segments ({number(ratio)}{of_reference})")
+                words.append(f"{1e6 * seconds:.0f} µs on {n} segments ({short_number(ratio)}{of_reference})")
                 of_reference = ""
         if words:
             yield fold(f"An evaluation takes {', '.join(words)}.", width, indent=0)
 
 
-def _differ(cell: Cell, reference: Cell) -> bool:
+def _differ(cell: RowNumbers, reference: RowNumbers) -> bool:
     """Return whether the verdicts differ. Where one is not asked there is no comparison."""
     unasked = {Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.OMITTED}
     return cell.row.verdict is not reference.row.verdict and not {cell.row.result, reference.row.result} & unasked
 
 
-def _is_worth_a_line(cell: Cell, reference: Cell) -> bool:
+def _is_worth_a_line(cell: RowNumbers, reference: RowNumbers) -> bool:
     """Return whether the errors of a property with one verdict are compared: those of a method, or far apart."""
     if isnan(cell.worst) or isnan(reference.worst):
         return False
@@ -101,7 +100,7 @@ def _is_worth_a_line(cell: Cell, reference: Cell) -> bool:
     return cell.row.info.family == _ACCURACY or (low > 1 and high > _DISTANT * low)
 
 
-def _table(name: str, reference: str, pairs: Sequence[tuple[Cell, Cell]]) -> Iterator[Text]:
+def _table(name: str, reference: str, pairs: Sequence[tuple[RowNumbers, RowNumbers]]) -> Iterator[Text]:
     """Yield a line for each property: both verdicts, and beside each its worst error over the tolerance."""
     if not pairs:
         return
@@ -116,6 +115,6 @@ def _table(name: str, reference: str, pairs: Sequence[tuple[Cell, Cell]]) -> Ite
         text = line(f"  {cell.row.property_id:{first}} ")
         for each, column in zip((cell, other), widths, strict=True):
             text.append(f"{each.row.result:{column}}", STYLES.get(each.row.result, PLAIN_STYLE))
-            text.append(f"{number(each.worst):>{_ERROR}} ")
+            text.append(f"{short_number(each.worst):>{_ERROR}} ")
         text.rstrip()
         yield text

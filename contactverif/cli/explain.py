@@ -24,8 +24,8 @@ from contactverif.explanations.terms import list_of_terms, symbol_meanings, term
 from contactverif.explanations.trait_text import trait_names, trait_text
 from contactverif.plugins.registry import load_formulations, property_ids, the_property
 from contactverif.run.run_options import RunOptions
-from contactverif_reports.draw import as_text
 from contactverif_reports.netcdf.read import read_run
+from contactverif_reports.plot.text import as_text
 
 _MOST_COLUMNS = 80  # Longer lines are hard to read.
 

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
-from math import isfinite
 from pathlib import Path
 
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from contactverif.api.run_files import PAGE
-from contactverif.cli.comparison_tables import MOST_MESHES, NAME_WIDTH, number
-from contactverif.cli.console import add_groups, indent_below, plain_table, show, show_verbatim
+from contactverif.cli.comparison_tables import MOST_MESHES
+from contactverif.cli.console import indent_below, show, show_verbatim
 from contactverif.cli.options import OutputFiles
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
-from contactverif_reports.compare.cells import Cell
-from contactverif_reports.compare.regression import Change, Changes, NamedRun
-from contactverif_reports.draw import as_text
+from contactverif_reports.comparisons import RowNumbers
 from contactverif_reports.html.comparison_page import changes_page
 from contactverif_reports.html.pages import write_page
 from contactverif_reports.netcdf.read import read_run
+from contactverif_reports.plot.text import as_text
+from contactverif_reports.regressions import Changes, NamedRun, changed_iterations_table, changes_table
+from contactverif_reports.tables import short_number
 
 
 def compare_reports(paths: Sequence[Path], globs: Sequence[str], files: OutputFiles) -> bool:
@@ -96,11 +95,13 @@ class ChangesTable:
             rows = "all rows" if others == len(changes.changes) else f"{others} rows (marked *)"
             yield Text(f"{rows} have other cases: their errors are compared as distributions, not case by case")
         yield Text("")
-        yield _results(changes.changes)
+        yield changes_table(changes.changes).without("median", "worst").terminal()
         if changed := [change for change in changes.changes if _errors(change.old) != _errors(change.new)]:
-            yield _changed_errors(changed)
+            errors = changes_table(changed).without("result", "better", "equal", "worse", "time")
+            errors.title = "error over tolerance, old → new, where it changed"
+            yield errors.terminal()
         if changes.iterations:
-            yield _iterations(changes)
+            yield changed_iterations_table(changes).terminal()
         for label, names in (("only in the old", changes.removed), ("only in the new", changes.added)):
             if names:
                 yield Text(f"{label}: {'; '.join(names)}")
@@ -116,66 +117,11 @@ def regressions_text(changes: Changes) -> Text:
     return Text.assemble((looks, "yellow"), ("\n".join(lines), "red"))
 
 
-def _results(changes: Sequence[Change]) -> Table:
-    """Return results, numbers of cases and time: a line for each row that both have."""
-
-    def cells(change: Change) -> list[str | Text]:
-        paired = change.paired
-        style = "red" if change.regressions else "green" if change.better else ""
-        result = Text(_arrow(str(change.old.row.result), str(change.new.row.result)), style=style)
-        counts = [paired.better, paired.equal, paired.worse] if paired is not None and paired.n else [""] * 3
-        return [_name(change), result, *map(str, counts), f"{change.slower:.2f}" if isfinite(change.slower) else "–"]
-
-    title = "result, old → new; cases better, equal, worse; time of a case, new/old (decides nothing)"
-    numbers = ("better", "equal", "worse", "time")
-    table = plain_table(title, "", width=NAME_WIDTH, words=("result",), numbers=numbers)
-    add_groups(table, changes, _formulation, cells)
-    return table
-
-
-def _changed_errors(changes: Sequence[Change]) -> Table:
-    title = "error over tolerance, old → new, where it changed"
-    table = plain_table(title, "", width=NAME_WIDTH, words=("median", "worst"))
-    add_groups(
-        table,
-        changes,
-        _formulation,
-        lambda change: [_name(change), *map(_arrow, _errors(change.old), _errors(change.new))],
-    )
-    return table
-
-
-def _iterations(changes: Changes) -> Table:
-    title, words = "Newton iterations that changed, old → new, where it converged", ("converged", "median", "most")
-    table = plain_table(title, "", width=NAME_WIDTH, words=words, numbers=("fewer", "same", "more"))
-    for old, new in changes.iterations:
-        table.add_row(
-            f"{new.formulation}, {new.title}",
-            _arrow(f"{old.converged}/{old.solved}", f"{new.converged}/{new.solved}"),
-            _arrow(number(old.median), number(new.median)),
-            _arrow(number(old.most), number(new.most)),
-            *map(str, (new.fewer, new.same, new.more)),
-        )
-    return table
-
-
 def _stored_mesh(example: Counterexample, report: str) -> Text:
     """Return the case on which a row that got worse fails, and the line that replays it."""
     title = f"{example.formulation}, {example.property_id}: {example.row.result}, {example.label}"
     return indent_below(title, *as_text(example.case).splitlines(), example.replay_command(report))
 
 
-def _formulation(change: Change) -> str:
-    return change.new.row.formulation
-
-
-def _name(change: Change) -> str:
-    return f"  {change.new.row.property_id}{'' if change.paired else ' *'}"
-
-
-def _errors(cell: Cell) -> tuple[str, str]:
-    return number(cell.median), number(cell.worst)
-
-
-def _arrow(old: str, new: str) -> str:
-    return old if old == new else f"{old} → {new}"
+def _errors(cell: RowNumbers) -> tuple[str, str]:
+    return short_number(cell.median), short_number(cell.worst)

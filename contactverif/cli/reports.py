@@ -24,10 +24,10 @@ from contactverif.run.audit import audit as audit_run
 from contactverif.run.judge import judge_if_applicable
 from contactverif.run.run_options import RunOptions
 from contactverif.sampling.draw import Sampling
-from contactverif_reports.draw import as_text
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
 from contactverif_reports.netcdf.write import write
+from contactverif_reports.plot.text import as_text
 from contactverif_reports.tables import Column, Table
 
 _MOST_LINES = 20  # The most differences that are listed.

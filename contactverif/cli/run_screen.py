@@ -33,7 +33,7 @@ from contactverif.contract.result import (
     Run,
 )
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
-from contactverif_reports.draw import as_text
+from contactverif_reports.plot.text import as_text
 from contactverif_reports.tables import STYLES
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.

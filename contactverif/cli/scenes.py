@@ -26,11 +26,10 @@ from contactverif.problems.catalogue import BLOCKS, SCENES, load_scene, options_
 from contactverif.run.judge import judge_if_applicable
 from contactverif.run.run_options import RunOptions
 from contactverif.studies.solved_scenes import solve_scene
-from contactverif_reports.draw import as_text
-from contactverif_reports.draw.scene_text import blocks_as_text, silhouettes_as_text
-from contactverif_reports.draw.solved_scene import SolvedScene
-from contactverif_reports.draw.vtu import write_vtu
 from contactverif_reports.netcdf.read import read_case
+from contactverif_reports.plot.solved_scene import SolvedScene
+from contactverif_reports.plot.text import as_text, blocks_as_text, silhouettes_as_text
+from contactverif_reports.plot.vtu import write_vtu
 from contactverif_reports.tables import Column, Table, numbers
 
 SOURCE = "Zavarise & De Lorenzis (2009)"
@@ -122,9 +121,9 @@ def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFile
         if suffix == SOLVED_SCENE:
             write_vtu(scene, scene.solutions[0], path)
         else:
-            from contactverif_reports.draw.scene_figures import draw_scene  # importing matplotlib is slow
+            from contactverif_reports.plot.scene_figures import plot_scene  # importing matplotlib is slow
 
-            draw_scene(scene, path, title=title)
+            plot_scene(scene, path, title=title)
     if not (scene.solutions and files.paths):
         echo(as_text(case))
     if scene.solutions:

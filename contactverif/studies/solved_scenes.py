@@ -21,7 +21,7 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.trace import End, Trace
 from contactverif.problems.blocks import is_uniform, pressure_of
 from contactverif.problems.uniform_stress import stress_error
-from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
+from contactverif_reports.plot.solved_scene import PointPressures, Solution, SolvedScene
 
 _FAR = 1e3  # An iterate is not drawn if a displacement exceeds this multiple of the size of the scene.
 

@@ -21,7 +21,7 @@ from contactverif.plugins.registry import load_formulation, load_properties, sub
 from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.run import check_known, run
 from contactverif.testing.parametrize import CheckOptions
-from contactverif_reports.draw import as_text
+from contactverif_reports.plot.text import as_text
 
 
 @dataclass(slots=True, repr=False)

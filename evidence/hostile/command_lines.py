@@ -35,7 +35,7 @@ GOOD = ("0", "1", "2", "130")
 BAD = ("traceback", "hang", "crash", "control character", "several lines")
 _WHOLE = ("0", "1", "2", "3", "-1", "-0", "1e3", "ten", "", "1_0", "٣", str(10**9), str(2**63), str(10**40), "9" * 5000)
 _BROKEN_NUMBERS = ("nan", "inf", "-inf", "1e999", "ten", "", "-1", "0", "1", "0.5")
-_EXPENSIVE = ("paper", "bench", "stability")  # Commands that take minutes if nothing is wrong.
+_EXPENSIVE = ("paper", "bench")  # Commands that take minutes if nothing is wrong.
 _POISON = ("--no-such-option", "--jobs=-1", "--out=no/such/folder/a.nc", "--out=a.wrong", f"--jobs={10**12}", "--out=")
 _COLUMNS = ("1", "2", "20", "80", "400", "0", "-3", "wide", "99999999")
 

@@ -22,7 +22,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from contactverif.contract.arrays import FloatArray
 from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import PaperFigure
-from contactverif_reports.draw.scene_figures import choose_pen
+from contactverif_reports.plot.scene_figures import choose_pen
 
 WIDTH = 7.2  # The width of a figure in inches: two columns of a journal.
 LETTERS = 11  # Points: 5.5 at half size.

@@ -27,7 +27,7 @@ from contactverif_paper.figure_style import (
 )
 from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.patch_solutions import Curve, PatchSolution
-from contactverif_reports.draw.scene_meshes import colour_scale, draw_bodies, magnifications
+from contactverif_reports.plot.scene_figures import colour_scale, magnifications, plot_bodies
 
 _TALLEST = 2.6  # Inches: the height of a panel with a deformed mesh.
 _SHORT_AXIS = 4.0  # An x axis of this length has a tick at each unit.
@@ -86,7 +86,7 @@ def plot_penetrations(patches: Sequence[PatchSolution]) -> Figure:
         remarks |= dict.fromkeys(magnification.words for magnification in magnified.values())
         panels_of_scene = [next(remaining) for _ in patch.curves]
         for axes, curve in zip(panels_of_scene, patch.curves, strict=True):
-            draw_bodies(axes, patch.solved, curve.solution, magnified[curve.solution.formulation], scale)
+            plot_bodies(axes, patch.solved, curve.solution, magnified[curve.solution.formulation], scale)
             axes.set_title(f"({next(letters)}) {curve.formulation.legend}{_end_remark(curve)}", loc="left")
         rows = -(-len(panels_of_scene) // across)
         bar = figure.colorbar(scale, ax=panels_of_scene, shrink=0.8, aspect=_BAR * rows, pad=0.01)
@@ -101,7 +101,7 @@ def plot_penetrations(patches: Sequence[PatchSolution]) -> Figure:
 
 
 def _surface_handles() -> list[Line2D | Patch]:
-    """Return the legend of both surfaces and of the penetration, as `draw_bodies` draws them."""
+    """Return the legend of both surfaces and of the penetration, as `plot_bodies` draws them."""
     pen: dict[str, Any] = {"color": "black", "linewidth": 1.3, "markersize": 3.6, "markeredgecolor": "black"}
     return [
         Line2D([], [], label="slave", marker="o", **pen),

@@ -36,7 +36,7 @@ from contactverif_paper.paper_formulations import (
     PaperFormulation,
     subject_of,
 )
-from contactverif_reports.draw.solved_scene import Solution, SolvedScene
+from contactverif_reports.plot.solved_scene import Solution, SolvedScene
 
 YOUNG = 1e4  # The modulus of the catalogue's scenes.
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.

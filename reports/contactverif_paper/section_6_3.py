@@ -20,7 +20,7 @@ from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
 from contactverif.contract.columns import Group
 from contactverif.contract.interface import Interface
-from contactverif.studies.evaluation_cost import make_state, measure_costs
+from contactverif.studies.comparison import make_state, measure_costs
 from contactverif_paper.paper_columns import Column, Formulations, to_group
 from contactverif_paper.paper_formulations import STS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isnan
 from typing import TYPE_CHECKING, Any
@@ -47,6 +47,12 @@ def numbers(*heads: str) -> tuple[Column, ...]:
     return tuple(Column(head, number=True) for head in heads)
 
 
+class Code(str):
+    """An id that one types; a page shows it so."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Change:
     """A cell with a value before and after; one that is the same is shown once."""
@@ -54,6 +60,14 @@ class Change:
     old: Any
     new: Any
     style: str = ""  # The colour in the terminal.
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A cell with a number and what it is."""
+
+    value: float
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +83,9 @@ class ResultCell:
 class Table:
     """A table: rows of cells, in groups with a title each.
 
-    A cell is words, a number, a `Change`, a `ResultCell`, or None; it may also be rich's `Text` or a page's `Markup`
-    where only one of the renderers is asked. A number that is not whole gets two digits. A page renders a table with
-    the macro `table` of `parts.html.j2`.
+    A cell is words, a number, a `Change`, a `Measured`, a `ResultCell`, or None; it may also be rich's `Text` or a
+    page's `Markup` where only one of the renderers is asked. A number that is not whole gets two digits. A page renders
+    a table with the macro `table` of `parts.html.j2`.
     """
 
     columns: Sequence[Column]
@@ -81,6 +95,13 @@ class Table:
     def add(self, *cells: Any, group: str = "") -> None:
         """Add a row to a group."""
         self.groups.setdefault(group, []).append(cells)
+
+    def insert(self, place: int, column: Column, cells: Iterable[Any]) -> None:
+        """Insert a column with its cells, row by row."""
+        each = iter(cells)
+        self.columns = [*self.columns[:place], column, *self.columns[place:]]
+        for title, rows in self.groups.items():
+            self.groups[title] = [(*row[:place], next(each), *row[place:]) for row in rows]
 
     def without(self, *heads: str) -> Table:
         """Return the table without some columns."""
@@ -141,6 +162,8 @@ def plain_text(value: Any) -> str:
         case Change(old, new):
             before, after = plain_text(old), plain_text(new)
             return after if before == after else f"{before} → {after}"
+        case Measured(number, name):
+            return f"{short_number(number)} {name}"
         case ResultCell(result, _, differs):
             mark = "" if differs is None else "≠ " if differs else "  "
             return f"{mark}{result or '–'}"

@@ -15,10 +15,10 @@ from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.plugins.registry import load_formulation
 from contactverif.problems.wavy import pose_wavy
-from contactverif.studies.bench.bench_plan import is_solved, largest_errors, vary
-from contactverif.studies.bench.cell_runs import TURNS, evaluate
-from contactverif_reports.bench.costs import REFERENCE
-from contactverif_reports.bench.results import ERRORS, RULE, Cell
+from contactverif.studies.bench_cells import TURNS, evaluate
+from contactverif.studies.bench_plan import is_solved, largest_errors, vary
+from contactverif_reports.bench_costs import REFERENCE
+from contactverif_reports.bench_results import ERRORS, RULE, Cell
 
 FILE = Path(__file__).parents[2] / "reports" / "bench" / "fine_waves.csv"
 FORMULATIONS = (REFERENCE, "sts", "nts-ar", "mortar", "chen-hisada", "mortar-lm")

@@ -11,8 +11,8 @@ from subjects import load_property
 
 from contactverif import named_case
 from contactverif.sampling.draw import Sampling, draw_cases
-from contactverif_reports.draw.case_figure import make_case_figure
-from contactverif_reports.draw.case_text import as_text
+from contactverif_reports.plot.case_figures import make_case_figure
+from contactverif_reports.plot.text import as_text
 
 N_DRAWN = 25
 

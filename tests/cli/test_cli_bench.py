@@ -12,8 +12,8 @@ from studies.bench_results import make_cells, make_results
 from subjects import change_verbs, load_subject
 
 from contactverif.contract.subject import Subject
-from contactverif.studies.bench import cell_runs, meter
-from contactverif_reports.bench.changes import changes
+from contactverif.studies import bench_cells
+from contactverif_reports.bench_costs import compare_benches
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
 QUICK = ("nts-ar", "vts-ppt", "--quick", "--scene", "wavy")
@@ -64,7 +64,6 @@ def test_what_became_slower_is_told_by_its_interval(ask: Ask, tmp_path: Path) ->
     [
         ([], "NAME: found nothing; needed --all, or some of "),
         (["nts", "--scene", "disk"], "--scene: found 'disk'; needed one of "),
-        (["nts", "--jobs", "2"], "--jobs: found 2; needed 1: solutions side by side would disturb their times"),
         (["nts", "--instances", "0"], "--instances: found 0; needed at least 1, at most 1000"),
         (["nts", "--against", "no-such.nc"], "FILE: found no-such.nc, which does not exist; needed a file that "),
         (["a.nc", "nts"], "NAME: found a.nc and more; needed formulations alone, or one file of a bench"),
@@ -91,8 +90,7 @@ class Counter:
 def counter(monkeypatch: pytest.MonkeyPatch) -> Counter:
     """Put a counter in the place of the clocks of a bench."""
     clock = Counter()
-    for module in (meter, cell_runs):
-        monkeypatch.setattr(module, "perf_counter", clock)
+    monkeypatch.setattr(bench_cells, "perf_counter", clock)
     return clock
 
 
@@ -145,4 +143,4 @@ def test_one_that_sleeps_is_found_by_seconds_and_a_needless_residual_without_a_c
     assert words in ours
     assert "(as fast); all counts are equal." in other
     new, old = (read_bench(tmp_path / f"{name}.nc") for name in ("new", "old"))
-    assert changes(new, old)[1].evaluation.middle == pytest.approx(factor, rel=0.01)
+    assert compare_benches(new, old)[1].evaluation.middle == pytest.approx(factor, rel=0.01)

@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 from quotes import DOCS, README, ROOT
 
-from contactverif_reports.bench.bench_text import bench_markdown
-from contactverif_reports.bench.cost_tables import ratios_at
-from contactverif_reports.bench.costs import REFERENCE
-from contactverif_reports.bench.results import BenchResults
+from contactverif_reports.bench_costs import REFERENCE, bench_markdown, ratios_at
+from contactverif_reports.bench_results import BenchResults
 from contactverif_reports.netcdf.bench_file import read_bench
 
 BENCH = ROOT / "reports" / "bench"

@@ -8,7 +8,7 @@ from catalogue import KINDS, PLUGINS
 from containment import CHECKS, HEADS, judge, run_command, scratch
 
 from contactverif.isolation.box import why_no_box
-from contactverif_reports.bench.results import Outcome
+from contactverif_reports.bench_results import Outcome
 from contactverif_reports.netcdf.bench_file import read_bench
 
 LEAST_PLUGINS = 80

@@ -4,7 +4,7 @@ import numpy as np
 
 from contactverif import Body, Case, Interface, Placing, Rectangle, Surface, block, rigid_surface
 from contactverif.contract.arrays import FloatArray
-from contactverif_reports.draw.solved_scene import PointPressures, Solution, SolvedScene
+from contactverif_reports.plot.solved_scene import PointPressures, Solution, SolvedScene
 
 PRESSURE = 100.0
 

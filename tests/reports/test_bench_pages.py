@@ -14,25 +14,27 @@ from page_reader import complaints
 from studies.bench_results import make_cells, make_results
 
 from contactverif.contract.errors import MisuseError
-from contactverif_reports.bench.bench_text import bench_markdown
-from contactverif_reports.bench.changes import changes
-from contactverif_reports.bench.cost_tables import cost_sentences, cost_table, format_seconds, starts_table
-from contactverif_reports.bench.costs import (
+from contactverif_reports.bench_costs import (
     BODIES,
-    best_of,
+    Ratio,
+    bench_markdown,
+    compare_benches,
     cost_of,
     cost_ratio,
+    cost_sentences,
+    cost_table,
     curve,
+    format_seconds,
     rank,
+    ratio_of,
     runtimes,
+    starts_table,
     total_ratio,
 )
-from contactverif_reports.bench.intervals import Ratio, ratio_of
-from contactverif_reports.bench.results import DEEP, VARIANTS, Outcome
-from contactverif_reports.draw.bench_figures import draw_bench, highlights, make_scene_figure
-from contactverif_reports.draw.curve_names import ROOM, spread
+from contactverif_reports.bench_results import BEST, DEEP, VARIANTS, Outcome
 from contactverif_reports.html.bench_page import bench_page
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
+from contactverif_reports.plot.bench_figures import ROOM, highlights, make_scene_figure, plot_bench, spread
 
 RUNS = {
     "vts-ppt": {8: (1e-3, 0.02, 2), 16: (2e-3, 0.004, 3)},
@@ -72,11 +74,11 @@ def test_the_best_penalty_afterwards_is_told_from_that_of_the_rule() -> None:
     errors[0, :6, VARIANTS.index(DEEP)] = 1e-9  # Another start is no other penalty.
     changed = replace(results, errors=errors)
     assert cost_of(changed, "vts-ppt", "wavy", 1e-2).middle("segments") == 16
-    assert best_of(changed, "vts-ppt", "wavy", 1e-2).middle("segments") == 8
-    assert best_of(changed, "vts-ppt", "wavy", 1e-4).middle("segments") == inf
-    (head, *_), (row, *_) = cost_table(changed, "wavy", 1e-2)
-    assert head == "reached"
-    assert row[:4] == ["vts-ppt", "6/6", "16", "8"]
+    assert cost_of(changed, "vts-ppt", "wavy", 1e-2, BEST).middle("segments") == 8
+    assert cost_of(changed, "vts-ppt", "wavy", 1e-4, BEST).middle("segments") == inf
+    table = cost_table(changed, "wavy", 1e-2)
+    assert [column.head for column in table.columns[:4]] == ["formulation", "reached", "segments", "best"]
+    assert table.groups[""][0][:4] == ("vts-ppt", "6/6", "16", "8")
 
 
 def test_whole_solutions_go_from_evaluations_to_factorisations_as_bodies_get_dearer() -> None:
@@ -176,10 +178,11 @@ def test_an_instance_without_a_solution_takes_no_mesh_off_a_curve() -> None:
 def test_the_table_of_starts_tells_failures_and_ranges() -> None:
     results = make_results(make_cells(), RUNS)
     results.counts[0, 0, 0, 0] = 7
-    heads, rows = starts_table(results, "wavy")
-    assert heads == ["8", "16"]
-    assert rows[:2] == [["vts-ppt, near", "2–7", "3"], ["vts-ppt, deep", "2", "3"]]
-    assert rows[-1] == ["poor, deepest", "2", "6 fail"]
+    table = starts_table(results, "wavy")
+    assert [column.head for column in table.columns] == ["formulation", "8", "16"]
+    rows = table.groups[""]
+    assert rows[:2] == [("vts-ppt, near", "2–7", "3"), ("vts-ppt, deep", "2", "3")]
+    assert rows[-1] == ("poor, deepest", "2", "6 fail")
 
 
 def test_counts_are_compared_exactly_and_seconds_in_factorisations() -> None:
@@ -187,19 +190,19 @@ def test_counts_are_compared_exactly_and_seconds_in_factorisations() -> None:
     slower = make_results(make_cells(), {**RUNS, "exact": {8: (3.6e-3, 0.008, 4), 16: (7.2e-3, 9e-4, 5)}}, noise=0.02)
     machine = replace(slower, evaluation=3 * slower.evaluation, factorisation=3 * slower.factorisation)
     for results in (slower, machine):
-        reference, exact, _ = changes(results, RESULTS)
+        reference, exact, _ = compare_benches(results, RESULTS)
         assert (reference.evaluation.word, exact.evaluation.word) == ("as fast", "slower")
         assert (reference.worse, exact.worse) == (False, True)
         assert exact.evaluation.middle == pytest.approx(1.2, rel=0.01)
         assert exact.counts_text == "all counts are equal"
     more = replace(RESULTS, counts=RESULTS.counts.copy())
     more.counts[1, 0, 0, 2] += 1  # One residual in one run.
-    _, exact, _ = changes(more, RESULTS)
+    _, exact, _ = compare_benches(more, RESULTS)
     assert exact.worse
     assert "residuals: 271 instead of 270" in exact.sentence
-    assert not changes(RESULTS, more)[1].worse  # Fewer are no slowdown, and are told.
-    assert changes(RESULTS, more)[1].counts
-    assert changes(make_results(make_cells("rings"), RUNS), RESULTS) == ()
+    assert not compare_benches(RESULTS, more)[1].worse  # Fewer are no slowdown, and are told.
+    assert compare_benches(RESULTS, more)[1].counts
+    assert compare_benches(make_results(make_cells("rings"), RUNS), RESULTS) == ()
 
 
 def test_the_file_holds_everything(tmp_path: Path) -> None:
@@ -222,10 +225,10 @@ def test_another_file_is_no_bench(tmp_path: Path) -> None:
 
 
 def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) -> None:
-    draw_bench(RESULTS, tmp_path)
+    plot_bench(RESULTS, tmp_path)
     assert {file.name for file in tmp_path.iterdir()} == {"wavy.svg", "cost.svg", "runtimes.svg", "starts.svg"}
     assert (RESULTS.outcomes == Outcome.NOT_SOLVED).any()
-    page = bench_page(RESULTS, changes(RESULTS, RESULTS))
+    page = bench_page(RESULTS, compare_benches(RESULTS, RESULTS))
     assert not complaints(page)
     assert not re.search(r'(src|href)="http', page)
     assert "never there: poor" in page
@@ -238,7 +241,7 @@ def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) 
 def test_many_formulations_have_a_picture_with_a_panel_each_and_one_mesh_has_no_curve(tmp_path: Path) -> None:
     many = {f"f{n}": RUNS["exact"] for n in range(7)}
     cells = (*make_cells(), *make_cells("kinked", meshes=(8,)))
-    draw_bench(make_results(cells, many), tmp_path)
+    plot_bench(make_results(cells, many), tmp_path)
     assert {file.name for file in tmp_path.iterdir()} == {
         "wavy.svg",
         "wavy-each.svg",

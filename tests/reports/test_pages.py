@@ -251,7 +251,7 @@ def test_a_strip_of_nothing_is_nothing() -> None:
 
 def test_the_bodies_of_a_scene_are_drawn_without_solving_it() -> None:
     from contactverif.problems.catalogue import load_scene
-    from contactverif_reports.draw.scene_outline import make_outline_figure
+    from contactverif_reports.plot.case_figures import make_outline_figure
 
     case = load_scene("c").case()
     svg = svg_inline(make_outline_figure(case, 5.4))

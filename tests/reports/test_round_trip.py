@@ -21,14 +21,13 @@ from contactverif.cli.run_tables import RunTable, summary
 from contactverif.contract.counterexample import counterexamples, failing_examples
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.run.run import run as verify
-from contactverif_reports.compare.cells import Cell
-from contactverif_reports.compare.comparison import Comparison
-from contactverif_reports.compare.regression import Changes, NamedRun
+from contactverif_reports.comparisons import Comparison, RowNumbers
 from contactverif_reports.html.comparison_page import changes_page, comparison_page
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, read_run
 from contactverif_reports.netcdf.write import write
+from contactverif_reports.regressions import Changes, NamedRun
 
 
 def hard_run() -> Run:
@@ -204,7 +203,7 @@ def test_the_cases_of_a_row_are_a_sequence(tmp_path: Path) -> None:
 
 def test_a_number_that_was_not_measured_has_no_margin() -> None:
     """A tolerance without its value is no failure; a value that is NaN is one."""
-    cell = Cell.from_row(hard_run().rows[0])
+    cell = RowNumbers.from_row(hard_run().rows[0])
     assert cell.margins[0] == pytest.approx(0.95)
     assert np.isinf(cell.margins[[1, 5, 6]]).all()
     assert np.isnan(cell.margins[[2, 3, 4, 7, 8]]).all()

@@ -16,14 +16,14 @@ from contactverif.run.judge import forces_to_draw
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases
-from contactverif_reports.draw import as_text, draw_case
-from contactverif_reports.draw.surface_figure import view_from_above, widen
-from contactverif_reports.draw.surface_vtu import write_surfaces
 from contactverif_reports.exchange.run_document import document_of
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
 from contactverif_reports.netcdf.stored_cases import counterexample_groups, read_forces
 from contactverif_reports.netcdf.write import write
+from contactverif_reports.plot.case_figures import plot_case, view_from_above, widen
+from contactverif_reports.plot.text import as_text
+from contactverif_reports.plot.vtu import write_surfaces
 
 CROSSED = named_case("crossed-diagonals")
 
@@ -67,7 +67,7 @@ def test_a_failure_is_drawn(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"case{suffix}"
     make_drawing(subject, question, judge_case(question, CROSSED, subject)).write(path)
     assert path.stat().st_size > 5000
-    draw_case(CROSSED, tmp_path / f"bare{suffix}")
+    plot_case(CROSSED, tmp_path / f"bare{suffix}")
     if suffix == ".svg":
         text = path.read_text(encoding="utf-8")
         assert "in space" in text
@@ -162,11 +162,11 @@ def test_quadrilaterals_have_the_pressure_of_their_forces(tmp_path: Path) -> Non
 
 def test_forces_of_one_size_and_two_directions_are_told_apart(tmp_path: Path) -> None:
     forces = np.repeat([[0.0, 0, 1], [0, 0, -1]], 4, axis=0)
-    draw_case(CROSSED, tmp_path / "case.svg", forces=-forces, exact=forces)
+    plot_case(CROSSED, tmp_path / "case.svg", forces=-forces, exact=forces)
     text = (tmp_path / "case.svg").read_text(encoding="utf-8")
     assert text.count("other way") == 8
     assert "slave, seen through its body" in text  # The view is against the master's normal.
-    draw_case(CROSSED, tmp_path / "nan.svg", forces=np.nan * forces, exact=forces)
+    plot_case(CROSSED, tmp_path / "nan.svg", forces=np.nan * forces, exact=forces)
     assert "error of the nodal forces, not finite" in (tmp_path / "nan.svg").read_text(encoding="utf-8")
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contactverif_reports.bench.results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
+from contactverif_reports.bench_results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
 
 N_PROCESSES = 3
 

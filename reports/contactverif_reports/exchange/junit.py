@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
-from contactverif_reports.draw import as_text
 from contactverif_reports.files import whole
+from contactverif_reports.plot.text import as_text
 
 _SKIPPED = (Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.UNDECIDED)
 

@@ -17,8 +17,8 @@ from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
 from contactverif.contract.result import Row, Run
 from contactverif.contract.schema import ROW, Column
-from contactverif_reports.draw import as_text
 from contactverif_reports.files import whole
+from contactverif_reports.plot.text import as_text
 
 VERSION = 1  # A change that a reader must know of is a new one.
 SCHEMA = Path(__file__).with_name("run.schema.json")

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from contactverif_reports.bench.bench_text import (
+from contactverif_reports.bench_costs import (
     DEEPEST_START,
     HOW_TO_READ,
     MOST_CURVES,
     STARTS,
     THREE_NUMBERS,
     TOTALS,
-)
-from contactverif_reports.bench.changes import Change
-from contactverif_reports.bench.cost_tables import (
+    BenchChange,
     cost_sentences,
     cost_table,
     format_share,
@@ -22,20 +20,47 @@ from contactverif_reports.bench.cost_tables import (
     starts_table,
     totals_table,
 )
-from contactverif_reports.bench.results import VARIANTS, BenchResults
+from contactverif_reports.bench_results import VARIANTS, BenchResults
 from contactverif_reports.html.pages import origin, render, svg_inline
+from contactverif_reports.tables import Column, Table
 
 _FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version", "blas", "platform", "isolation")
 
 
-def bench_page(results: BenchResults, changes: Sequence[Change] = ()) -> str:
+def bench_page(results: BenchResults, changes: Sequence[BenchChange] = ()) -> str:
     """Return the page of a bench."""
-    from contactverif_reports.draw.bench_figures import (  # Importing it is slow.
-        make_cost_figure,
-        make_runtime_figure,
-        make_starts_figure,
-    )
+    from contactverif_reports.plot import bench_figures as plots  # Importing it is slow.
 
+    scenes: list[dict[str, Any]] = []
+    for scene in results.scenes:
+        figures = []
+        if len(results.meshes_of(scene)) > 1:
+            figures.append(svg_inline(plots.make_scene_figure(results, scene), f"errors, {scene}"))
+            if len(results.formulations) > MOST_CURVES:
+                figures.append(svg_inline(plots.make_each_figure(results, scene), f"each formulation, {scene}"))
+        reached, words = split_targets(results, scene)
+        targets = [
+            {
+                "title": f"an error of {format_share(target)} in the forces",
+                "sentences": cost_sentences(results, scene, target),
+                "table": cost_table(results, scene, target),
+            }
+            for target in reached
+        ]
+        scenes.append(
+            {
+                "name": scene,
+                "label": results.label(scene),
+                "figures": figures,
+                "targets": targets,
+                "out_of_reach": words,
+                "totals": totals_table(results, scene),
+                "starts": starts_table(results, scene),
+            }
+        )
+    since = Table([Column("formulation"), Column("evaluation", number=True), Column(""), Column("counts", wrap=True)])
+    for change in changes:
+        since.add(change.formulation, change.evaluation.text, change.evaluation.word, change.counts_text)
     return render(
         "bench.html.j2",
         results=results,
@@ -46,44 +71,14 @@ def bench_page(results: BenchResults, changes: Sequence[Change] = ()) -> str:
             "starts": STARTS,
             "deepest": DEEPEST_START,
         },
-        cost=svg_inline(make_cost_figure(results), "what an error costs"),
-        runtimes=svg_inline(make_runtime_figure(results), "runtimes"),
-        deepest=svg_inline(make_starts_figure(results), "who fails from the deepest start"),
-        scenes=[_scene(results, scene) for scene in results.scenes],
+        cost=svg_inline(plots.make_cost_figure(results), "what an error costs"),
+        runtimes=svg_inline(plots.make_runtime_figure(results), "runtimes"),
+        deepest=svg_inline(plots.make_starts_figure(results), "who fails from the deepest start"),
+        scenes=scenes,
         failures=_list_failures(results),
-        changes=changes,
+        changes=since,
         about=origin(results.provenance, _FACTS),
     )
-
-
-def _scene(results: BenchResults, scene: str) -> dict[str, Any]:
-    """Return what the page shows of a scene."""
-    from contactverif_reports.draw.bench_figures import make_each_figure, make_scene_figure
-
-    figures = []
-    if len(results.meshes_of(scene)) > 1:
-        figures.append(svg_inline(make_scene_figure(results, scene), f"errors, {scene}"))
-        if len(results.formulations) > MOST_CURVES:
-            figures.append(svg_inline(make_each_figure(results, scene), f"each formulation, {scene}"))
-    reached, words = split_targets(results, scene)
-    targets = [
-        {
-            "title": f"an error of {format_share(target)} in the forces",
-            "sentences": cost_sentences(results, scene, target),
-            "table": cost_table(results, scene, target),
-        }
-        for target in reached
-    ]
-    totals = totals_table(results, scene, results.targets[scene][0])
-    return {
-        "name": scene,
-        "label": results.label(scene),
-        "figures": figures,
-        "targets": targets,
-        "out_of_reach": words,
-        "totals": totals if totals[1] else None,
-        "starts": starts_table(results, scene),
-    }
 
 
 def _list_failures(results: BenchResults) -> list[tuple[str, int, str]]:
@@ -96,6 +91,6 @@ def _list_failures(results: BenchResults) -> list[tuple[str, int, str]]:
             if formulation == name
         ]
         if ends:
-            kinds = sorted(set(ends), key=ends.count, reverse=True)
+            kinds = sorted(dict.fromkeys(ends), key=ends.count, reverse=True)
             rows.append((name, len(ends), "; ".join(f"{ends.count(kind)} {kind}" for kind in kinds[:3])))
     return rows

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isnan
+from math import inf
 from typing import Any
 
 from markupsafe import Markup
@@ -12,12 +12,22 @@ from markupsafe import Markup
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
-from contactverif_reports.compare.cells import Cell
-from contactverif_reports.compare.comparison import PARTS, Comparison, Cost, Differing
-from contactverif_reports.compare.regression import Change, Changes
-from contactverif_reports.draw.solved_scene import SolvedScene
+from contactverif.contract.property import Verdict
+from contactverif_reports.comparisons import (
+    Comparison,
+    Cost,
+    Differing,
+    cost_table,
+    errors_table,
+    iterations_table,
+    measured_cells,
+    results_table,
+)
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import origin, render, svg_inline
+from contactverif_reports.plot.solved_scene import SolvedScene
+from contactverif_reports.regressions import Changes, changed_iterations_table, changes_table
+from contactverif_reports.tables import Column
 
 _FACTS = ("command", "created", "commit", "profile", "examples", "seed", "contactverif_version", "blas", "platform")
 _FIGURE_WIDTH = 5.6  # The width of a figure in inches; two stand side by side on a wide page.
@@ -40,18 +50,24 @@ def comparison_page(
 ) -> str:
     """Return the page of formulations against a reference."""
     axis = Axis.from_margins(cell.margins for cell in comparison.cells.values())
+    errors = errors_table(comparison)
+    head = Column("", wrap=True, page_head=Markup("error / tolerance{}").format(ticks(axis)))
+    errors.insert(len(errors.columns) - 1, head, (strip(cell.margins, axis) for cell in measured_cells(comparison)))
+    verdicts: dict[str, set[Verdict]] = {id_: set() for id_ in comparison.properties}
+    for (_, id_), cell in comparison.cells.items():
+        verdicts[id_].add(cell.row.verdict)
     return render(
         "compare.html.j2",
         found=comparison,
         candidates=comparison.formulations[1:],
         wrong=comparison.unexpected,
-        differ=[id_ for id_ in comparison.properties if _verdicts_differ(comparison, id_)],
-        results=[(id_, _results(comparison, id_)) for id_ in comparison.properties],
-        errors=[(id_, lines) for id_ in comparison.properties if (lines := _errors(comparison, id_, axis))],
-        ticks=ticks(axis),
-        parts_of_time=PARTS,
+        differ=[id_ for id_, every in verdicts.items() if len(every) > 1],
+        results=results_table(comparison),
+        errors=errors,
+        iterations=iterations_table(comparison),
         inf=inf,
-        costs=_costs(costs, comparison.reference),
+        costs=costs,
+        times=cost_table(costs, comparison.reference),
         meshes=[_mesh(*pair, comparison.reference) for pair in zip(differing, drawings, strict=True)],
         about=origin(comparison.provenance, _FACTS),
     )
@@ -60,11 +76,15 @@ def comparison_page(
 def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> str:
     """Return the page of an old report and a new one."""
     axis = Axis.from_margins(cell.margins for change in changes.changes for cell in (change.old, change.new))
+    rows = changes_table(changes.changes)
+    head = Column("", wrap=True, page_head=Markup("old above new{}").format(ticks(axis)))
+    by_formulation = [each for name in rows.groups for each in changes.changes if each.new.row.formulation == name]
+    rows.insert(4, head, (strip(each.old.margins, axis) + strip(each.new.margins, axis) for each in by_formulation))
     return render(
         "changes.html.j2",
         changes=changes,
-        rows=_by_formulation(changes, axis),
-        ticks=ticks(axis),
+        rows=rows,
+        iterations=changed_iterations_table(changes) if changes.iterations else None,
         meshes=[
             (example, example.replay_command(changes.new.path), _case_figure(example.case, None, None, id_))
             for id_, example in examples.items()
@@ -75,70 +95,6 @@ def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> st
     )
 
 
-def _by_formulation(changes: Changes, axis: Axis) -> list[tuple[str, list[tuple[Change, Markup, Markup]]]]:
-    """Return the rows by formulation, with the strips of the old and the new margins."""
-    rows: dict[str, list[tuple[Change, Markup, Markup]]] = {}
-    for change in changes.changes:
-        line = (change, strip(change.old.margins, axis), strip(change.new.margins, axis))
-        rows.setdefault(change.new.row.formulation, []).append(line)
-    return list(rows.items())
-
-
-def _cells(comparison: Comparison, id_: str) -> list[Cell]:
-    """Return the cells of one property, the reference first."""
-    keys = ((name, id_) for name in comparison.formulations)
-    return [comparison.cells[key] for key in keys if key in comparison.cells]
-
-
-def _verdicts_differ(comparison: Comparison, id_: str) -> bool:
-    return len({cell.row.verdict for cell in _cells(comparison, id_)}) > 1
-
-
-def _results(comparison: Comparison, id_: str) -> list[dict[str, Any] | None]:
-    """Return the results of one property, None where a formulation was not checked."""
-    reference = comparison.cells.get((comparison.reference, id_))
-    results: list[dict[str, Any] | None] = []
-    for name in comparison.formulations:
-        cell = comparison.cells.get((name, id_))
-        if cell is None:
-            results.append(None)
-            continue
-        differs = reference is not None and cell.row.verdict is not reference.row.verdict
-        results.append({"word": str(cell.row.result), "unexpected": cell.row.unexpected, "differs": differs})
-    return results
-
-
-def _errors(comparison: Comparison, id_: str, axis: Axis) -> list[tuple[Cell, Any, Markup]]:
-    """Return the lines of the table of errors of one property; none where nothing was measured."""
-    return [
-        (cell, comparison.paired.get((cell.row.formulation, id_)), strip(cell.margins, axis))
-        for cell in _cells(comparison, id_)
-        if not isnan(cell.worst)
-    ]
-
-
-def _costs(costs: Sequence[Cost], reference: str) -> list[tuple[int, list[dict[str, Any]]]]:
-    """Return by number of slave segments the microseconds of each formulation, and its ratio to the reference's."""
-    totals = {cost.n_segments: cost.total for cost in costs if cost.formulation == reference}
-    lines: dict[int, list[dict[str, Any]]] = {cost.n_segments: [] for cost in costs}
-    for cost in costs:
-        seconds = [*(cost.seconds[part] for part in PARTS), cost.total]
-        ratio = cost.total / totals[cost.n_segments]
-        lines[cost.n_segments].append(
-            {
-                "formulation": cost.formulation,
-                "failed": cost.failed,
-                "times": [*map(_microseconds, seconds), _microseconds(cost.total / cost.n_segments, digits=2)],
-                "ratio": "–" if isnan(ratio) else f"{ratio:.2f}",
-            }
-        )
-    return list(lines.items())
-
-
-def _microseconds(seconds: float, digits: int = 1) -> str:
-    return "–" if isnan(seconds) else f"{1e6 * seconds:.{digits}f}"
-
-
 def _mesh(differing: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
     """Return two figures with a caption each, or one with both."""
     sides = [
@@ -147,7 +103,7 @@ def _mesh(differing: Differing, drawing: Drawing, reference: str) -> dict[str, A
     ]
     id_ = differing.info.id
     if drawing.solved is not None and drawing.solved.solutions:
-        from contactverif_reports.draw.scene_figures import make_scene_figure
+        from contactverif_reports.plot.scene_figures import make_scene_figure
 
         figures = [(svg_inline(make_scene_figure(drawing.solved), f"{id_}, solved"), sides)]
     else:
@@ -162,7 +118,7 @@ def _case_figure(case: Case, forces: FloatArray | None, exact: FloatArray | None
     """Return the figure of a case: its bodies, or its interface with forces."""
     import matplotlib  # Importing it is slow.
 
-    from contactverif_reports.draw.scene_outline import make_mesh_figure
+    from contactverif_reports.plot.case_figures import make_mesh_figure
 
     with matplotlib.rc_context({"legend.fontsize": _LEGEND_SIZE}):
         beside = exact if forces is not None else None  # The exact multipliers are not known.

@@ -24,7 +24,7 @@ from contactverif.contract.foreign_text import printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result
 from contactverif_reports.files import check_writable, checked_name, whole
-from contactverif_reports.tables import Change, ResultCell, plain_text
+from contactverif_reports.tables import Change, Code, Measured, ResultCell, plain_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,17 +83,28 @@ def svg_inline(figure: Figure, label: str = "") -> Markup:
     """
     import matplotlib
 
-    from contactverif_reports.draw.plain_labels import save_plainly
+    from contactverif_reports.plot.case_figures import save_plainly
 
     buffer = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "contactverif", "svg.fonttype": "none"}):
         save_plainly(figure, buffer, format="svg", transparent=True, metadata={"Date": None})
     root = ElementTree.fromstring(buffer.getvalue())
-    _remove_strangers(root)
+    for parent in list(root.iter()):  # Metadata, and a style sheet for every element of the page, do not belong to it.
+        for child in list(parent):
+            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
+                parent.remove(child)
     _prefix_ids(root, "f" + hashlib.sha256(buffer.getvalue()).hexdigest()[:9])
     for element in root.iter():
         element.tag = element.tag.removeprefix(_SVG)
-    root.attrib = _root_attributes(root, label)
+    width = float(root.attrib["width"].removesuffix("pt")) * _PX_PER_PT
+    root.attrib = {
+        "data-figure": root.attrib["data-figure"],
+        "viewBox": root.attrib["viewBox"],
+        "width": "100%",
+        "style": f"max-width:{width:.0f}px;--least:{_LEAST_SCALE * width:.0f}px;"
+        "stroke-linejoin:round;stroke-linecap:butt",
+        **({"role": "img", "aria-label": label} if label else {"aria-hidden": "true"}),
+    }
     return Markup(ElementTree.tostring(root, encoding="unicode"))
 
 
@@ -110,14 +121,20 @@ def page_cell(value: Any) -> str:
     match value:
         case float():
             return number(value, 2)
+        case Code():
+            return Markup("<code>{}</code>").format(value)
         case Change(old, new) if plain_text(old) != plain_text(new):
             return Markup("{} → {}").format(page_cell(old), page_cell(new))
         case Change(_, new):
             return page_cell(new)
+        case Measured(measured, name):
+            return f"{number(measured, 2)} {name}"
         case ResultCell(result, unexpected, differs) if result:
             parts: Any = _environment().get_template("parts.html.j2").module
             verdict = Markup(parts.verdict(str(result), unexpected))
             return verdict + Markup(' <span class="soft">(differs)</span>') if differs else verdict
+        case ResultCell():
+            return "–"
     return value if isinstance(value, str) else plain_text(value)
 
 
@@ -150,14 +167,6 @@ def _make_printable(value: Any) -> Any:
     return printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
-def _remove_strangers(root: ElementTree.Element) -> None:
-    """Remove the parts that affect the page beyond the figure: metadata, and a style sheet for every element."""
-    for parent in list(root.iter()):
-        for child in list(parent):
-            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
-                parent.remove(child)
-
-
 def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:
     """Put the prefix before each id that some element refers to, and remove the other ids."""
     references = re.compile(r"url\(#([^)]+)\)")
@@ -176,19 +185,6 @@ def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:
         if (id_ := element.attrib.pop("id", None)) in used:
             element.set("id", f"{prefix}-{id_}")
     root.set("data-figure", prefix)
-
-
-def _root_attributes(root: ElementTree.Element, label: str) -> dict[str, str]:
-    width = float(root.attrib["width"].removesuffix("pt")) * _PX_PER_PT
-    spoken = {"role": "img", "aria-label": label} if label else {"aria-hidden": "true"}
-    return {
-        "data-figure": root.attrib["data-figure"],
-        "viewBox": root.attrib["viewBox"],
-        "width": "100%",
-        "style": f"max-width:{width:.0f}px;--least:{_LEAST_SCALE * width:.0f}px;"
-        "stroke-linejoin:round;stroke-linecap:butt",
-        **spoken,
-    }
 
 
 def _with_distinct_ids(html: str) -> str:

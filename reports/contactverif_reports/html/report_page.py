@@ -12,16 +12,16 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
-from contactverif_reports.compare.cells import Cell
-from contactverif_reports.compare.comparison import Iterations, count_iterations
-from contactverif_reports.draw import as_text
+from contactverif_reports.comparisons import Iterations, RowNumbers, count_iterations
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import render, svg_inline
+from contactverif_reports.plot.text import as_text
 
 MOST_FIGURES = 24  # Counterexamples that are drawn as figures, the unexpected ones first; the others are text.
 _WIDTH = 5.4  # The width of a figure in inches: on a phone its labels can still be read.
 _COLUMNS = 14  # Properties beside each other, so that a table fits on a page of paper.
 _OPEN_SECTIONS = 8  # With more formulations than this, only sections with something unexpected are open.
+_MOST_NOTEBOOK_ROWS = 10  # Rows that fail and have a line each in a notebook.
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 
 
@@ -42,7 +42,7 @@ class Example:
 class Line:
     """A row of the table of a formulation."""
 
-    cell: Cell  # The row, and its numbers by case.
+    cell: RowNumbers  # The row, and its numbers by case.
     promise: str  # What the formulation states, in a word.
     strip: Markup  # The distribution of value over tolerance.
     example: str  # The id of its counterexample, empty if it has none.
@@ -71,20 +71,27 @@ class Section:
 
 def report_page(run: Run, path: str | os.PathLike[str]) -> str:
     """Return the page of a run. The same run and the same path give the same text."""
-    cells = {key: Cell.from_row(row) for key, row in run.row_of.items()}
+    cells = {key: RowNumbers.from_row(row) for key, row in run.row_of.items()}
     axis = Axis.from_margins(cell.margins for cell in cells.values())
     examples = _examples(run, os.fspath(path))
+    names, ids = run.formulations, list(run.properties)
+    subject = (
+        "contact formulations" if not names else f"{len(names)} formulations" if len(names) > 3 else ", ".join(names)
+    )
+    applicable = {row.property_id for row in run.rows if row.result is not Result.NOT_APPLICABLE}
+    # Tables that are about equally wide.
+    n_columns = max(1, -(-len(ids) // max(1, -(-len(ids) // _COLUMNS))))
     return render(
         "report.html.j2",
         run=run,
         opposite_sign=OPPOSITE_SIGN,
         row_of=run.row_of,
-        title=_title(run),
+        title=f"Verification of {subject}",
         headline=headline(run),
-        sections=[_section(run, name, cells, examples, axis) for name in run.formulations],
-        chunks=_chunks(list(run.properties)),
-        anchors=_anchors(run),
-        numbers={name: n for n, name in enumerate(run.formulations, 1)},
+        sections=[_section(run, name, cells, examples, axis) for name in names],
+        chunks=[ids[start : start + n_columns] for start in range(0, len(ids), n_columns)],
+        anchors={id_: f"property-{n}" for n, id_ in enumerate(ids, 1) if id_ in applicable},
+        numbers={name: n for n, name in enumerate(names, 1)},
         results=[result for result in Result if run.count(result)],
         ticks=ticks(axis),
         coverages=coverage_of(run),
@@ -113,57 +120,30 @@ def headline(run: Run) -> str:
     return f"{', '.join(words)}." if words else "Nothing was checked."
 
 
-def _title(run: Run) -> str:
-    names = run.formulations
-    if not names:
-        return "Verification of contact formulations"
-    return f"Verification of {', '.join(names)}" if len(names) <= 3 else f"Verification of {len(names)} formulations"
-
-
 def _section(
-    run: Run, name: str, cells: Mapping[tuple[str, str], Cell], examples: Sequence[Example], axis: Axis
+    run: Run, name: str, cells: Mapping[tuple[str, str], RowNumbers], examples: Sequence[Example], axis: Axis
 ) -> Section:
     """Return the section of one formulation."""
     own_cells = [cells[name, row.property_id] for row in run.rows_of(name)]
     own_examples = [example for example in examples if example.counterexample.formulation == name]
+    example_of = {example.counterexample.property_id: example.counterexample.id for example in own_examples}
+    lines, inapplicable = [], dict[str, list[str]]()
+    for cell in own_cells:
+        id_ = cell.row.property_id
+        if cell.row.result is Result.NOT_APPLICABLE:
+            inapplicable.setdefault(cell.row.reason, []).append(id_)
+        else:
+            promise = _PROMISES[cell.row.promise]
+            lines.append(Line(cell, promise, strip(cell.margins, axis), example_of.get(id_, "")))
     return Section(
         formulation=name,
         number=run.formulations.index(name) + 1,
         open=len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in run.rows_of(name)),
         missing=tuple(part for part, provided in run.provided.get(name, {}).items() if not provided),
-        lines=_lines(own_cells, own_examples, axis),
-        inapplicable=_inapplicable(run, name),
+        lines=tuple(lines),
+        inapplicable=tuple(inapplicable.items()),
         examples=tuple(own_examples),
         iterations=tuple(line for cell in own_cells for line in count_iterations([cell])),
-    )
-
-
-def _anchors(run: Run) -> dict[str, str]:
-    """Return {property id: anchor of its text} of the properties that apply to a formulation of the run."""
-    applicable = {row.property_id for row in run.rows if _applies(row)}
-    return {id_: f"property-{n}" for n, id_ in enumerate(run.properties, 1) if id_ in applicable}
-
-
-def _applies(row: Row) -> bool:
-    return row.result is not Result.NOT_APPLICABLE
-
-
-def _inapplicable(run: Run, name: str) -> tuple[tuple[str, list[str]], ...]:
-    """Return the reasons why properties do not apply to a formulation, each with the ids of these properties."""
-    by_reason: dict[str, list[str]] = {}
-    for row in run.rows_of(name):
-        if not _applies(row):
-            by_reason.setdefault(row.reason, []).append(row.property_id)
-    return tuple(by_reason.items())
-
-
-def _lines(cells: Sequence[Cell], examples: Sequence[Example], axis: Axis) -> tuple[Line, ...]:
-    """Return the table of one formulation, a line for each property."""
-    example_of = {example.counterexample.property_id: example.counterexample.id for example in examples}
-    return tuple(
-        Line(cell, _PROMISES[cell.row.promise], strip(cell.margins, axis), example_of.get(cell.row.property_id, ""))
-        for cell in cells
-        if _applies(cell.row)
     )
 
 
@@ -194,7 +174,7 @@ def _figures(examples: Mapping[str, Counterexample]) -> dict[str, Markup]:
     """Return {id: figure} of as many counterexamples as are drawn."""
     if not examples:
         return {}
-    from contactverif_reports.draw.scene_outline import make_mesh_figure  # Importing matplotlib is slow.
+    from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
 
     ids = sorted(examples, key=lambda id_: not examples[id_].row.unexpected)
     figures = {}
@@ -206,8 +186,19 @@ def _figures(examples: Mapping[str, Counterexample]) -> dict[str, Markup]:
     return figures
 
 
-def _chunks(ids: list[str]) -> list[list[str]]:
-    """Return the properties in tables that are about equally wide."""
-    n_tables = -(-len(ids) // _COLUMNS)
-    size = -(-len(ids) // n_tables) if n_tables else 0
-    return [ids[start : start + size] for start in range(0, len(ids), size or 1)]
+def run_view(run: Run, rows: Sequence[Row], remarks: Sequence[str], example: Counterexample | None) -> str:
+    """Return the output of a notebook cell: the rows that fail, and a failing mesh; no formulation is asked."""
+    figure = Markup("")
+    if example is not None:
+        from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
+
+        figure = svg_inline(make_mesh_figure(example.case, _WIDTH))
+    return render(
+        "notebook.html.j2",
+        headline=headline(run),
+        remarks=remarks,
+        rows=rows[:_MOST_NOTEBOOK_ROWS],
+        n_more=max(len(rows) - _MOST_NOTEBOOK_ROWS, 0),
+        words=[] if example is None else example.words,
+        figure=figure,
+    )

@@ -14,7 +14,7 @@ import numpy as np
 from contactverif.contract.columns import Group, Variable, codes, numbers, words
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.schema import NONE, RATIO, SECONDS, Column, text
-from contactverif_reports.bench.results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
+from contactverif_reports.bench_results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.file_groups import read_groups, write_tree
 

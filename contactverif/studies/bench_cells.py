@@ -1,0 +1,282 @@
+"""One cell of the bench: all formulations solve it in all variants, and their evaluations are timed in turns.
+
+Errors, counts and nonzeros come from solutions that no clock looks at; they are the same in every run. An evaluation is
+timed at the near start, where all formulations see the same positions, and again in further processes of the plugins.
+Who begins a turn changes, so that whatever disturbs the machine disturbs all, and the least time counts. Counts are of
+what the harness asks, so that no plugin tells them. Seconds are those of the plugin's own process, which times each
+call itself, without the checks of the harness and without the way there.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field
+from functools import partial
+from math import nan
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from contactverif.contract.arrays import Array
+from contactverif.contract.case import Case
+from contactverif.contract.errors import ContractError, PluginError
+from contactverif.contract.interface import Interface
+from contactverif.contract.pairing import Pairing
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.isolation.remote import RemoteFormulation
+from contactverif.isolation.worker import MethodCalls
+from contactverif.mechanics.scene import forget_bodies
+from contactverif.mechanics.solving import solution_of, solve_in_tries
+from contactverif.mechanics.system import System
+from contactverif.mechanics.trace import Trace
+from contactverif.mechanics.whole_scene import WholeScene
+from contactverif.problems.problem import ProblemInstance
+from contactverif.studies.bench_plan import is_solved, largest_errors, pose
+from contactverif_reports.bench_results import COUNTS, RULE, VARIANTS, Cell, Outcome
+
+TURNS = 5  # The number of timed evaluations in each process, and the largest of timed factorisations.
+_LONG = 0.25  # Seconds. Factorisations of a matrix are timed no further once they have taken so long together.
+_COUNTS_OF_VERB = {
+    "pair": ("pairs",),
+    "residual": ("residuals",),
+    "tangent": ("tangents",),
+    "residual_and_tangent": ("residuals", "tangents"),
+}
+
+
+class Meter:
+    """The counts of one solution by name, and the seconds, or the methods that run, of all calls where wanted."""
+
+    def __init__(self, *, timed: bool = False, counted: bool = False) -> None:
+        self.timed, self.counted = timed, counted
+        self.seconds, self.calls = 0.0, 0
+        self.counts = dict.fromkeys(tuple(COUNTS)[1:], 0)  # All but the iterations
+        self.differencing = False
+
+    def call(self, verb: str, plugin: Any, method: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a method of the plugin, and count its states and its seconds."""
+        with MethodCalls() if self.counted else nullcontext() as counter:
+            start = perf_counter()
+            answer = method(*arguments)
+            seconds = perf_counter() - start
+        calls = 0 if counter is None else counter.count
+        if isinstance(plugin, RemoteFormulation) and (self.timed or self.counted):
+            seconds, calls = plugin.seconds(), plugin.calls()
+        self.seconds += seconds
+        self.calls += calls
+        n_states = int(np.prod(np.shape(arguments[-1])[:-1]))  # Forces may be wanted at a batch z (..., n_unknowns).
+        for name in ("differences",) if self.differencing else _COUNTS_OF_VERB[verb]:
+            self.counts[name] += n_states
+        return answer
+
+
+class _MeteredPlugin:
+    """A plugin whose verbs are counted; everything else is the plugin's own."""
+
+    def __init__(self, plugin: Any, meter: Meter) -> None:
+        self._plugin, self._meter = plugin, meter
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._plugin, name)
+        is_counted = name in _COUNTS_OF_VERB and callable(value)
+        return partial(self._meter.call, name, self._plugin, value) if is_counted else value
+
+
+class _MeteredFormulation:
+    """A checked formulation of which the meter knows when forces are computed for differences."""
+
+    def __init__(self, formulation: CheckedFormulation, meter: Meter) -> None:
+        self._formulation, self._meter = formulation, meter
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._formulation, name)
+
+    def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
+        """Return the forces (..., n_unknowns) at z (..., n_unknowns); a batch of states is for differences."""
+        self._meter.differencing = z.ndim > 1
+        try:
+            return self._formulation.residual(interface, pairing, z)
+        finally:
+            self._meter.differencing = False
+
+
+def _add_meter(subject: Subject, case: Case, meter: Meter) -> Any:
+    """Return the formulation with the penalty of a case, as Newton's method needs it, with the meter around it."""
+    plugin = subject.for_case(case).plugin
+    if isinstance(plugin, RemoteFormulation):
+        plugin.timed, plugin.counted = meter.timed, meter.counted
+    metered = _MeteredPlugin(plugin, meter)
+    return _MeteredFormulation(CheckedFormulation(metered, subject.traits, subject.provides), meter)
+
+
+@dataclass(slots=True)
+class SolutionRecord:
+    """One formulation in one cell and one variant."""
+
+    outcome: int = int(Outcome.CRASHED)  # The outcome, see `Outcome`.
+    remark: str = ""  # How it ended, if it is no solution.
+    errors: dict[str, float] = field(default_factory=dict)  # The errors by kind; empty without a solution.
+    counts: dict[str, int] = field(default_factory=dict)  # The counts by name; empty after a crash.
+    ended: bool = False  # The plugin ended its process.
+
+
+_NOT_RUN = [
+    SolutionRecord(remark="not asked: the plugin ended its process in all solutions of an earlier mesh", ended=True)
+    for _ in VARIANTS
+]
+
+
+@dataclass(slots=True)
+class RunRecord:
+    """One formulation in one cell."""
+
+    solutions: list[SolutionRecord] = field(default_factory=list)  # By variant; none in further processes
+    nonzeros: tuple[int, int] = (0, 0)  # Those of the tangent and of the factors, 0 without a solution
+    calls: int = 0  # Methods that run in one evaluation; 0 in further processes
+    factorisation: float = nan  # The least seconds of one factorisation
+    evaluation: float = nan  # The least seconds of one evaluation in this process; NaN if it crashed
+
+    @property
+    def is_lost(self) -> bool:
+        """The plugin ended its process in all variants."""
+        return bool(self.solutions) and all(solution.ended for solution in self.solutions)
+
+
+@dataclass(slots=True)
+class CellRecord:
+    """All formulations in one cell and one process of each, as the journal keeps it."""
+
+    segments: int  # The number of slave segments
+    unknowns: int  # The number of free components of all bodies; 0 in further processes
+    runs: dict[str, RunRecord]  # The runs by formulation
+    best_pressure: float = 0.0  # The error of the best linear pressure on the slave's mesh; 0 in further processes
+
+
+def run_cell(
+    cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True, dead: Collection[str] = ()
+) -> CellRecord:
+    """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns.
+
+    Those whose names are in `dead` are asked nothing.
+    """
+    instances = [pose(cell, RULE.penalty, subject.traits, seed) for subject in subjects]
+    whole = WholeScene.of_scene(instances[0].scene) if solve else None
+    runs = [RunRecord(_NOT_RUN[:] if subject.name in dead else []) for subject in subjects]
+    for subject, instance, run in zip(subjects, instances, runs, strict=True):
+        if whole is not None:
+            _solve_variants(cell, subject, instance, seed, whole, run)
+    forget_bodies()
+    running = [number for number, run in enumerate(runs) if not run.is_lost]
+    gc.collect()
+    with _without_collector():
+        for turn in range(TURNS):
+            for place in range(len(running)):
+                number = running[(place + turn) % len(running)]
+                seconds = evaluate(subjects[number], instances[number], timed=True).seconds
+                runs[number].evaluation = float(np.fmin(runs[number].evaluation, seconds))
+    names = (subject.name for subject in subjects)
+    size = 0 if whole is None else whole.n_free
+    best = 0.0 if whole is None else instances[0].best_pressure
+    return CellRecord(len(instances[0].scene.interface.slave), size, dict(zip(names, runs, strict=True)), best)
+
+
+def _solve_variants(
+    cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeScene, run: RunRecord
+) -> None:
+    """Solve all variants of a cell, measure the whole system at the solution of the rule, and count an evaluation."""
+    if run.is_lost:
+        return
+    for variant in VARIANTS:
+        other = variant.penalty != RULE.penalty
+        varied = pose(cell, variant.penalty, subject.traits, seed) if other else instance
+        record = SolutionRecord()
+        run.solutions.append(record)
+        try:
+            trace = _solve(subject, varied, variant.start, record)
+            if variant == RULE and record.outcome == Outcome.SOLVED:
+                _measure_system(subject, varied, trace, whole, run)
+        except ContractError as error:
+            record.remark, record.ended = str(error), isinstance(error, PluginError) and error.ended
+    if not run.is_lost:
+        run.calls = evaluate(subject, instance, counted=True).calls
+
+
+def _solve(subject: Subject, instance: ProblemInstance, start: str, record: SolutionRecord) -> Trace:
+    """Solve one variant; record how that ended, its errors and its counts."""
+    meter = Meter()
+    formulation = _add_meter(subject, instance.first_guess, meter)
+    with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
+        tries = solve_in_tries(instance.scene, formulation, instance.starts[start], instance.step)
+    # The scene keeps stiffness and load. The factors of its bodies may take gigabytes, and are of no further use.
+    vars(instance.scene).pop("condensed_bodies", None)
+    counts = {"iterations": sum(trace.n_iterations for trace in tries), **meter.counts}
+    plain = subject.for_case(instance.first_guess)
+    solution = solution_of(tries[-1], plain, nodal=subject.traits.rules.penalty == "nodal")
+    solved = is_solved(solution)
+    record.errors = largest_errors(instance, solution) if solved else {}
+    record.counts, record.remark = counts, "" if solved else tries[-1].end.label
+    record.outcome = int(Outcome.SOLVED if solved else Outcome.NOT_SOLVED)
+    return tries[-1]
+
+
+def _measure_system(
+    subject: Subject, instance: ProblemInstance, trace: Trace, whole: WholeScene, run: RunRecord
+) -> None:
+    """Count the nonzeros of the tangent at the solution and of the factors, and time the factorisation."""
+    formulation: CheckedFormulation = subject.for_case(instance.first_guess)
+    system = System(instance.scene, formulation, difference_step=instance.step)
+    u = trace.u[-1]
+    tangent = system.tangent(u, system.pair(u))
+    whole_system = System(whole, formulation)
+    matrix = sparse.csc_array(whole_system.stiffness + whole_system.contact_stiffness(u, None, tangent))
+    n_tangent = int(np.count_nonzero(tangent)) if isinstance(tangent, np.ndarray) else int(tangent.nnz)
+    seconds: list[float] = []
+    while len(seconds) < TURNS and sum(seconds) < _LONG:
+        start = perf_counter()
+        try:
+            factors = splu(matrix)
+        except RuntimeError:  # The matrix is exactly singular: multipliers that are not unique.
+            run.nonzeros = n_tangent, 0
+            return
+        seconds.append(perf_counter() - start)
+    run.factorisation = min(seconds)
+    run.nonzeros = n_tangent, int(factors.L.nnz + factors.U.nnz)
+
+
+def evaluate(subject: Subject, instance: ProblemInstance, *, timed: bool = False, counted: bool = False) -> Meter:
+    """Return the meter of one evaluation, search, forces and tangent or differences; its seconds are NaN after a crash.
+
+    It is timed or counted, since an interpreter that counts is slower.
+    """
+    meter = Meter(timed=timed, counted=counted)
+    formulation: Any = _add_meter(subject, instance.first_guess, meter)
+    interface = instance.scene.interface
+    try:
+        z = np.concatenate([instance.first_guess.z, np.zeros(formulation.n_multipliers(interface))])
+        pairing = formulation.pair(interface, z)
+        if "tangent" in subject.provides:
+            formulation.residual_and_tangent(interface, pairing, z)
+        else:
+            formulation.residual(interface, pairing, z)
+            steps = np.diag(np.full(z.size, 1e-6 if instance.step is None else instance.step))
+            formulation.residual(interface, pairing, np.concatenate([z + steps, z - steps]))
+    except ContractError:
+        meter.seconds = nan
+    return meter
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """Keep Python's collector of garbage out of the times, as `timeit` does."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

@@ -1,0 +1,213 @@
+"""A comparison of candidates with a reference: one run over the same cases, then the cost of an evaluation.
+
+A run checks one formulation after the other, so its seconds depend on who came first and on what was shrunk. For the
+cost all formulations take turns on the same states. The first turn is not timed: kernels compile and answers are
+checked in it. Of many turns the fastest counts, because whatever disturbs a machine only adds time. The plugin itself
+is timed, without the checks of the harness, which would make fast and slow ones alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isnan, nan
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from contactverif.contract.arrays import freeze
+from contactverif.contract.case import Case
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import Interface
+from contactverif.contract.property import Property
+from contactverif.contract.result import NotLoaded, Run
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.isolation.remote import RemoteFormulation
+from contactverif.run.run import run
+from contactverif.sampling.draw import Sampling, with_case
+from contactverif_reports.comparisons import PARTS, Comparison, Cost, Differing
+
+TURNS = 9  # The least number of turns that are timed.
+MOST_TURNS = 60
+ENOUGH_SECONDS = 1.0  # More turns than `TURNS` are taken as long as all of them took less than this.
+SEGMENTS = (16, 256)  # Slave segments: few show what a call costs, many show what a segment costs.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Study:
+    """A comparison with all that it rests on."""
+
+    run: Run  # The run of reference and candidates, as `verify` makes it.
+    comparison: Comparison  # Its numbers side by side.
+    # The case of each property on which they differ most, the largest difference first.
+    differing: tuple[Differing, ...]
+    costs: tuple[Cost, ...]  # The times of an evaluation.
+    apart: tuple[str, ...] = ()  # The candidates with other cases: of another dimension, or on other faces.
+
+
+def run_comparison(
+    reference: Subject,
+    candidates: Sequence[Subject | NotLoaded],
+    properties: Sequence[Property | NotLoaded],
+    *,
+    place: Interface | Case | None = None,
+    **options: Any,
+) -> Study:
+    """Check every property of the reference and of the candidates, on the same cases; options are those of `run`."""
+    if not candidates:
+        raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")
+    loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
+    if reference.name in [
+        *(item.name for item in loaded),
+        *(item.formulation for item in candidates if isinstance(item, NotLoaded)),
+    ]:
+        raise MisuseError("--against", f"{reference.name}, which is compared too", "another formulation than those")
+    result = run([reference, *candidates], properties, place=place, **options)
+    comparison = Comparison.from_run(result, reference.name)
+    abilities = [subject.traits.abilities for subject in (reference, *loaded)]
+    faces, *others = (() if each.in_plane else each.faces for each in abilities)
+    apart = tuple(subject.name for subject, there in zip(loaded, others, strict=True) if there != faces)
+    variants = [item.for_traits(reference.traits) for item in properties if isinstance(item, Property)]
+    differing = _with_cases(find_differing(result, comparison), variants, result, place)
+    return Study(result, comparison, differing, measure_costs([reference, *loaded]), apart)
+
+
+def _with_cases(
+    every: Sequence[Differing],
+    properties: Sequence[Property],
+    result: Run,
+    place: Interface | Case | None,
+) -> tuple[Differing, ...]:
+    """Return the differing outcomes with their cases; a run of many examples does not keep them all."""
+    facts = result.provenance
+    sampling = Sampling.at(place, int(facts["examples"]), int(facts["seed"]))
+    question_of = {question.id: question for question in properties}
+    complete = []
+    for differing in every:
+        question, number = question_of[differing.info.id], differing.number
+        outcome = with_case(sampling, question, number, differing.outcome)
+        reference_outcome = replace(differing.reference_outcome, case_or_summary=outcome.case)
+        complete.append(replace(differing, outcome=outcome, reference_outcome=reference_outcome))
+    return tuple(complete)
+
+
+def find_differing(result: Run, comparison: Comparison) -> tuple[Differing, ...]:
+    """Return for each property the case on which a candidate differs most from the reference.
+
+    The largest difference comes first. Cases on which one passes and the other does not stand before those where both
+    fail.
+    """
+    rows, reference = result.row_of, comparison.reference
+    largest = []
+    for id_ in comparison.properties:
+        every = []
+        for name in comparison.formulations[1:]:
+            paired = comparison.paired.get((name, id_))
+            if paired is None:
+                continue
+            cell, beside = comparison.cells[name, id_], comparison.cells[reference, id_]
+            number = paired.furthest(cell.kinds[:, :2].sum(axis=1))
+            if number is not None:
+                every.append(
+                    Differing(
+                        info=rows[name, id_].info,
+                        formulation=name,
+                        number=number,
+                        apart=bool(paired.apart[number]),
+                        decades=float(paired.decades[number]),
+                        margin=float(cell.standing[number]),
+                        reference_margin=float(beside.standing[number]),
+                        outcome=rows[name, id_].outcomes[number],
+                        reference_outcome=rows[reference, id_].outcomes[number],
+                    )
+                )
+        if every:
+            largest.append(max(every, key=_rank))
+    return tuple(sorted(largest, key=_rank, reverse=True))
+
+
+def _rank(differing: Differing) -> tuple[Any, ...]:
+    far = inf if isnan(differing.decades) else float(np.abs(differing.decades))
+    return differing.apart, far
+
+
+def measure_costs(
+    subjects: Sequence[Subject], cases: Sequence[Case] | None = None, turns: int = TURNS
+) -> tuple[Cost, ...]:
+    """Time each formulation on each state, in turns, and return the fastest times."""
+    costs: list[Cost] = []
+    for case in cases if cases is not None else [make_state(n) for n in SEGMENTS]:
+        timers = [_Timer(subject, case) for subject in subjects]
+        start, turn = perf_counter(), 0
+        while turn <= turns or (turn <= MOST_TURNS and perf_counter() - start < ENOUGH_SECONDS):
+            for place in range(len(timers)):
+                timers[(place + turn) % len(timers)].take_turn(count=turn > 0)
+            turn += 1
+        costs += [timer.cost() for timer in timers]
+    return tuple(costs)
+
+
+def make_state(n_segments: int, ratio: float = 0.75, before: float = 0.5) -> Case:
+    """Return a flat interface of that many unit slave segments, on `ratio` times as many, all of it in contact.
+
+    The master is longer by 1, and begins by the length `before` the slave.
+    """
+    n_master = max(1, int(ratio * n_segments))
+    slave_x = np.arange(n_segments + 1.0)
+    master_x = np.linspace(-before, n_segments + (1 - before), n_master + 1)[::-1]
+    depth = (1 + slave_x % 3) / 64  # 1/64 to 3/64, so that no force is a repetition of its neighbour's.
+    upper, lower = (np.column_stack([x, np.zeros_like(x)]) for x in (slave_x, master_x))
+    interface = Interface.from_chains(upper, lower)
+    upper[:, 1] = -depth
+    return Case(interface, np.vstack([upper, lower]).reshape(-1), penalty=16.0)
+
+
+class _Timer:
+    """The times of one formulation on one state."""
+
+    def __init__(self, subject: Subject, case: Case) -> None:
+        self._subject, self._case = subject, case
+        self._fastest = dict.fromkeys(PARTS, nan)
+        self._failed = ""
+
+    def take_turn(self, *, count: bool) -> None:
+        """Evaluate once; an error ends it for good."""
+        if self._failed:
+            return
+        try:
+            formulation = self._subject.for_case(self._case)
+            times = self._times(formulation.plugin if count else formulation, formulation)
+        except Exception as error:  # A plugin without the harness' guard may raise anything.
+            self._failed, self._fastest = f"{error}", dict.fromkeys(PARTS, nan)
+            return
+        if count:
+            for part, seconds in times.items():
+                self._fastest[part] = float(np.fmin(self._fastest[part], seconds))
+
+    def cost(self) -> Cost:
+        """Return the fastest times after all turns."""
+        return Cost(self._subject.name, len(self._case.interface.slave), self._fastest, self._failed)
+
+    def _times(self, plugin: Any, formulation: CheckedFormulation) -> dict[str, float]:
+        interface, provides = self._case.interface, self._subject.provides
+        z = freeze(np.concatenate([self._case.z, np.zeros(formulation.n_multipliers(interface))]), np.float64)
+        pairing = formulation.own_pairing(interface, z)
+        if isinstance(plugin, RemoteFormulation):
+            plugin.timed = True
+        times = {}
+        if "pair" in provides:
+            times["pair"] = _seconds(plugin, lambda: plugin.pair(interface, z))
+        times["residual"] = _seconds(plugin, lambda: plugin.residual(interface, pairing, z))
+        if "tangent" in provides:
+            times["tangent"] = _seconds(plugin, lambda: plugin.tangent(interface, pairing, z))
+        return times
+
+
+def _seconds(plugin: Any, call: Callable[[], Any]) -> float:
+    """Return the seconds of a call; where the plugin has a process of its own, those that it took there."""
+    start = perf_counter()
+    call()
+    there = plugin.seconds() if isinstance(plugin, RemoteFormulation) else nan
+    here = perf_counter() - start
+    return there if 0 <= there <= here else here  # A plugin's process may say what it likes.

@@ -1,1 +1,0 @@
-"""Numbers of several formulations, or of two reports, side by side."""

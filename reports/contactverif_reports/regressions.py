@@ -1,0 +1,340 @@
+"""The regressions from an old report to a new one, by rules with a formula: no clock and no noise decides.
+
+A row (formulation × property) has regressed if one of these holds:
+
+- It passed and does not any more, or it crashes and did not.
+- A promise that was kept, or a property that was judged, is not any more (`unexpected`).
+- On the same cases, one that passed fails.
+- On the same cases, the median or the worst margin m = value/tolerance is above 1 and m_new > 2 m_old + 2. A tolerance
+  is what roundoff may do to a number, and each of the two may be off by one. Far beyond it, where a solution fails,
+  roundoff decides which of its iterates is judged, so a factor of two between them is no news.
+- On the same cases, those that were judged and are undecided now outnumber those the other way round by more than
+  max(1, 1 %). Roundoff may take a case across a limit of what can be decided, either way, but few lie at one.
+- Likewise solutions that converged and do not any more, by more than 2 + 5 %. Whether an active set that wanders comes
+  to rest is chaotic too: ±1 ulp in the residual was seen to cost 5 of 150.
+- With the same seed and number of examples it has fewer cases, by more than max(1, 1 %), which no roundoff does.
+- On different cases, which are two samples of one population, the new margins lie higher than chance allows. The
+  empirical distributions F of max(m, 1) then satisfy max (F_old − F_new) > √(½ ln(1/α) (1/n_old + 1/n_new) / s), the
+  one-sided test of Smirnov at the level α = 1e-6. The share s of a run's cases is independent: hypothesis varies what
+  it drew before. Failures occur in both samples, so they do not bias the comparison. The test sees ranks, so that it
+  takes a change of 1 % for news where all margins are alike: an old m > 1 enters as 2 m + 2 here too. Within the
+  tolerance nothing is compared.
+
+Worth a look, though nothing got worse by it, is a row on the same cases where
+
+- Newton needs more than 2 n_old + 2 iterations in the median: an active set may take a few more or fewer.
+- A median or worst margin within its tolerance is more than 100 times what it was and above 1/10. Margins below that
+  may be one roundoff (0.05 where a tolerance is 20 of them), which comes and goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, log, nan, sqrt
+from textwrap import shorten
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import Run
+from contactverif_reports import tables
+from contactverif_reports.comparisons import (
+    CONVERGED,
+    END,
+    Iterations,
+    Paired,
+    RowNumbers,
+    count_iterations,
+    name_column,
+    statistics,
+)
+from contactverif_reports.tables import Code, Column, ResultCell, Table, numbers
+
+ALPHA = 1e-6  # The rate of false alarms per row on different cases.
+# The share of the cases that is independent: runs of one code with other seeds lie so far apart, at 90 % and 99 % of
+# 1100 pairs.
+INDEPENDENT_SHARE = 0.5
+REASON_LENGTH = 100  # The number of characters of a reason that are printed.
+FACTOR = 2.0  # The factor between two margins beyond the tolerance that is no news.
+ITERATIONS_FACTOR, ITERATIONS_MORE = 2.0, 2.0  # Iterations that grow by no more than factor · n + more are no news.
+LEAP = 100.0  # The factor by which a margin within the tolerance must grow to be worth a look.
+LEAST_MARGIN = 0.1  # A margin that stays below this is roundoff.
+ROUNDOFFS = 2.0  # The number of tolerances by which two right margins may differ.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change:
+    """One formulation and property, before and after."""
+
+    old: RowNumbers  # The numbers of both rows.
+    new: RowNumbers
+    paired: Paired | None  # The new beside the old, case by case; None where the cases are not the same.
+    regressions: tuple[str, ...]  # The regressions, in words; empty if there is none.
+    noteworthy: tuple[str, ...] = ()  # The changes that are worth a look and no regression, in words.
+
+    @property
+    def title(self) -> str:
+        """The formulation and the property."""
+        return f"{self.new.row.formulation}, {self.new.row.property_id}"
+
+    @property
+    def better(self) -> bool:
+        """Return whether the row passes now, and did not before."""
+        return self.new.row.verdict is Verdict.PASS and self.old.row.verdict is not Verdict.PASS
+
+    @property
+    def slower(self) -> float:
+        """Median seconds of a case, new over old; NaN where nothing was judged. It decides nothing."""
+        return self.new.seconds / self.old.seconds if self.old.seconds > 0 else nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NamedRun:
+    """A run with the name of its report and its numbers by case."""
+
+    path: str  # The report as the caller wrote it.
+    run: Run  # The run that it stores.
+    cells: Mapping[tuple[str, str], RowNumbers]  # {(formulation, property): numbers}.
+
+    @classmethod
+    def from_run(cls, path: str, run: Run) -> NamedRun:
+        """Collect the numbers of a run."""
+        return cls(path, run, {key: RowNumbers.from_row(row) for key, row in run.row_of.items()})
+
+    @property
+    def not_loaded(self) -> dict[str, str]:
+        """The plugins that did not load, {name: reason}."""
+        return {item.formulation: item.reason for item in self.run.not_loaded}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Changes:
+    """An old report and a new one."""
+
+    old: NamedRun  # The runs.
+    new: NamedRun
+    changes: tuple[Change, ...]  # The rows that both have.
+    # The entries of the old report only, and of the new report only: names of formulations, ids of properties, or
+    # rows.
+    removed: tuple[str, ...]
+    added: tuple[str, ...]
+    # {name: reason} of the plugins that the old report has and the new run could not load.
+    no_longer_loaded: Mapping[str, str]
+
+    @property
+    def regressions(self) -> tuple[str, ...]:
+        """The regressions: a line for each row, and for each plugin that does not load any more."""
+        lines = [f"{change.title}: {'; '.join(change.regressions)}" for change in self.changes if change.regressions]
+        return (*lines, *(f"{name}: not loaded any more: {reason}" for name, reason in self.no_longer_loaded.items()))
+
+    @property
+    def noteworthy(self) -> tuple[str, ...]:
+        """The changes that are worth a look and no regression: a line for each row."""
+        return tuple(f"{change.title}: {'; '.join(change.noteworthy)}" for change in self.changes if change.noteworthy)
+
+    @property
+    def iterations(self) -> tuple[tuple[Iterations, Iterations], ...]:
+        """Newton iterations (old, new) that changed, on the same cases."""
+        paired = [change for change in self.changes if change.paired is not None]
+        return tuple(
+            lines
+            for change in paired
+            for lines in paired_iterations(change.old, change.new)
+            if lines[1].fewer or lines[1].more or lines[0].converged != lines[1].converged
+        )
+
+    @classmethod
+    def between(cls, old: NamedRun, new: NamedRun) -> Changes:
+        """Compare the rows that both runs have; none if they have nothing in common."""
+        same_seed, same_examples = (
+            old.run.provenance.get(name) == new.run.provenance.get(name) for name in ("seed", "examples")
+        )
+        return cls(
+            old=old,
+            new=new,
+            changes=tuple(
+                compare_rows(cell, new.cells[key], same_seed=same_seed, same_examples=same_examples)
+                for key, cell in old.cells.items()
+                if key in new.cells
+            ),
+            removed=_only(old, new),
+            added=_only(new, old),
+            no_longer_loaded={
+                name: reason
+                for name, reason in new.not_loaded.items()
+                if name in (*old.run.formulations, *old.run.properties) and name not in old.not_loaded
+            },
+        )
+
+
+def compare_rows(old: RowNumbers, new: RowNumbers, *, same_seed: bool, same_examples: bool = True) -> Change:
+    """Compare one row, before and after."""
+    paired = Paired.from_cells(new, old) if same_seed and same_cases(old, new) else None
+    lines = [*_verdicts(old, new)]
+    n_old, n_new = len(old.verdicts), len(new.verdicts)
+    if same_seed and same_examples and n_old - n_new > few(n_old):
+        lines.append(f"{n_new} cases, {n_old} before, at the same seed and number of examples")
+    if paired is None:
+        return Change(old, new, None, (*lines, *_on_others(old, new)))
+    lines += [*_on_the_same(old, new, paired), *_fewer(old, new)]
+    return Change(old, new, paired, tuple(lines), tuple(noteworthy_changes(old, new)))
+
+
+def few(n_cases: int) -> float:
+    """Return the number of cases that roundoff may leave undecided."""
+    return max(1.0, 0.01 * n_cases)
+
+
+def wandering(n_cases: int) -> float:
+    """Return the number of solutions that roundoff may keep from converging."""
+    return 2 + 0.05 * n_cases
+
+
+def same_cases(old: RowNumbers, new: RowNumbers) -> bool:
+    """Return whether the cases of the shorter row are the first of the longer one, by their summaries."""
+    n = min(len(old.kinds), len(new.kinds))
+    return bool(np.array_equal(old.kinds[:n], new.kinds[:n], equal_nan=True))
+
+
+def _verdicts(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
+    before, after = old.row.verdict, new.row.verdict
+    if after is not before and (before is Verdict.PASS or after is Verdict.CRASHED):
+        reason = new.row.reason
+        detail = f" ({shorten(reason, REASON_LENGTH, placeholder=' …')})" if reason else ""
+        return [f"{before} → {after}{detail}"]
+    if new.row.unexpected and not old.row.unexpected:
+        return [f"promises kept → {new.row.unexpected}"]
+    return []
+
+
+def _on_the_same(old: RowNumbers, new: RowNumbers, paired: Paired) -> Sequence[str]:
+    n = len(paired.decades)
+    fails_now = paired.apart & (new.standing[:n] > 1)
+    lines = []
+    if fails_now.any() and old.row.verdict is not Verdict.PASS:
+        first = int(np.flatnonzero(fails_now)[0])
+        lines.append(f"{int(fails_now.sum())} of {paired.n} cases passed and fail now, the first is case {first}")
+    grew = [
+        f"{name} {m_old:.3g} → {m_new:.3g}"
+        for name, m_old, m_new in statistics(old, new)
+        if m_new > 1 and m_new > FACTOR * m_old + ROUNDOFFS
+    ]
+    if grew:
+        lines.append(f"error grew, in tolerances, on the same {paired.n} cases: {', '.join(grew)}")
+    return lines
+
+
+def _fewer(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
+    """Return a line if fewer cases are judged, and one for each solution that converges less often."""
+    n = min(len(old.verdicts), len(new.verdicts))
+    lines = []
+    worse, better, back = _count_changes(old.decided[:n], new.decided[:n])
+    if worse - better > few(n):
+        lines.append(f"{worse} of the same {n} cases were judged and are undecided now{back}")
+    ends = [name for name in old.details if name in new.details and name.partition(", ")[0] == END]
+    for name in ends:
+        before, after = old.details[name][:n], new.details[name][:n]
+        both = ~(np.isnan(before) | np.isnan(after))
+        worse, better, back = _count_changes(both & (before == CONVERGED), both & (after == CONVERGED))
+        n_both, solution = int(both.sum()), name.partition(", ")[2]
+        if worse - better > wandering(n_both):
+            solutions = f"{n_both} solutions{f' ({solution})' if solution else ''}"
+            lines.append(f"{worse} of the same {solutions} converged and do not any more{back}")
+    return lines
+
+
+def _count_changes(before: BoolArray, after: BoolArray) -> tuple[int, int, str]:
+    """Return how many cases became worse and better, and the latter in words."""
+    worse, better = int((before & ~after).sum()), int((~before & after).sum())
+    return worse, better, f", {better} the other way round" if better else ""
+
+
+def _on_others(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
+    before, after = (np.maximum(cell.standing[~np.isnan(cell.standing)], 1.0) for cell in (old, new))
+    if not (len(before) and len(after)):
+        return []
+    higher = shift(np.where(before > 1, FACTOR * before + ROUNDOFFS, 1.0), after)
+    by_chance = sqrt(0.5 * log(1 / ALPHA) * (1 / len(before) + 1 / len(after)) / INDEPENDENT_SHARE)
+    if higher <= by_chance:
+        return []
+    return [f"errors grew on other cases: distributions {higher:.2f} apart, chance allows {by_chance:.2f}"]
+
+
+def shift(before: FloatArray, after: FloatArray) -> float:
+    """Return Smirnov's one-sided distance max (F_before − F_after) of two samples (n,): how much higher `after` is."""
+    places = np.unique(np.concatenate([before, after]))
+    counts = [np.searchsorted(np.sort(sample), places, side="right") / len(sample) for sample in (before, after)]
+    return float(np.max(counts[0] - counts[1], initial=0.0))
+
+
+def noteworthy_changes(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
+    """Return what is worth a look, in words; both cells are over the same cases."""
+    lines = [
+        f"{name} error grew within its tolerance, {m_old:.2g} → {m_new:.2g} of it"
+        for name, m_old, m_new in statistics(old, new)
+        if LEAST_MARGIN < m_new <= 1 and m_new > LEAP * m_old
+    ]
+    for before, after in paired_iterations(old, new):
+        if after.median > ITERATIONS_FACTOR * before.median + ITERATIONS_MORE:
+            solution = f" ({after.solution})" if after.solution else ""
+            lines.append(f"Newton iterations{solution}, median {before.median:g} → {after.median:g}")
+    return lines
+
+
+def paired_iterations(old: RowNumbers, new: RowNumbers) -> Sequence[tuple[Iterations, Iterations]]:
+    """Return the Newton iterations (before, after) of each solution that both kept."""
+    by_title: dict[str, list[Iterations]] = {}
+    for line in count_iterations([old, new]):
+        by_title.setdefault(line.title, []).append(line)
+    return [(lines[0], lines[1]) for lines in by_title.values() if len(lines) == 2]
+
+
+def _only(first: NamedRun, second: NamedRun) -> tuple[str, ...]:
+    """Return what only the first has; a formulation or property that the second does not have is named once."""
+    formulations = [name for name in first.run.formulations if name not in second.run.formulations]
+    properties = [name for name in first.run.properties if name not in second.run.properties]
+    rows = [
+        f"{formulation}, {id_}"
+        for formulation, id_ in first.cells
+        if formulation not in formulations and id_ not in properties and (formulation, id_) not in second.cells
+    ]
+    return (*formulations, *properties, *rows)
+
+
+def changes_table(changes: Sequence[Change]) -> Table:
+    """Return results, errors and numbers of cases, old → new, and the time of a case: a line for each row."""
+    title = "result, old → new; cases better, equal, worse; time of a case, new/old (decides nothing)"
+    words = Column("result"), Column("median"), Column("worst")
+    table = Table([name_column("formulation, property"), *words, *numbers("better", "equal", "worse", "time")], title)
+    for change in changes:
+        old, new, paired = change.old, change.new, change.paired
+        style = "red" if change.regressions else "green" if change.better else ""
+        results = ResultCell(old.row.result), ResultCell(new.row.result, "; ".join(change.regressions))
+        table.add(
+            Code(f"{new.row.property_id}{'' if paired else ' *'}"),
+            tables.Change(*results, style),
+            tables.Change(old.median, new.median),
+            tables.Change(old.worst, new.worst),
+            *([paired.better, paired.equal, paired.worse] if paired is not None and paired.n else [None] * 3),
+            f"{change.slower:.2f}" if isfinite(change.slower) else "–",
+            group=new.row.formulation,
+        )
+    return table
+
+
+def changed_iterations_table(changes: Changes) -> Table:
+    """Return Newton's iterations that changed on the same cases."""
+    words = Column("converged"), Column("median"), Column("most")
+    title = "Newton iterations that changed, old → new, where it converged"
+    table = Table([name_column("formulation, property"), *words, *numbers("fewer", "same", "more")], title)
+    for old, new in changes.iterations:
+        table.add(
+            f"{new.formulation}, {new.title}",
+            tables.Change(f"{old.converged}/{old.solved}", f"{new.converged}/{new.solved}"),
+            tables.Change(old.median, new.median),
+            tables.Change(old.most, new.most),
+            *(new.fewer, new.same, new.more),
+        )
+    return table
