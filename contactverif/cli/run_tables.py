@@ -14,9 +14,21 @@ from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
 from contactverif.cli.console import fold, line
-from contactverif.contract.case_counts import CaseCounts, add_by_kind, percent, total, whole_percent
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import BROKEN_BY_FAILING, OPPOSITE_SIGN, Coverage, Result, Row, Run, coverage_of
+from contactverif.contract.result import (
+    BROKEN_BY_FAILING,
+    OPPOSITE_SIGN,
+    CaseCounts,
+    Coverage,
+    Result,
+    Row,
+    Run,
+    add_by_kind,
+    coverage_of,
+    percent,
+    total,
+    whole_percent,
+)
 from contactverif.run.ranking import by_rank
 from contactverif_reports.tables import PLAIN_STYLE, STYLES
 

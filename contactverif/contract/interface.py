@@ -13,8 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contactverif.contract.arrays import FloatArray, IntArray, as_array, freeze
-from contactverif.contract.chains import link_segments
+from contactverif.contract.arrays import Array, FloatArray, IntArray, as_array, freeze
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import (
     QUADRILATERAL,
@@ -349,7 +348,7 @@ def _link(data: bytes, n_corners: int) -> list[IntArray]:
     """Check the faces (n_faces, n_corners) whose bytes are given; return neighbours, chain order and starts, nodes."""
     faces = np.frombuffer(data, np.int64).reshape(-1, n_corners)
     if n_corners == SEGMENT:
-        arrays = link_segments(faces)
+        arrays = _link_segments(faces)
     else:
         none = np.zeros(0, np.int64)
         arrays = [link_faces(faces), none, none, np.unique(faces)]
@@ -358,6 +357,58 @@ def _link(data: bytes, n_corners: int) -> list[IntArray]:
 
 _SMALL = 128  # Number of node numbers of a surface that is remembered: random meshes share few ways to hang together.
 _link_small = lru_cache(maxsize=1024)(_link)
+
+
+def _link_segments(segments: IntArray) -> list[IntArray]:
+    """Check segments (n_segments, 2); return neighbours, chain order and starts, and nodes, as `Surface` has them."""
+    _check_chains(segments)
+    nodes, ends = np.unique(segments, return_inverse=True)
+    first, second = ends.reshape(segments.shape).T  # Node numbers without gaps.
+    starting, ending = (np.full(len(nodes), -1) for _ in range(2))
+    starting[first] = ending[second] = np.arange(len(segments))
+    neighbours = np.column_stack([ending[first], starting[second]])  # −1 at a free end.
+    order = _chain_order(neighbours)
+    starts = np.flatnonzero(np.append(True, neighbours[order[:-1], 1] != order[1:]))
+    return [neighbours, order, starts, nodes]
+
+
+def _check_chains(segments: IntArray) -> None:
+    """Check that node numbers and connections are those of chains."""
+    if segments.min() < 0:
+        raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
+    loops = np.flatnonzero(segments[:, 0] == segments[:, 1])
+    if len(loops):
+        segment = loops[0]
+        node = segments[segment, 0]
+        raise MisuseError("segments", f"segment {segment} that begins and ends at node {node}", "two nodes")
+    for end, verb in ((0, "begin"), (1, "end")):
+        numbers = np.sort(segments[:, end])
+        if (numbers[1:] == numbers[:-1]).any():
+            numbers, counts = np.unique(numbers, return_counts=True)
+            node = numbers[np.argmax(counts)]
+            meeting = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
+            raise MisuseError(
+                "segments",
+                f"segments {meeting} that all {verb} at node {node}",
+                "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
+            )
+
+
+def _chain_order(neighbours: IntArray) -> IntArray:
+    """Return open chains first, each from its free end; then closed chains, each from its lowest segment."""
+    numbers = np.arange(len(neighbours))
+    if ((neighbours[:, 1] == numbers + 1) | (neighbours[:, 1] < 0)).all():
+        return numbers  # Open chains, numbered as they run.
+    following = neighbours[:, 1].tolist()
+    visited = [False] * len(following)
+    order = []
+    for start in [*np.flatnonzero(neighbours[:, 0] < 0).tolist(), *range(len(following))]:
+        segment = start
+        while segment >= 0 and not visited[segment]:
+            visited[segment] = True
+            order.append(segment)
+            segment = following[segment]
+    return np.array(order, dtype=np.int64)
 
 
 def _check_nodes(values: ArrayLike) -> FloatArray:
@@ -398,3 +449,77 @@ def _check_positions(name: str, surface: Surface, nodes: FloatArray) -> None:
 def _abbreviate(numbers: IntArray) -> str:
     listed = ", ".join(map(str, numbers[:5].tolist()))
     return listed + (", …" if len(numbers) > 5 else "")
+
+
+def split_states(interface: Interface, z: Array) -> tuple[Array, Array]:
+    """Return contiguous copies of the positions (n_states, n_nodes, dim) and the multipliers (n_states, n_multipliers).
+
+    The states z (..., n_unknowns + n_multipliers) are real or complex; their leading axes become one.
+    """
+    states = z.reshape(-1, z.shape[-1])
+    n_unknowns = interface.n_unknowns
+    positions = np.array(states[:, :n_unknowns]).reshape(len(states), *interface.nodes.shape)
+    return positions, np.array(states[:, n_unknowns:])
+
+
+def split_state(interface: Interface, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return copies of the positions (n_nodes, dim) and the multipliers of one state (n_unknowns + n_multipliers,)."""
+    n_unknowns = interface.n_unknowns
+    return np.array(z[:n_unknowns]).reshape(interface.nodes.shape), np.array(z[n_unknowns:])
+
+
+def join_rows(forces: Array, constraints: Array, z: Array) -> Array:
+    """Join forces (n_states, n_nodes, dim) and constraint rows (n_states, n_multipliers) to a residual of z's shape."""
+    if not constraints.size:
+        return forces.reshape(z.shape)
+    return np.concatenate([forces.reshape(len(forces), -1), constraints], axis=1).reshape(z.shape)
+
+
+STEEPEST_FACING = 0.5  # The cosine of 60°: two surfaces whose normals differ more from opposite ones do not face.
+# The normals of a half disk have a mean of 0.64, of half a sphere 0.5; those of a ring or a sphere have none.
+ONE_SIDED = 0.5
+
+
+def ways_to_master(interface: Interface) -> tuple[FloatArray, FloatArray]:
+    """Return how far each slave node (n_slave_nodes,) is from the master, and the unit vector (n, 2) along which.
+
+    Nodes look along the mean normal of the slave; around a ring each looks along its own. The way is a length, negative
+    where the node is inside the master, and infinite where the node does not see the master.
+    """
+    directions = _directions(interface)
+    pairs = zip(interface.nodes[: interface.n_slave_nodes], directions, strict=True)
+    return np.array([_way_along(interface, point, direction) for point, direction in pairs]), directions
+
+
+def mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray:
+    """Return the mean normal (2,) out of the body, weighted by length: shorter than 1 where the surface is bent."""
+    along = np.diff(nodes[surface.segments], axis=1)[:, 0]
+    normal: FloatArray = np.array([along[:, 1].sum(), -along[:, 0].sum()]) / np.hypot(*along.T).sum()
+    return normal
+
+
+def _directions(interface: Interface) -> FloatArray:
+    """Return the unit vector (n_slave_nodes, 2) out of the slave along which each of its nodes looks."""
+    surface, nodes = interface.slave, interface.nodes
+    mean, normals = mean_normal(surface, nodes), np.zeros((interface.n_slave_nodes, 2))
+    if np.hypot(*mean) > ONE_SIDED:
+        normals[:] = mean / np.hypot(*mean)
+        return normals
+    along = np.diff(nodes[surface.segments], axis=1)[:, 0]
+    for end in surface.segments.T:
+        np.add.at(normals, end, np.column_stack([along[:, 1], -along[:, 0]]))
+    lengths = np.hypot(*normals.T)[:, None]
+    normals /= np.where(lengths > 0, lengths, 1.0)
+    return normals
+
+
+def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -> float:
+    """Return the shortest way, forwards or backwards, from a point (2,) to a master segment that faces it."""
+    first, second = np.moveaxis(interface.nodes[interface.master.segments], 1, 0)
+    along, apart = second - first, first - point
+    facing = direction[0] * along[:, 1] - direction[1] * along[:, 0]  # −|along| where the normals oppose each other.
+    facing = np.where(facing < -STEEPEST_FACING * np.hypot(*along.T), facing, np.nan)
+    place = (direction[1] * apart[:, 0] - direction[0] * apart[:, 1]) / facing
+    ways = (along[:, 1] * apart[:, 0] - along[:, 0] * apart[:, 1]) / facing
+    ways = ways[(place >= 0) & (place <= 1)]
+    return float(ways[np.argmin(np.abs(ways))]) if len(ways) else np.inf

@@ -5,7 +5,8 @@ Rule for the next editor: `PropertyInfo` is plain data, which a report stores; o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cache
@@ -13,7 +14,7 @@ from importlib import import_module
 from inspect import getdoc
 from math import isfinite
 from sys import modules
-from typing import Annotated, Any, Literal, TypedDict, Unpack
+from typing import Annotated, Any, Literal, TypedDict, Unpack, overload
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
@@ -404,3 +405,22 @@ def judge_stored(info: PropertyInfo, outcome: Outcome) -> Outcome:
 def _failure(number: CheckedNumber) -> str:
     quantity = number.quantity
     return f"{quantity.name} {number.value:.3g}, {quantity.sense} {number.tolerance:.3g}"
+
+
+class Outcomes(Sequence[Outcome]):
+    """The outcomes of a row in order. A class of this kind has its length, and `at`."""
+
+    @abstractmethod
+    def at(self, number: int) -> Outcome:
+        """Return an outcome by its number, from 0."""
+
+    @overload
+    def __getitem__(self, number: int) -> Outcome: ...
+    @overload
+    def __getitem__(self, number: slice) -> tuple[Outcome, ...]: ...
+    def __getitem__(self, number: int | slice) -> Outcome | tuple[Outcome, ...]:
+        if isinstance(number, slice):
+            return tuple(self.at(n) for n in range(*number.indices(len(self))))
+        if not -len(self) <= number < len(self):
+            raise IndexError(number)
+        return self.at(number % len(self))

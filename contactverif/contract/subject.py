@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Collection, Sequence
+from contextlib import AbstractContextManager, suppress
 from contextvars import copy_context
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, freeze
+from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, dense, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.first_answers import FirstAnswers
 from contactverif.contract.foreign_text import describe_error, name_line, one_line, place_of_error
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE, Interface
@@ -34,6 +34,15 @@ POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each o
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
 _COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstAnswers:
+    """The answers to the first questions, at one state."""
+
+    case: Case  # The state, with its multipliers if there are any.
+    residual: FloatArray  # (n,) with n = n_unknowns + n_multipliers
+    tangent: FloatArray | None  # (n, n); None if it was not asked.
 
 
 class Prefetching(ABC):
@@ -440,3 +449,25 @@ def _copy_compressed(tangent: Any) -> Any:
 def _describe_non_finite(values: Array) -> str:
     bad = np.flatnonzero(~np.isfinite(values).reshape(-1))
     return f"{values.reshape(-1)[bad[0]]} in {len(bad)} of {values.size} entries"
+
+
+def ask_first(subject: Subject, case: Case, parts: Collection[str]) -> FirstAnswers:
+    """Ask a flat case, whose multipliers press, for its pairing, its residual and, if it is among `parts`, its tangent.
+
+    A tangent that breaks the contract is None here.
+
+    Raises
+    ------
+    ContractError
+        If pairing or residual break the contract, or the plugin raises an exception there.
+    """
+    formulation, interface = subject.for_case(case), case.interface
+    pressure = case.penalty * case.parameter("penetration")
+    state = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure))
+    pairing = formulation.pair(interface, state.z)
+    residual: FloatArray = formulation.residual(interface, pairing, state.z)
+    tangent: FloatArray | None = None
+    if "tangent" in parts:
+        with suppress(ContractError):
+            tangent = dense(formulation.tangent(interface, pairing, state.z))
+    return FirstAnswers(state, residual, tangent)

@@ -20,8 +20,7 @@ from scipy.sparse import csgraph
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Surface
-from contactverif.contract.ways import ONE_SIDED, mean_normal, ways_to_master
+from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
 from contactverif.mechanics.scene import Scene
 from contactverif.meshes.mesh_file import (
     MeshSides,

@@ -13,8 +13,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.faces import TRIANGLE, turns_of
-from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.ways import ONE_SIDED
+from contactverif.contract.interface import ONE_SIDED, Interface, Surface
 from contactverif.meshes.mesh_groups import Group, kinds_in, unknown_group_error
 from contactverif.meshes.plain_mesh import PlainMesh
 

@@ -8,8 +8,7 @@ from time import perf_counter
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample, Origin, counterexamples
-from contactverif.contract.outcomes import Outcomes
-from contactverif.contract.property import Outcome, Property, PropertyInfo, judge_stored
+from contactverif.contract.property import Outcome, Outcomes, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.plugins.provenance import code_digests, collect_versions, machine

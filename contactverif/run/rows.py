@@ -19,8 +19,7 @@ from contactverif.contract import records
 from contactverif.contract.case import Case
 from contactverif.contract.cases import needs_of_place
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.outcomes import Outcomes
-from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.property import Outcome, Outcomes, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.contract.traits import traits_behind

@@ -22,9 +22,8 @@ from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.pairing import Handle, Pairing
-from contactverif.contract.published_forces import Fractions, format_forces, parse_forces
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Fractions, Traits, format_forces, parse_forces
 
 NAMES = ("pass_1.", "pass_2.")  # The prefixes of the names in a pairing.
 _EXCHANGED = "-swapped"  # The end of the name of a flat case whose slave and master have exchanged their lengths.

@@ -20,9 +20,8 @@ from contactverif.contract.errors import ContractError
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
-from contactverif.contract.published_forces import parse_forces
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Traits, parse_forces
 from contactverif.oracle import nodal_spring_weights, nodal_surface_weights
 from contactverif.problems.flat_states import equal_area_states, equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case

@@ -43,7 +43,7 @@ import numpy as np
 from scipy import sparse
 
 from contactverif import Interface, Subject, evaluate_both, load_formulation
-from contactverif.contract.state_vector import split_state
+from contactverif.contract.interface import split_state
 from contactverif.geometry import block_rows
 from contactverif.geometry.block_rows import NO_NODE, Couplings, zero_matrix
 from contactverif.geometry.projection import search_tree

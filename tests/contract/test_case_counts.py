@@ -4,7 +4,7 @@ from math import comb
 
 import pytest
 
-from contactverif.contract.case_counts import BY_CHANCE, exceeds
+from contactverif.contract.result import BY_CHANCE, exceeds
 
 
 @pytest.mark.parametrize(("number", "share"), [(100, 0.04), (900, 0.002), (20, 0.3)])

@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 
 from contactverif import ContractError, Evidence, Traits
-from contactverif.contract.published_forces import format_forces, parse_forces
+from contactverif.contract.traits import format_forces, parse_forces
 
 
 def test_text_becomes_fractions_and_text_again() -> None:

@@ -22,8 +22,8 @@ from contactverif import (
     read_scene,
     solve,
 )
+from contactverif.contract.interface import ways_to_master
 from contactverif.contract.result import NOT_HERE
-from contactverif.contract.ways import ways_to_master
 from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases

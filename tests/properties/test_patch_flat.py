@@ -19,7 +19,7 @@ from textbook_springs import CentredSprings
 
 import contactverif_nts
 from contactverif import Case, Interface, PatchPromises, Promises, Rules, Subject, Traits, Verdict, judge_case
-from contactverif.contract.published_forces import parse_forces
+from contactverif.contract.traits import parse_forces
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.run import run

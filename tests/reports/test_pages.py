@@ -15,9 +15,8 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from page_reader import Page, complaints
 
-from contactverif.contract.case_counts import percent
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.result import OPPOSITE_SIGN
+from contactverif.contract.result import OPPOSITE_SIGN, percent
 from contactverif_reports.html import margin_strips as margins
 from contactverif_reports.html import pages
 from contactverif_reports.html import report_page as report_page_module

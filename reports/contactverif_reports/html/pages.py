@@ -18,11 +18,10 @@ from xml.etree import ElementTree
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from contactverif.contract.case_counts import percent
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.foreign_text import printable
 from contactverif.contract.property import Verdict
-from contactverif.contract.result import Result
+from contactverif.contract.result import Result, percent
 from contactverif_reports.files import check_writable, checked_name, whole
 from contactverif_reports.tables import Change, Code, Measured, ResultCell, plain_text
 

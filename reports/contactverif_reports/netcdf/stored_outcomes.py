@@ -17,8 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.columns import Axes, Group, StoredColumns, Variable, to_variables, words
 from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.contract.outcomes import Outcomes
-from contactverif.contract.property import Outcome, PropertyInfo, Verdict
+from contactverif.contract.property import Outcome, Outcomes, PropertyInfo, Verdict
 
 Table = dict[str, Variable]
 

@@ -120,7 +120,7 @@ def _summary(run: Run) -> Group:
     if run.not_loaded:
         plugins = [(entry.formulation, entry.reason) for entry in run.not_loaded]
         table["not_loaded"] = words(["plugin"], [name for name, _ in plugins], "plugin that did not load")
-        table["not_loaded_reason"] = words(["plugin"], [reason for _, reason in plugins], "reason it did not load")
+        table["not_loaded_reason"] = words(["plugin"], [reason for _, reason in plugins], "why it did not load")
         attributes["not_loaded"] = "\n".join(schema.text(f"{name}: not loaded: {reason}") for name, reason in plugins)
     attributes["comment"] = (
         "one row for each formulation and property; closest_value is the measured number nearest to its tolerance or "
