@@ -74,23 +74,23 @@ def single_scenes() -> tuple[Case, ...]:
 
 
 def _class_cases(drawings: dict[str, _ClassMesh]) -> list[Case]:
-    return [replace(_class_case(drawing), name=name) for name, drawing in drawings.items()]
-
-
-def _class_case(drawing: _ClassMesh) -> Case:
-    """Return the scene: three layers of cells above, two below, the interface on y = 0."""
-    slave, master = (np.append(0.0, np.cumsum(lengths)) for lengths in (drawing.slave, drawing.master))
-    master -= _BESIDE
-    height, softer = float(slave[-1]) / 2, min(1.0, drawing.ratio)
-    angle = radians(drawing.degrees)
-    axis = (cos(angle), sin(angle)) if drawing.degrees else UPRIGHT.axis
-    return two_blocks(
-        Rectangle(slave, np.linspace(0.0, height, 4), young=1.0, poisson=0.3),
-        Rectangle(master, np.linspace(-0.75 * height, 0.0, 3), young=drawing.ratio, poisson=0.2),
-        penalty=MODERATE_PENALTY * softer / float(np.diff(slave).mean()) / drawing.scale,
-        pressure=_STRAIN * softer,
-        placing=Placing(axis, scale=drawing.scale),
-    ).case()
+    """Return the scenes: three layers of cells above, two below, the interface on y = 0."""
+    cases = []
+    for name, drawing in drawings.items():
+        slave, master = (np.append(0.0, np.cumsum(lengths)) for lengths in (drawing.slave, drawing.master))
+        master -= _BESIDE
+        height, softer = float(slave[-1]) / 2, min(1.0, drawing.ratio)
+        angle = radians(drawing.degrees)
+        axis = (cos(angle), sin(angle)) if drawing.degrees else UPRIGHT.axis
+        scene = two_blocks(
+            Rectangle(slave, np.linspace(0.0, height, 4), young=1.0, poisson=0.3),
+            Rectangle(master, np.linspace(-0.75 * height, 0.0, 3), young=drawing.ratio, poisson=0.2),
+            penalty=MODERATE_PENALTY * softer / float(np.diff(slave).mean()) / drawing.scale,
+            pressure=_STRAIN * softer,
+            placing=Placing(axis, scale=drawing.scale),
+        )
+        cases.append(replace(scene.case(), name=name))
+    return cases
 
 
 _HEIGHT = 6.0

@@ -290,7 +290,8 @@ def _describe_need(name: str, option: str, value: Any) -> str:
         return "" if value in ("rollers", "free") else "rollers or free"
     if option == "refine":
         finest = _FINEST if name in BLOCKS else _FINEST_DISK
-        return "" if _is_whole(value) and 1 <= value <= finest else f"a whole number from 1 to {finest}"
+        is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        return "" if is_whole and 1 <= value <= finest else f"a whole number from 1 to {finest}"
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return "a number"
     low, high, needed = -inf, inf, "a finite number"
@@ -298,18 +299,10 @@ def _describe_need(name: str, option: str, value: Any) -> str:
         low, high, needed = -1.0, 0.5, "Poisson's ratio above −1 and below 0.5"
     elif option in _ABOVE_ZERO:
         low, needed = 0.0, "a number > 0"
-    return "" if low < _as_float(value) < high else needed
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def _as_float(value: Any) -> float:
     try:
-        return float(value)
+        return "" if low < float(value) < high else needed
     except OverflowError:  # No float can hold so large a whole number.
-        return inf
+        return needed
 
 
 OPTIONS = tuple(dict.fromkeys(option for name in SCENES for option in options_of(name)))

@@ -187,7 +187,14 @@ def equal_length_states() -> tuple[Case, ...]:
         for count in (2, MANY_EIGHTS)
     )
     return tuple(
-        flat_state(name, _ends(lengths), flat_master(_ends(opposite)), depth, turn=turn, penalty=penalty)
+        flat_state(
+            name,
+            [*accumulate(lengths, initial=0.0)],
+            flat_master([*accumulate(opposite, initial=0.0)]),
+            depth,
+            turn=turn,
+            penalty=penalty,
+        )
         for name, (lengths, opposite), depth, turn, penalty in (
             ("8 segments", _EIGHT, 2.0**-4, UPRIGHT, 16.0),
             ("8 segments, upright, soft and shallow", _EIGHT, 2.0**-12, (0, 1, 1), 2.0**-4),
@@ -195,11 +202,6 @@ def equal_length_states() -> tuple[Case, ...]:
             (f"{8 * MANY_EIGHTS} segments", many, 2.0**-4, UPRIGHT, 16.0),
         )
     )
-
-
-def _ends(lengths: Sequence[float]) -> list[float]:
-    """Return 0 and the places where segments of these lengths end, one behind the other."""
-    return [*accumulate(lengths, initial=0.0)]
 
 
 @cache
@@ -302,9 +304,11 @@ def _touching(
             sides[side].append(origin + np.multiply.outer(np.array(places), along) + lift * normal)
             directions[side].append(np.tile(along, (len(places), 1)))
     nodes = np.vstack([*sides[0], *sides[1]])
-    slave_chains = _chains(len(slave), len(angles), 0)
-    master_chains = _chains(len(master), len(angles), len(slave) * len(angles))
-    interface = Interface(nodes, Surface(np.array(slave_chains)), Surface(np.array(master_chains)))
+    chains = [
+        [(first, first + 1) for k in range(len(angles)) for first in range(start + k * n, start + k * n + n - 1)]
+        for n, start in ((len(slave), 0), (len(master), len(slave) * len(angles)))
+    ]
+    interface = Interface(nodes, *(Surface(np.array(segments)) for segments in chains))
     parameters = {"directions": np.vstack([*directions[0], *directions[1]]), "shift": np.array(shift)}
     return Case(interface, nodes.reshape(-1), _PENALTY, parameters, name=name)
 
@@ -312,12 +316,6 @@ def _touching(
 def _direction(angle: float) -> FloatArray:
     """Return the integer direction (2,) nearest to an angle in degrees, over a power of two; its length is near 1."""
     return np.round(np.array([cos(radians(angle)), sin(radians(angle))]) * _FINENESS) / _FINENESS
-
-
-def _chains(length: int, count: int, first: int) -> list[tuple[int, int]]:
-    """Return the segments of `count` chains of `length` nodes, whose nodes are numbered from `first`."""
-    starts = [first + length * number for number in range(count)]
-    return [(start + node, start + node + 1) for start in starts for node in range(length - 1)]
 
 
 Quaternion = tuple[int, int, int, int]

@@ -350,20 +350,16 @@ class HertzStudy:
 
 
 def _shape_errors(exact: FloatArray, solution: Solution) -> Errors:
-    """Return the errors of the largest pressure on the slave and of the width of the forces."""
-    interface = solution.interface
+    """Return the errors of the largest pressure on the slave and of 2 √(Σ F x² / Σ F), which is a for Hertz."""
+    interface, numbers = solution.interface, []
     lengths = shape_integrals(interface.slave, interface.nodes)
-    numbers = [_peak_and_width(forces, interface.nodes, lengths) for forces in (solution.forces, exact)]
-    return {kind: abs(found / right - 1) for kind, found, right in zip((PEAK, WIDTH), *numbers, strict=True)}
-
-
-def _peak_and_width(forces: FloatArray, nodes: FloatArray, lengths: FloatArray) -> tuple[float, float]:
-    """Return the largest force over its node's length, and 2 √(Σ F x² / Σ F), which is a for Hertz' pressure."""
     counted = lengths > 0
-    pushes = np.abs(forces[counted, 1])
-    total = pushes.sum()
-    width = 2 * np.sqrt(pushes @ nodes[counted, 0] ** 2 / total) if total > 0 else 0.0
-    return float((pushes / lengths[counted]).max()), float(width)
+    for forces in (solution.forces, exact):
+        pushes = np.abs(forces[counted, 1])
+        total = pushes.sum()
+        width = 2 * np.sqrt(pushes @ interface.nodes[counted, 0] ** 2 / total) if total > 0 else 0.0
+        numbers.append((float((pushes / lengths[counted]).max()), float(width)))
+    return {kind: abs(computed / right - 1) for kind, computed, right in zip((PEAK, WIDTH), *numbers, strict=True)}
 
 
 @cache
