@@ -6,12 +6,15 @@ processes, since the system ends the process of a plugin together with the threa
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from time import perf_counter
 from typing import Any, Generic, TypeVar
+
+from contactverif.isolation.process import PINNING
 
 _Result = TypeVar("_Result")
 # What a call waits for. It returns False if a process has ended: then the calls begin anew, one after another.
@@ -34,6 +37,7 @@ class _Lane(threading.Thread, Generic[_Result]):
     def __init__(self) -> None:
         super().__init__(daemon=True)
         self._go, self._back = SimpleQueue[None](), SimpleQueue[None]()
+        self._core = -1
 
     def begin(self, call: Callable[[], _Result]) -> None:
         self._call, self._cancelled = call, False
@@ -47,7 +51,7 @@ class _Lane(threading.Thread, Generic[_Result]):
     def run(self) -> None:
         _thread.lane = self
         while True:
-            self._go.get()
+            self._wait_for_turn()
             try:
                 if not self._cancelled:
                     self.result = self._call()
@@ -55,6 +59,13 @@ class _Lane(threading.Thread, Generic[_Result]):
                 self.error = error
             self.ended = True
             self._stand()
+
+    def _wait_for_turn(self) -> None:
+        self._go.get()
+        if PINNING.core not in (-1, self._core):  # Cores are those of a thread, and this one computes for the judge.
+            self._core = PINNING.core
+            with suppress(OSError):
+                os.sched_setaffinity(0, {self._core})
 
     def _stand(self) -> None:
         self.stands = True
@@ -83,7 +94,7 @@ class _Lane(threading.Thread, Generic[_Result]):
         if not self._cancelled:
             self.wish = wish
             self._stand()
-            self._go.get()
+            self._wait_for_turn()
         if self._cancelled:
             raise _CancelledError
 

@@ -15,13 +15,16 @@ import difflib
 import inspect
 import os
 import re
+import subprocess
 import sys
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import cache_from_source, find_spec
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -53,6 +56,7 @@ ENGINE_PROPERTIES = "contactverif.engine_properties"  # Those that are asked of 
 ENGINES = "contactverif.engines"
 PROBLEMS = "contactverif.problems"
 _RENAMED = {"scale": "total-stiffness", "scaling": "units", "engine.scaling": "engine.units"}  # {former id: id}
+_COMPILE_SECONDS = 60.0
 _OURS = "contactverif"  # The distribution whose problems keep their names.
 
 _SHORT_NAME = f"at most {LONGEST_NAME} characters"
@@ -211,12 +215,33 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
     if limits is None:
         make = _load_factory(text)
         return make if isinstance(make, NotLoaded) else subject_of(text, make)
+    installed = entries_by_name(FORMULATIONS)
+    modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
+    _compile_once(frozenset(module.partition(".")[0] for module in modules))
     if limits.box is not None:  # It keeps compiled kernels, those of all formulations of the same modules.
-        installed = entries_by_name(FORMULATIONS)
-        modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
         store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share a package's name.
         limits = replace(limits, box=replace(limits.box, store=store))
     return load_remote(_worker(), text, limits)
+
+
+@cache
+def _compile_once(packages: frozenset[str]) -> None:
+    """Let Python keep the compiled files of packages, and of numba, which a plugin's process may not write.
+
+    Without them, as pip can leave them, each start of a process would compile for some seconds. No plugin runs here.
+    """
+    if sys.dont_write_bytecode:
+        return
+    for name in sorted(packages | {"numba"}):
+        with suppress(ImportError, ValueError, OSError, subprocess.SubprocessError):  # The process says what is wrong.
+            spec = find_spec(name)
+            source = Path((spec and spec.origin) or "")
+            missing = source.suffix == ".py" and not os.path.exists(cache_from_source(source))
+            if missing and os.access(source.parent, os.W_OK):
+                place = source.parent if spec and spec.submodule_search_locations else source
+                # All of numba is too much.
+                arguments = ["-c", "import numba"] if name == "numba" else ["-m", "compileall", "-q", str(place)]
+                subprocess.run([sys.executable, *arguments], capture_output=True, check=False, timeout=_COMPILE_SECONDS)
 
 
 def _worker() -> tuple[str, ...]:
