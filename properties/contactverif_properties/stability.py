@@ -271,7 +271,7 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The same state, flat and at the origin, is the reference: there every product is nearly exact.
     It is turned by a rational rotation and shifted, and neither rounds anything. Both residuals are evaluated on the
     pairing of the flat state. The error is counted in roundings, ω (see the shared measure of conditioning). The
-    tolerance is 16. The states are a finite list, and `contactverif stability` draws them. Besides ω, the error and the
+    tolerance is 16. The states are a finite list. Besides ω, the error and the
     condition number of the worst force are kept.
 
     **Undecided.** Never, since no decision is made anew. A formulation without `pair` decides anew inside its residual.
@@ -399,7 +399,7 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
     of the exact solution. Newton's method, with the tangent that the formulation calls exact, goes on down to roundoff.
     The forces are compared, and the error is counted in roundings, ω (see the shared measure of conditioning). The
     derivative K is here that of bodies and contact together, the matrix of the system. The tolerance is 16. The scenes
-    are a finite list, and `contactverif stability` draws them.
+    are a finite list.
 
     **Undecided.** A case is undecided if the system has no inverse in floats, or if Newton's method does not settle on
     the frozen pairing.

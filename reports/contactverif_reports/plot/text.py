@@ -23,7 +23,7 @@ _PICTURE_HEIGHT, _SILHOUETTE_HEIGHT = 17, 20  # The largest numbers of rows.
 _DISTANCE = 2  # Rows between surfaces that would be nearer to each other.
 _LABELLED = 12  # The nodes of a picture get their numbers if a side has at most so many.
 _LISTED = 8  # The positions of at most so many nodes a side are listed.
-_LISTED_FACES = 12  # In space the nodes and faces of at most so many a side are listed.
+_LISTED_FACES = 12  # The nodes and faces of at most so many a side in space are listed.
 _INKS = {"slave": "▒", "master": "░"}  # The fillings of bodies.
 _FACES = {3: "triangle", 4: "quadrilateral"}
 
