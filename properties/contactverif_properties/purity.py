@@ -1,4 +1,4 @@
-"""Whether an answer depends on the question alone: all methods in turn, in two orders, and in a long life."""
+"""Answers that depend on the question alone: all methods are asked in turn, in two orders, and in a long life."""
 
 from __future__ import annotations
 

@@ -847,7 +847,7 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
     if all(pairing == first for first, *others in beside for pairing in others):
         return "a kink: the pairing changes here, and is steady on either side", ""
     around = [pair(scale * np.arange(-2, 4)) for scale in (1, 2.0**-5, 2.0**-10)]
-    differ = all(one != other for pairings in around for one, other in combinations(pairings, 2))
+    differ = all(first != second for pairings in around for first, second in combinations(pairings, 2))
     if differ and _change_forces(list(chain(*around)), state, directions):
         return "", "the pairing is another one wherever the nodes move: it holds numbers, not decisions"
     return "", ""

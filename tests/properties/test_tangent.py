@@ -68,10 +68,10 @@ SLOPES: dict[str, tuple[Any, Any, float, float]] = {
 }
 
 
-@pytest.mark.parametrize("what", SLOPES)
-def test_the_slope_of_remainders(what: str) -> None:
-    remainders, steps, floor, slope = SLOPES[what]
-    assert taylor_slope(remainders, steps, floor) == pytest.approx(slope, rel=0.05 if "beside" in what else 1e-6)
+@pytest.mark.parametrize("name", SLOPES)
+def test_the_slope_of_remainders(name: str) -> None:
+    remainders, steps, floor, slope = SLOPES[name]
+    assert taylor_slope(remainders, steps, floor) == pytest.approx(slope, rel=0.05 if "beside" in name else 1e-6)
 
 
 def test_the_slope_finds_a_large_error_and_misses_a_small_one() -> None:
