@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import chain, product
@@ -74,6 +74,9 @@ class RowOutcomes(Outcomes):
 
     def __len__(self) -> int:
         return len(self._form_of)
+
+    def __iter__(self) -> Iterator[Outcome]:
+        return map(self.at, range(len(self)))  # That of a sequence asks for the length at each outcome.
 
     def at(self, number: int) -> Outcome:
         """Return an outcome, which is made of its numbers if it did not stay whole."""

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,15 @@ from same_facts import facts
 
 from contactverif import Interface, Subject, load_formulation, load_properties, named_case
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.result import NotLoaded
 from contactverif.contract.traits import Traits
 from contactverif.isolation import host
 from contactverif.isolation.limits import Limits
+from contactverif.isolation.remote import code_files, note_code_files, places
+from contactverif.plugins.registry import load_subject
 from contactverif.run import scheduler
 from contactverif.run.run import run
-from contactverif.run.scheduler import CaseChunk, WorkerError, decode, encode
+from contactverif.run.scheduler import CaseChunk, WorkerError, begin_loading, decode, encode
 from contactverif.run.worker_pool import default_jobs, usable_cores, worker_pool
 
 PROPERTY_IDS = ("balance.moment", "patch.flat.transmission", "hard.deep", "hard.dead-zone")
@@ -167,3 +171,47 @@ def test_what_a_plugin_prints_in_a_worker_comes_to_the_parent(pool: Executor, mo
     jobs = (scheduler.Job(abs, (number,), lambda answer: results.append(answer) or ()) for number in (-2, -3))
     scheduler.Scheduler(pool).work(jobs)
     assert sorted(results) == [2, 3]
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Workers load formulations as this process does: what loads, what does not, and what a user has mistyped.
+
+LIMITS = Limits()
+
+
+def test_a_worker_loads_what_this_process_loads(pool: Executor) -> None:
+    (loader,) = begin_loading(["vts-me:n=4"], LIMITS, pool)
+    there, here = loader(), load_subject("vts-me:n=4", LIMITS)
+    assert isinstance(there, Subject)
+    assert isinstance(here, Subject)
+    assert (there.name, there.traits, there.provides) == (here.name, here.traits, here.provides)
+
+
+def test_the_compiled_code_of_a_workers_plugin_is_in_the_report(pool: Executor) -> None:
+    (loader,) = begin_loading(["sts"], LIMITS, pool)
+    subject = loader()
+    assert isinstance(subject, Subject)
+    assert any("numba" in str(file) for file in code_files(subject))
+    note_code_files(subject, [*code_files(subject), Path(__file__)])  # This process may run the others, too.
+    assert Path(__file__).name in places([subject])["libraries"]
+
+
+def test_a_mistyped_name_is_the_users_mistake_and_the_others_load(pool: Executor) -> None:
+    wrong, right = begin_loading(["vts-me:n=four", "nts"], LIMITS, pool)
+    with pytest.raises(MisuseError, match="option n of 'vts-me:n=four'") as there:
+        wrong()
+    with pytest.raises(MisuseError) as here:
+        load_subject("vts-me:n=four", LIMITS)
+    assert str(there.value) == str(here.value)
+    assert isinstance(right(), Subject)
+
+
+def test_a_wrapper_without_a_formulation_is_told_as_here(pool: Executor) -> None:
+    (loader,) = begin_loading(["two-pass"], LIMITS, pool)
+    with pytest.raises(MisuseError, match="two-pass/NAME"):
+        loader()
+
+
+def test_what_does_not_load_says_why(pool: Executor) -> None:
+    (loader,) = begin_loading(["nts"], Limits(memory=1), pool)
+    assert isinstance(loader(), NotLoaded)
