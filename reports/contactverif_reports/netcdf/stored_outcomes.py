@@ -96,7 +96,8 @@ def outcome_variables(
         "parameter_value": common_unit(_parameter_units(axes), "see parameter_units"),
     }
     table = schema.OUTCOME + (schema.CASE_COLUMNS if with_cases else ())
-    return to_variables(table, outcomes, dims, axes, prefix=prefix, units=units)
+    summaries = [outcome and replace(outcome, case_or_summary=outcome.summary) for outcome in outcomes]  # Made once.
+    return to_variables(table, summaries, dims, axes, prefix=prefix, units=units)
 
 
 class OutcomeArrays:
