@@ -365,7 +365,8 @@ def _judge_together(question: Property, subject: Subject, cases: Mapping[int, Ca
 
     Lockstep saves messages to the plugin's process. It is not tried if the first case fails or a process has ended.
     """
-    if not isinstance(subject, RemoteSubject) or len(cases) < 2 or count_ends(subject):
+    # SuperLU frees a factor only in the thread that made it, and a body keeps its factor for other cases.
+    if not isinstance(subject, RemoteSubject) or question.bodies or len(cases) < 2 or count_ends(subject):
         return {}
     (first, case), *others = cases.items()
     passed = {first: judge.judge_case(question, case, subject)}
