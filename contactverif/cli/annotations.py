@@ -1,5 +1,7 @@
 """Annotations in a workflow of GitHub: what makes a run fail is shown at the factory of the formulation.
 
+The factory is looked up in the working copy, and nothing is imported.
+
 References
 ----------
 GitHub Docs, Workflow commands for GitHub Actions.
@@ -7,47 +9,43 @@ GitHub Docs, Workflow commands for GitHub Actions.
 
 from __future__ import annotations
 
+import ast
+import importlib.util
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
 
 import typer
 
-if TYPE_CHECKING:
-    from contactverif.contract.result import Run
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.foreign_text import one_line
+from contactverif.contract.names import parse_name
+from contactverif.contract.result import OPPOSITE_SIGN, Run
+from contactverif.plugins.registry import FORMULATIONS
 
 _IN_WORKFLOW = "GITHUB_ACTIONS"
+_INSTALLED = {"site-packages", "dist-packages"}  # An environment may lie in the working folder.
+_MOST_HOPS = 8  # A name may be imported from module to module.
 
 
 def annotate(run: Run) -> None:
     """Print an annotation for all that makes a run fail, if this is a job of a workflow."""
-    if os.environ.get(_IN_WORKFLOW) == "true":
-        for formulation, title, text in _failures(run):
-            typer.echo(_annotation(formulation, title, text))
-
-
-def _failures(run: Run) -> Iterator[tuple[str, str, str]]:
-    """Yield (formulation, title, text) of all that makes a run fail."""
-    from contactverif.contract.result import OPPOSITE_SIGN
-
-    for item in run.not_loaded:
-        yield item.formulation, f"{item.formulation} is not loaded", item.reason
-    for name in run.opposite_signs:
-        yield name, f"{name}: sign", OPPOSITE_SIGN
-    for row in run.unexpected:
-        if row.omitted:
-            continue
-        yield row.formulation, f"{row.formulation} {row.property_id}: {row.unexpected}", row.reason
-
-
-def _annotation(formulation: str, title: str, text: str) -> str:
-    from contactverif.api.factory_places import factory_place
-    from contactverif.contract.foreign_text import one_line
-
-    place = factory_place(formulation)
-    properties = {} if place is None else {"file": place[0], "line": str(place[1])}
-    words = ",".join(f"{name}={_escape(value, ':,')}" for name, value in {**properties, "title": title}.items())
-    return f"::error {words}::{_escape(one_line(text))}"
+    if os.environ.get(_IN_WORKFLOW) != "true":
+        return
+    failures = [(item.formulation, f"{item.formulation} is not loaded", item.reason) for item in run.not_loaded]
+    failures += [(name, f"{name}: sign", OPPOSITE_SIGN) for name in run.opposite_signs]
+    failures += [
+        (row.formulation, f"{row.formulation} {row.property_id}: {row.unexpected}", row.reason)
+        for row in run.unexpected
+        if not row.omitted
+    ]
+    for formulation, title, text in failures:
+        place = factory_place(formulation)
+        words = {} if place is None else {"file": place[0], "line": str(place[1])}
+        listed = ",".join(f"{name}={_escape(value, ':,')}" for name, value in {**words, "title": title}.items())
+        typer.echo(f"::error {listed}::{_escape(one_line(text))}")
 
 
 def _escape(text: str, marks: str = "") -> str:
@@ -55,3 +53,78 @@ def _escape(text: str, marks: str = "") -> str:
     for letter in f"%\r\n{marks}":
         text = text.replace(letter, f"%{ord(letter):02X}")
     return text
+
+
+@cache
+def factory_place(name: str) -> tuple[str, int] | None:
+    """Return file and line of the factory of a formulation; of a wrapped one, that of the inner formulation.
+
+    None if the file is not below the working folder, or is that of an installed package.
+    """
+    try:
+        inner = parse_name("formulation", name)[0].rpartition("/")[2]
+    except MisuseError:
+        return None
+    for entry in entry_points(group=FORMULATIONS, name=inner):
+        place = _follow(entry.module, entry.attr)
+        if place is not None and place[0].is_relative_to(os.getcwd()) and not _INSTALLED & {*place[0].parts}:
+            return place[0].relative_to(os.getcwd()).as_posix(), place[1]
+    return None
+
+
+def _follow(module: str, name: str) -> tuple[Path, int] | None:
+    """Return file and line where a name of a module is defined, through the imports of packages."""
+    for _ in range(_MOST_HOPS):
+        file = _file_of(module)
+        if file is None:
+            return None
+        try:
+            tree = ast.parse(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError, SyntaxError):
+            return file, 1
+        line = next((node.lineno for node in tree.body if name in _names(node)), None)
+        if line is not None:
+            return file, line
+        origin = next(_origins(tree, module, name, is_package=file.name == "__init__.py"), None)
+        if origin is None:
+            return file, 1
+        module, name = origin
+    return None
+
+
+def _file_of(module: str) -> Path | None:
+    """Return the file of a module. Of a package no more than its place is looked up."""
+    top, *rest = module.split(".")
+    try:
+        spec = importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        return None
+    if spec is None or spec.origin is None:
+        return None
+    path = Path(spec.origin)
+    if rest:
+        path = path.parent.joinpath(*rest)
+        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    return path.resolve()
+
+
+def _names(node: ast.stmt) -> list[str]:
+    """Return the names that a statement defines."""
+    match node:
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+            return [name]
+        case ast.Assign(targets=targets):
+            return [target.id for target in targets if isinstance(target, ast.Name)]
+    return []
+
+
+def _origins(tree: ast.Module, module: str, name: str, *, is_package: bool) -> Iterator[tuple[str, str]]:
+    """Yield (module, name) from which a module imports a name."""
+    for node in tree.body:
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        for alias in node.names:
+            if (alias.asname or alias.name) == name:
+                parts = module.split(".")
+                base = ".".join(parts[: len(parts) - node.level + is_package]) if node.level else ""
+                yield ".".join(filter(None, (base, node.module))), alias.name

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from contactverif import Run, load_formulation, load_properties, verify
-from contactverif.api.factory_places import factory_place
-from contactverif.cli.annotations import annotate
+from contactverif.cli.annotations import annotate, factory_place
 from contactverif.contract.result import NotLoaded
 
 PACKAGE = {
@@ -31,7 +30,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     def entries(group: str, name: str) -> list[EntryPoint]:
         return [EntryPoint(name, names[name], group)] if name in names else []
 
-    monkeypatch.setattr("contactverif.api.factory_places.entry_points", entries)
+    monkeypatch.setattr("contactverif.cli.annotations.entry_points", entries)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.chdir(tmp_path)
     factory_place.cache_clear()
