@@ -145,9 +145,9 @@ def recheck_store(
         question, numbers = plain.for_traits(subject.traits), store.numbers(subject.name, plain.id)
         row = open_row(subject, question, sampling.source(question), "", sampling) if numbers else None
         if isinstance(row, OpenRow):
-            chosen = choose_share(numbers)
-            stored = (store.outcomes(subject.name, question.info, number, 1) for number in chosen)
-            outcomes = {number: each[0] for number, each in zip(chosen, stored, strict=True) if each}
+            numbers_again = choose_share(numbers)
+            stored = (store.outcomes(subject.name, question.info, number, 1) for number in numbers_again)
+            outcomes = {number: each[0] for number, each in zip(numbers_again, stored, strict=True) if each}
             samples.append(Sample.of_row(row, outcomes))
             counts[subject.name, question.id] = len(numbers), len(outcomes)
     recheck = Recheck(samples, sampling, exact=store.same_machine)

@@ -224,15 +224,15 @@ class Store:
 
     def outcomes(self, formulation: str, info: PropertyInfo, first: int, count: int) -> dict[int, Outcome]:
         """Return {place behind the first: outcome} of those of some cases of a row that are judged already."""
-        part, found = self._range(formulation, info.id, first, count), dict[int, Outcome]()
+        part, outcomes = self._range(formulation, info.id, first, count), dict[int, Outcome]()
         pairs = zip((self._keys[part] % self._room).tolist(), self._places[part].tolist(), strict=True)
         for file, group in groupby(pairs, lambda pair: pair[1] >> _FILE_BITS):
             with self._paths[file].open("rb") as stream:
                 for key, place in group:
                     outcome = self._read_outcome(stream, file, place & (1 << _FILE_BITS) - 1, info)
                     if outcome is not None:
-                        found[key - 1 - first] = outcome
-        return found
+                        outcomes[key - 1 - first] = outcome
+        return outcomes
 
     def _read_outcome(self, stream: IO[bytes], file: int, place: int, info: PropertyInfo) -> Outcome | None:
         """Return an outcome with the verdict that follows from its numbers; None if it is to be judged again."""

@@ -6,7 +6,7 @@ import pytest
 from forged_journals import HARM, KINDS, Campaign
 
 N_FORGED = 2
-NAMED = ("other numbers", "records of another seed")  # What differs in numbers is always named.
+NAMED = ("other numbers", "records of another seed")  # The kinds that differ in numbers, so that a line names them.
 
 
 @pytest.fixture(scope="module")

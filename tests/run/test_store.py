@@ -62,7 +62,7 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
 
 ERROR, OTHER = Quantity("error", "ξ", "a reason"), Quantity("other", "", "", sense="at least", unit="N")
 INFO = PropertyInfo("of.one", "of", "One.", (ERROR, OTHER))
-ONE = Plan(formulations=("mine", "other"), properties=(INFO.id,), examples=20)
+SMALL_PLAN = Plan(formulations=("mine", "other"), properties=(INFO.id,), examples=20)
 
 
 def outcome(number: float) -> Outcome:
@@ -78,13 +78,13 @@ def outcome(number: float) -> Outcome:
     return judge_stored(INFO, Outcome(named_case("c"), Verdict.PASS, "", measured, 0.25))
 
 
-def stored(item: Outcome) -> str:
+def describe(item: Outcome) -> str:
     return repr(replace(item, case_or_summary=item.summary))
 
 
 def write(folder: Path, outcomes: dict[tuple[int, int], Outcome], session: str = "a") -> Path:
     """Write {(row, number): outcome} into a new journal, and return its file."""
-    journal = journal_of(folder, ONE)
+    journal = journal_of(folder, SMALL_PLAN)
     for (row, number), item in outcomes.items():
         Writer(str(journal), session, row, number).add(0, item)
     Writer(str(journal), session, 0, 0).file.close()
@@ -94,27 +94,27 @@ def write(folder: Path, outcomes: dict[tuple[int, int], Outcome], session: str =
 
 def read(path: Path, count: int = 20, formulation: str = "mine") -> dict[int, str]:
     """Return {number: outcome} of those of a row, the witness included."""
-    found = Store(ONE, None, [path.parent]).outcomes(formulation, INFO, -1, count + 1)
-    return {place - 1: repr(item) for place, item in found.items()}
+    outcomes = Store(SMALL_PLAN, None, [path.parent]).outcomes(formulation, INFO, -1, count + 1)
+    return {place - 1: repr(item) for place, item in outcomes.items()}
 
 
 def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     path = write(tmp_path, {(0, number): outcome(number / 3) for number in range(-1, 4)})
-    assert read(path) == {number: stored(outcome(number / 3)) for number in range(-1, 4)}
+    assert read(path) == {number: describe(outcome(number / 3)) for number in range(-1, 4)}
     assert read(path, formulation="other") == {}
-    store = Store(ONE, None, [path.parent])
+    store = Store(SMALL_PLAN, None, [path.parent])
     assert store.numbers("mine", INFO.id) == [-1, 0, 1, 2, 3]
     assert (store.n_outcomes, store.n_records) == (5, 5)
 
 
 def test_of_two_outcomes_of_a_case_the_last_counts(tmp_path: Path) -> None:
-    writer = Writer(str(journal_of(tmp_path, ONE)), "b", 0, 3)
+    writer = Writer(str(journal_of(tmp_path, SMALL_PLAN)), "b", 0, 3)
     for number in (1.0, 2.0):
         writer.add(0, outcome(number))
     writer.file.close()
-    store = Store(ONE, None, [tmp_path / "r.journal"])
+    store = Store(SMALL_PLAN, None, [tmp_path / "r.journal"])
     assert (store.n_outcomes, store.n_records) == (1, 2)
-    assert repr(store.outcomes("mine", INFO, 3, 1)[0]) == stored(outcome(2.0))
+    assert repr(store.outcomes("mine", INFO, 3, 1)[0]) == describe(outcome(2.0))
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_words_of_a_plugin_are_taken_for_what_they_are(
     tmp_path: Path, change: dict[str, Any], expected: dict[str, Any]
 ) -> None:
     path = write(tmp_path, {(0, 0): replace(outcome(1.0), **change)})
-    assert read(path) == {0: stored(replace(outcome(1.0), **expected))}
+    assert read(path) == {0: describe(replace(outcome(1.0), **expected))}
 
 
 def test_verdicts_follow_from_numbers_and_a_pass_without_numbers_is_none(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_verdicts_follow_from_numbers_and_a_pass_without_numbers_is_none(tmp_pat
     nothing = Outcome(named_case("c"), Verdict.PASS)
     crash = replace(nothing, verdict=Verdict.CRASHED, reason="signal 9")
     path = write(tmp_path, {(0, 0): wrong, (0, 1): nothing, (0, 2): crash})
-    assert read(path) == {0: stored(outcome(1.0)), 2: stored(crash)}
+    assert read(path) == {0: describe(outcome(1.0)), 2: describe(crash)}
 
 
 def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
@@ -152,15 +152,15 @@ def test_a_damaged_file_is_read_up_to_the_damage(tmp_path: Path) -> None:
         path.write_bytes(damaged)
         whole = sum(end <= byte for end in [*places[1:], len(data)])
         assert [place for place, _ in read_messages(path)] == places[:whole]
-        right = {number: stored(outcome(float(number))) for number in range(max(whole - 1, 0))}
+        right = {number: describe(outcome(float(number))) for number in range(max(whole - 1, 0))}
         assert read(path) == right  # The first record is a form.
 
 
 def test_a_record_of_no_row_or_case_is_not_believed_and_takes_no_memory(tmp_path: Path) -> None:
     places = ((0, 0), (5, 0), (-1, 0), (0, 10**9), (0, -7), (0, 10**12))
     path = write(tmp_path, {place: outcome(1.0) for place in places})
-    assert Store(ONE, None, [path.parent]).n_outcomes == 1
-    large = msgspec.structs.replace(ONE, examples=10**12)
+    assert Store(SMALL_PLAN, None, [path.parent]).n_outcomes == 1
+    large = msgspec.structs.replace(SMALL_PLAN, examples=10**12)
     assert Store(large, None, [path.parent]).numbers("mine", INFO.id) == [0, 10**9, 10**12]
 
 
@@ -243,7 +243,7 @@ def test_a_new_journal_keeps_the_earlier_file_apart_and_the_stopped_run_aside(tm
 def test_a_mistake_before_anything_is_judged_takes_the_new_journal_back(tmp_path: Path) -> None:
     report, folder = tmp_path / "r.nc", tmp_path / "r.nc.journal"
     report.write_text("yesterday")
-    for plan in (PLAN, ONE):
+    for plan in (PLAN, SMALL_PLAN):
         with suppress(MisuseError), new_journal(folder, plan, [report]):
             assert not report.exists()
             raise MisuseError("NAME", "nothing", "something")
