@@ -157,8 +157,8 @@ class Cells(NamedTuple):
 
     def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
         """Return what `Parts.cuts` says."""
-        ends = sides.master.segments[self.master]
-        low, high = np.where(self.cut_low, ends[:, 1], -1), np.where(self.cut_high, ends[:, 0], -1)
+        cells = tuple(map(read_only, (self.master, self.cut_low, self.cut_high)))
+        low, high = _cutting_nodes(sides.master.segments, *cells)
         arrays = self.slave, self.master, low, high, self.before, self.behind, np.empty(0, np.int64)
         return tuple(map(read_only, arrays)), (6 if self.averaged else 4, NODE_2, NODE_1)
 
@@ -191,13 +191,17 @@ class Quadrature:
         Their numbers are c, ξ, gap (negative in penetration), weight (a length), and the normal out of the slave.
         """
         reference, places, weights = match_precision(x, sides.nodes, self.places, self.weights)
-        segments = sides.slave.lengths(reference), sides.slave.segments, sides.master.segments
+        segments = self._reference_lengths(sides, reference), sides.slave.segments, sides.master.segments
         return _points(x, segments, parts.cuts(sides)[0], (places, weights, self.current))
 
     def variations(self, sides: Interface | Sides, parts: Parts, x: FloatArray) -> FloatArray:
         """Compute Δ of c, ξ, gap, weight, and the turn ω of the normal: (n_points, 5, n_local, 2)."""
-        segments = sides.slave.lengths(sides.nodes), sides.slave.segments, sides.master.segments
+        segments = self._reference_lengths(sides, sides.nodes), sides.slave.segments, sides.master.segments
         return _variations(x, segments, *parts.cuts(sides), (self.places, self.weights, self.current))
+
+    def _reference_lengths(self, sides: Interface | Sides, reference: FloatArray) -> FloatArray:
+        """Return the lengths (n_slave_segments,) at reference positions; none if current lengths count."""
+        return np.empty(0, reference.dtype) if self.current else sides.slave.lengths(reference)
 
 
 def read_only(array: Any) -> Any:
@@ -214,6 +218,20 @@ def any_end(nodes: BoolArray, slave: IntArray, carrier: IntArray) -> BoolArray:
     for i in range(len(carrier)):
         selection[i] = nodes[slave[carrier[i], 0]] or nodes[slave[carrier[i], 1]]
     return selection
+
+
+@compile_maker
+def _cutting_nodes(
+    master: IntArray, partner: IntArray, cut_low: BoolArray, cut_high: BoolArray
+) -> tuple[IntArray, IntArray]:
+    """Return the master nodes that cut the lower and the upper end of each cell, −1 for none."""
+    low, high = np.full(len(partner), -1), np.full(len(partner), -1)
+    for cell in range(len(partner)):
+        if cut_low[cell]:
+            low[cell] = master[partner[cell], 1]
+        if cut_high[cell]:
+            high[cell] = master[partner[cell], 0]
+    return low, high
 
 
 @compile_maker
