@@ -81,7 +81,6 @@ def _are_equal(couplings: Couplings, others: Couplings) -> bool:
 def _make_pattern(
     n_nodes: int, n_multipliers: int, per_node: int, couplings: Couplings
 ) -> tuple[AnyIntArray, AnyIntArray]:
-    """Return where each row of unknowns begins, and the columns of all rows."""
     size, n_numbers = per_node * n_nodes + n_multipliers, n_nodes + n_multipliers
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
     members, ends = np.empty(len(couplings.nodes), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
@@ -161,7 +160,6 @@ def _write_pattern(
     ends: IntArray,
     columns: NumberArray,
 ) -> None:
-    """Write the starts of all rows of unknowns, and their columns."""
     at, unknown = 0, 0
     indptr[0] = 0
     for row in range(len(ends)):

@@ -235,7 +235,6 @@ def _add_springs(
     penalty: float,
     active: BoolArray,
 ) -> None:
-    """Add the forces of the springs on all cells, and their derivative to compressed rows."""
     places, weights = rule
     n_q = len(places)
     rows, pushes = np.empty((4, N_NUMBERS)), np.empty(4)

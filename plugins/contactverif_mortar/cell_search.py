@@ -136,7 +136,6 @@ def find_cells(
 
 @compile_maker
 def _lengthen(values: Array, room: int) -> Array:
-    """Return an array with more room behind the same values."""
     longer = np.empty(room, dtype=values.dtype)
     longer[: len(values)] = values
     return longer

@@ -140,7 +140,6 @@ def _add_springs(
 def _pair_nodes(
     x: FloatArray, n_nodes: int, master: IntArray, neighbours: IntArray, tree: Tree, tau: float
 ) -> tuple[IntArray, BoolArray]:
-    """Return the nearest master segment of each slave node, and whether the node is in contact."""
     order, boxes = tree
     nearest = np.empty(n_nodes, dtype=np.int64)
     active = np.empty(n_nodes, dtype=np.bool_)

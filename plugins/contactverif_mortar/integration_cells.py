@@ -263,7 +263,6 @@ def ends_of_part(view: SlaveView, x: Array, low: int, high: int) -> tuple[float,
 
 @compile_inline
 def _points_of_part(slot: IntArray, part: int, n_q: int) -> tuple[int, int]:
-    """Return the first and the end of the points of the rule that a part has."""
     return (slot[part], slot[part] + 1) if len(slot) > 0 else (0, n_q)
 
 

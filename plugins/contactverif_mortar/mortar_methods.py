@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -47,16 +46,6 @@ _SOURCES = {
     False: "Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629",
     True: "Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465",
 }
-
-
-class Carried(NamedTuple):
-    """The cells that carry pressures at one state, and what a method makes of them."""
-
-    cells: Cells
-    active: BoolArray  # (n_slave_nodes,)
-    weights: StateWeights  # The integrals, and the shapes: their numbers, or at points.
-    x: FloatArray  # (n_nodes, 2)
-    state: NodeState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,48 +88,23 @@ class Weighting:
         _, gaps = self.gaps(interface, cells, x)
         return Pairing({**cells._asdict(), "active": multipliers - penalty * gaps >= 0})  # false where the gap is NaN
 
-    def tangent(self, interface: Interface, carried: Carried) -> NodeRows:
-        """Compute forces and the assembled tangent, which is the `rest` of the result."""
-        n_nodes = len(carried.active)
-
-        def choose_pattern(groups: RowGroups) -> Couplings:
-            check_product(groups.starts[: n_nodes + 1])
-            return groups.pattern(0, n_nodes)
-
-        rows = self._rows(interface, carried, choose_pattern)
-        rows.multiply(carried.state.weights, 0, len(rows.groups.starts) - 1)
-        return rows
-
-    def factors(self, interface: Interface, carried: Carried) -> Factors:
-        """Compute the tangent in factors at a state of the slave nodes."""
-        return self._rows(interface, carried, RowGroups.pattern_of_cells).factors(carried.state.weights)
-
-    def saddle(
-        self, interface: Interface, cells: Cells, active: BoolArray, x: FloatArray, multipliers: FloatArray
-    ) -> Factors:
-        """Compute Σ λ_j ΔB_j, B and Δ∫φ_j g: the `rest`, and `left` and `right` of the slave nodes alone."""
-        zeros, ones, n_nodes = np.zeros(len(active)), np.ones(len(active)), len(active)
-        state, weights = NodeState(multipliers, ones, zeros, ones), self.weigh(interface, cells, x)
-
-        def choose_pattern(groups: RowGroups) -> Couplings:
-            if self.dual:
-                return groups.pattern(n_nodes, len(groups.starts) - 1)
-            return groups.pattern_of_cells()
-
-        rows = self._rows(interface, Carried(cells, active, weights, x, state), choose_pattern)
-        rows.multiply(ones, n_nodes, len(rows.groups.starts) - 1)
-        rest, left, _, right = rows.factors(ones)
-        return Factors(rest, left[:n_nodes], ones, right[:n_nodes])
-
-    def _rows(
-        self, interface: Interface, carried: Carried, choose_pattern: Callable[[RowGroups], Couplings]
+    def rows(
+        self,
+        interface: Interface,
+        cells: Cells,
+        active: BoolArray,
+        x: FloatArray,
+        shapes: FloatArray | ShapedPoints,
+        state: NodeState,
+        choose_pattern: Callable[[RowGroups], Couplings],
     ) -> NodeRows:
-        """Compute forces and factors, with a pattern for the rest that depends on the groups of the rows."""
-        cells, active, weights, x, state = carried
-        groups = group_nodes(
-            interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, self.dual
-        )
-        pattern, shapes = choose_pattern(groups), weights[2]
+        """Compute forces and factors on the cells that carry pressures, with the shapes of `weigh` there.
+
+        The pattern of the rest depends on the groups of the rows.
+        """
+        slave, local = interface.slave.segments, cells.local_nodes(interface)
+        groups = group_nodes(interface.n_nodes, slave, cells.slave, local, active, self.dual)
+        pattern = choose_pattern(groups)
         if not isinstance(shapes, ShapedPoints):
             return node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         total, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
@@ -173,7 +137,14 @@ class Mortar:
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        rows = self.weighting.tangent(interface, self._carry(interface, pairing, z))
+        n_nodes = interface.n_slave_nodes
+
+        def choose_pattern(groups: RowGroups) -> Couplings:
+            check_product(groups.starts[: n_nodes + 1])
+            return groups.pattern(0, n_nodes)
+
+        rows = self._rows(interface, pairing, z, choose_pattern)
+        rows.multiply(0, len(rows.groups.starts) - 1)
         return rows.forces, rows.rest
 
     def factors(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Factors:
@@ -182,17 +153,20 @@ class Mortar:
         The assembled tangent is dense on all nodes that face the segments at a slave node. A solver that multiplies by
         the tangent, or that knows the pressures as unknowns of their own, does not need it.
         """
-        return self.weighting.factors(interface, self._carry(interface, pairing, z))
+        return self._rows(interface, pairing, z, RowGroups.pattern_of_cells).factors()
 
-    def _carry(self, interface: Interface, pairing: Pairing, z: FloatArray) -> Carried:
-        """Return the cells that carry pressures, with the pressures of the slave nodes."""
+    def _rows(
+        self, interface: Interface, pairing: Pairing, z: FloatArray, choose_pattern: Callable[[RowGroups], Couplings]
+    ) -> NodeRows:
+        """Compute forces and factors on the cells that carry pressures."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         cells = Cells.from_pairing(pairing).near(active, interface)
-        integrals = self.weighting.weigh(interface, cells, x)
-        areas = np.where(active, integrals[0], 1.0)
-        gaps = np.where(active, integrals[1] / areas, 0.0)
+        areas, with_gap, shapes = self.weighting.weigh(interface, cells, x)
+        areas = np.where(active, areas, 1.0)
+        gaps = np.where(active, with_gap / areas, 0.0)
         weights = np.where(active, -self.penalty, 0.0)
-        return Carried(cells, active, integrals, x, NodeState(weights * gaps, weights, gaps, areas))
+        state = NodeState(weights * gaps, weights, gaps, areas)
+        return self.weighting.rows(interface, cells, active, x, shapes, state, choose_pattern)
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""
@@ -236,9 +210,19 @@ class MortarMultipliers:
         x, multipliers = split_state(interface, z)
         active = pairing["active"]
         cells = Cells.from_pairing(pairing).near(active, interface)
-        derivative, influence, _, d_gaps = self.weighting.saddle(
-            interface, cells, active, x, np.where(active, multipliers, 0.0)
-        )
+        n_nodes, zeros, ones = len(active), np.zeros(len(active)), np.ones(len(active))
+        state = NodeState(np.where(active, multipliers, 0.0), ones, zeros, ones)
+
+        def choose_pattern(groups: RowGroups) -> Couplings:
+            if self.weighting.dual:
+                return groups.pattern(n_nodes, len(groups.starts) - 1)
+            return groups.pattern_of_cells()
+
+        shapes = self.weighting.weigh(interface, cells, x)[2]
+        rows = self.weighting.rows(interface, cells, active, x, shapes, state, choose_pattern)
+        rows.multiply(n_nodes, len(rows.groups.starts) - 1)
+        derivative, left, _, right = rows.factors()
+        influence, d_gaps = left[:n_nodes], right[:n_nodes]
         idle = sparse.diags_array(np.where(active, 0.0, own_lengths(interface, interface.nodes)), format="csr")
         upper = sparse.hstack([derivative, influence.T.tocsr()], format="csr")
         return sparse.vstack([upper, sparse.hstack([-d_gaps, idle], format="csr")], format="csr")
@@ -306,7 +290,6 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
 
 
 def _with_multipliers(traits: Traits) -> Traits:
-    """Return the promises of a penalty method, for multipliers in its place."""
     return traits.revise(
         enforcement="multiplier",
         independent_multipliers=True,
@@ -317,7 +300,6 @@ def _with_multipliers(traits: Traits) -> Traits:
 
 
 def _make(penalty: float, area: str, normals: str, *, dual: bool) -> tuple[Traits, float, Weighting]:
-    """Return the promises of a penalty method, its penalty and its weighting, from checked options."""
     averaged, current = choose("normals", normals, NORMALS), choose("area", area, AREAS)
     kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
     pulls = {"nodal-push": "b"} if dual else {}

@@ -201,23 +201,24 @@ class NodeRows(NamedTuple):
     groups: RowGroups  # The nodes of each row.
     left: FloatArray  # (2 n_members,) The entries of both factors, two for each member of a group.
     right: FloatArray
+    weights: FloatArray  # (n_slave_nodes,) Those of the slave nodes; the rows of segments have the weight one.
 
-    def factors(self, weights: FloatArray) -> Factors:
-        """Return the factors with weights (n_slave_nodes,); the rows of segments have the weight one."""
-        groups, n_unknowns = self.groups, self.rest.shape[1]
-        indptr = (2 * groups.starts).astype(np.int32)
-        indices = (2 * groups.nodes[:, None] + np.arange(2, dtype=np.int32)).ravel()
-        shape = (len(indptr) - 1, n_unknowns)
+    def factors(self) -> Factors:
+        """Return the factors as sparse matrices."""
+        indptr = (2 * self.groups.starts).astype(np.int32)
+        indices = (2 * self.groups.nodes[:, None] + np.arange(2, dtype=np.int32)).ravel()
+        shape = (len(indptr) - 1, self.rest.shape[1])
         left, right = (sparse.csr_array((values, indices, indptr), shape=shape) for values in (self.left, self.right))
-        return Factors(self.rest, left, np.append(weights, np.ones(shape[0] - len(weights))), right)
+        return Factors(self.rest, left, self._all_weights(), right)
 
-    def multiply(self, weights: FloatArray, first_row: int, end_row: int) -> sparse.csr_array:
-        """Add the products of some rows to `rest`, whose pattern must hold their groups, and return it."""
-        groups, rest = self.groups, self.rest
-        all_weights = np.append(weights, np.ones(len(groups.starts) - 1 - len(weights)))
-        factors = self.left, all_weights, self.right
-        _add_products((rest.indptr, rest.indices, rest.data), first_row, end_row, groups.nodes, groups.starts, factors)
-        return rest
+    def multiply(self, first_row: int, end_row: int) -> None:
+        """Add the products of some rows to `rest`, whose pattern must hold their groups."""
+        csr, groups = (self.rest.indptr, self.rest.indices, self.rest.data), self.groups
+        factors = self.left, self._all_weights(), self.right
+        _add_products(csr, first_row, end_row, groups.nodes, groups.starts, factors)
+
+    def _all_weights(self) -> FloatArray:
+        return np.append(self.weights, np.ones(len(self.groups.starts) - 1 - len(self.weights)))
 
 
 @compile_maker

@@ -146,7 +146,7 @@ def node_rows(
     written = forces, (matrix.indptr, matrix.indices, matrix.data), (groups.nodes, groups.starts, left, right)
     at_nodes = state.pressure, state.gaps, state.divisor
     _add_rows(written, x, *cell_arguments(interface, cells, rule), shapes, at_nodes)
-    return NodeRows(forces, matrix, groups, left, right)
+    return NodeRows(forces, matrix, groups, left, right, state.weights)
 
 
 @compile_maker

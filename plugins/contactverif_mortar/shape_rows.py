@@ -194,7 +194,7 @@ def add_shaped_rows(
         _add_points(written, begin * n_q, n_q, n_pushed, places, at_points, variations, at_nodes)
     if dual:
         add_chains(shaped.slave, chain, state.divisor, groups.nodes, groups.starts, right)
-    return NodeRows(total, rest, groups, left, right)
+    return NodeRows(total, rest, groups, left, right, state.weights)
 
 
 @compile_maker

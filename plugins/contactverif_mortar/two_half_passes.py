@@ -161,7 +161,7 @@ class TwoHalfPasses:
             weights = np.where(active, -self.penalty, 0.0)
             state = NodeState(weights * gaps, weights, gaps, areas)
             rows = add_shaped_rows(each.linearize(self.rule, x), of_rows, state, 2, forces, matrix)
-            rows.multiply(weights, 0, interface.n_nodes)
+            rows.multiply(0, interface.n_nodes)
         return forces, matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
@@ -196,7 +196,6 @@ class TwoHalfPasses:
 
 
 def _both_sides(interface: Interface) -> tuple[tuple[str, Sides], ...]:
-    """Return for each half pass its prefix, and the surfaces in their roles."""
     nodes, slave, master = interface.nodes, interface.slave, interface.master
     return (PREFIXES[0], Sides(nodes, slave, master)), (PREFIXES[1], Sides(nodes, master, slave))
 

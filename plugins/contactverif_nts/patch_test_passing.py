@@ -120,7 +120,6 @@ class PatchTestPassing:
         return self._sweep(interface, pairing, z)
 
     def _sweep(self, interface: Interface, pairing: Pairing, z: FloatArray) -> tuple[FloatArray, sparse.csr_array]:
-        """Compute the residual and its exact derivative."""
         state, arguments = split_state(interface, z), self._arguments(interface, pairing, z)
         n_nodes, n_multipliers = interface.n_nodes, len(state[1])
         group, first_multiplier = (1, n_nodes) if n_multipliers else (self.n, NO_NODE)
@@ -269,13 +268,11 @@ def vts_ppt_lm(
 # No promise depends on the penalty, and a formulation is made for the penalty of each case. So promises are kept.
 @cache
 def _promises_as_printed(free_end: int, n: int) -> Traits:
-    """Return the promises of `vts_ppt`."""
     return add_locking(_PRINTED.revise(overhang=free_end == walk.COVER), n)
 
 
 @cache
 def _basic_promises(free_end: int, n: int) -> Traits:
-    """Return the promises of `vts_ppt_basic`."""
     consistent = _promises_as_printed(free_end, n)
     witnesses = {**consistent.evidence.witnesses, "tangent": "offset-c", "newton": "example-1bis"}
     return consistent.revise(tangent="approximate", witnesses=witnesses)

@@ -79,7 +79,6 @@ class TwoPass:
         return Pairing(arrays)
 
     def _tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> sparse.coo_array:
-        """Compute the sum of both tangents, sparse."""
         parts = []
         for each in self._passes(interface):
             part = sparse.coo_array(self._inner.tangent(each.interface, each.part(pairing), z[each.places]))
@@ -108,7 +107,6 @@ class TwoPass:
         return self._last_passes[1]
 
     def _new_passes(self, interface: Interface) -> tuple[Pass, Pass]:
-        """Make both passes of an interface."""
         swapped, positions = interface.swap_roles(), np.arange(interface.n_unknowns)
         n_slave_unknowns = interface.dim * interface.n_slave_nodes
         first, second = (self._inner.n_multipliers(side) for side in (interface, swapped))

@@ -540,7 +540,6 @@ def _add_multiplier(
     owner: NumberArray,
     part: int,
 ) -> None:
-    """Add row and column of the multiplier of a coupling, and its constraint."""
     number, width = nodes[start + n_coupled], 2 * n_coupled
     unknown, is_mine = n_nodes + number, owner[number] == part
     for q in range(n_coupled):

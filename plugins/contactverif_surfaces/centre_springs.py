@@ -186,7 +186,6 @@ def _find_centroid(room: Array, n_corners: int) -> tuple[float, float, float]:
 
 @compile_inline
 def _set_slopes(room: Array) -> None:
-    """Write the slopes of the shape functions of the master face in (s, t)."""
     a_s, a_t = room[MASTER + 1, S] - room[MASTER, S], room[MASTER + 1, T] - room[MASTER, T]
     b_s, b_t = room[MASTER + 2, S] - room[MASTER, S], room[MASTER + 2, T] - room[MASTER, T]
     area = a_s * b_t - a_t * b_s
@@ -292,7 +291,6 @@ def _add_springs(
     cells: IntArray,
     penalty: float,
 ) -> None:
-    """Add the forces of some cells, and their derivative to compressed rows."""
     for number in range(len(cells)):
         nodes, code = members[number], codes[cells[number]]
         point = _place_centre(room, x, nodes[:3], nodes[3:], code)
@@ -525,7 +523,6 @@ def _nodes(pairs: FacePairs) -> tuple[IntArray, IntArray]:
 
 
 def _points(pairs: FacePairs, z: FloatArray) -> CellPoints:
-    """Return the points of all cells, one each."""
     n_cells = len(pairs.codes)
     points, shapes = np.empty((n_cells, 5)), np.empty((n_cells, 6))
     _write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), _nodes(pairs), pairs.codes)

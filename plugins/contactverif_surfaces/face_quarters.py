@@ -60,42 +60,6 @@ PARTS = {n_corners: _quarter(n_corners) for n_corners in (3, 4)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Centres:
-    """The centres of parts of slave faces, each with the master face under it."""
-
-    part: IntArray  # (n,) The number of a part in its face.
-    slave_nodes: IntArray  # (n, n_slave_corners) The nodes of the slave face.
-    nodes: IntArray  # (n, n_corners) These, and the nodes of the master face under the centre.
-
-    @classmethod
-    def of_parts(cls, interface: Interface, parts: IntArray, home: IntArray) -> Centres:
-        """Return the centres of parts (n,), numbered through all slave faces, over the master faces `home` (n,)."""
-        slave = interface.slave.faces[parts // N_PARTS]
-        return cls(parts % N_PARTS, slave, np.concatenate([slave, interface.master.faces[home]], axis=1))
-
-    def points_at(self, z: Array) -> CellPoints:
-        """Return the points at states z (..., n_unknowns), each with the area of its part."""
-        return _centre_points(positions_of(z, self.nodes), PARTS[self.slave_nodes.shape[1]][self.part])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PartCells:
-    """The cells of parts of slave faces with the master faces under them."""
-
-    shares: FloatArray  # (n, corners of a part, n_slave_corners) The corners of the part as shares of the face's.
-    codes: IntArray  # (n, most_corners, 2) See `face_search`.
-    master_nodes: IntArray  # (n, n_master_corners)
-    nodes: IntArray  # (n, n_corners) The nodes of the slave face, then these.
-
-    @classmethod
-    def of_parts(cls, interface: Interface, parts: IntArray, master: IntArray, codes: IntArray) -> PartCells:
-        """Return the cells of parts (n,), numbered through all slave faces, and master faces (n,)."""
-        slave, opposite = interface.slave.faces[parts // N_PARTS], interface.master.faces[master]
-        shares = PARTS[slave.shape[1]][parts % N_PARTS]
-        return cls(shares, codes, opposite, np.concatenate([slave, opposite], axis=1))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class FaceQuarters:
     """The formulation: pressure −ε̂ g of each part of a slave face, where the gap g at its centre is below 0."""
 
@@ -113,44 +77,46 @@ class FaceQuarters:
         home = _find_homes(corners, x[master.faces], faces)
         parts = np.flatnonzero(home >= 0)
         active = np.zeros(len(home), bool)
-        active[parts] = Centres.of_parts(interface, parts, home[parts]).points_at(z).gap[:, 0] < 0
+        shares, nodes = _parts_on_faces(interface, parts, home[parts])
+        active[parts] = _centre_points(positions_of(z, nodes), shares).gap[:, 0] < 0
         return Pairing(
             {"part": faces[:, 0], "master_face": faces[:, 1], "corners": codes, "home": home, "active": active}
         )
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
-        centres, cells, part_of_cell = _in_contact(interface, pairing)
-        on_slave = _press_slave(self.penalty, positions_of(z, centres.nodes), self._shares(centres))
-        pressure = -self.penalty * centres.points_at(z).gap[..., 0]
-        on_master = _unit_master(positions_of(z, cells.nodes), cells.shares, cells.codes)
-        on_master = on_master * pressure[..., part_of_cell, None]
-        forces = add_rows(on_slave, unknowns_of(centres.slave_nodes), z.shape[-1])
-        return forces + add_rows(on_master, unknowns_of(cells.master_nodes), z.shape[-1])
+        (shares, nodes), (cell_shares, cell_nodes), codes, part_of_cell = _in_contact(interface, pairing)
+        n_slave, corners = shares.shape[-1], positions_of(z, nodes)
+        on_slave = _press_slave(self.penalty, corners, shares)
+        pressure = _pressure(self.penalty, corners, shares)[..., 0]
+        on_master = _unit_master(positions_of(z, cell_nodes), cell_shares, codes) * pressure[..., part_of_cell, None]
+        forces = add_rows(on_slave, unknowns_of(nodes[:, :n_slave]), z.shape[-1])
+        return forces + add_rows(on_master, unknowns_of(cell_nodes[:, n_slave:]), z.shape[-1])
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual: on the slave, and on the master at fixed pressures and by these."""
-        centres, cells, part_of_cell = _in_contact(interface, pairing)
-        n, shares = interface.n_unknowns, self._shares(centres)
-        at_centres, at_cells = positions_of(z, centres.nodes), positions_of(z, cells.nodes)
-        pressure = -self.penalty * centres.points_at(z).gap[..., 0]
-        by_nodes, by_cells = unknowns_of(centres.nodes), unknowns_of(cells.nodes)
+        (shares, nodes), (cell_shares, cell_nodes), codes, part_of_cell = _in_contact(interface, pairing)
+        n, n_slave = interface.n_unknowns, shares.shape[-1]
+        at_centres, at_cells = positions_of(z, nodes), positions_of(z, cell_nodes)
+        pressure = _pressure(self.penalty, at_centres, shares)[..., 0]
+        by_nodes, by_cells = unknowns_of(nodes), unknowns_of(cell_nodes)
         on_slave = differentiate(partial(_press_slave, self.penalty), at_centres, shares)
-        fixed = differentiate(_unit_master, at_cells, cells.shares, cells.codes) * pressure[part_of_cell, None, None]
-        units = _unit_master(at_cells, cells.shares, cells.codes)[..., None]
+        fixed = differentiate(_unit_master, at_cells, cell_shares, codes) * pressure[part_of_cell, None, None]
+        units = _unit_master(at_cells, cell_shares, codes)[..., None]
         slopes = differentiate(partial(_pressure, self.penalty), at_centres, shares)
-        rows, columns = unknowns_of(cells.master_nodes), part_of_cell[:, None]
+        rows, columns = unknowns_of(cell_nodes[:, n_slave:]), part_of_cell[:, None]
         by_pressure = add_blocks(units, rows, columns, (n, len(pressure)))
         of_pressure = add_blocks(slopes, np.arange(len(pressure))[:, None], by_nodes, (len(pressure), n))
-        direct = add_blocks(on_slave, unknowns_of(centres.slave_nodes), by_nodes, (n, n))
+        direct = add_blocks(on_slave, unknowns_of(nodes[:, :n_slave]), by_nodes, (n, n))
         return sparse.csr_array(direct + add_blocks(fixed, rows, by_cells, (n, n)) + by_pressure @ of_pressure)
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the centres of all parts that have a master face under them."""
         parts = np.flatnonzero(pairing["home"] >= 0)
         home, active = pairing["home"][parts], pairing["active"][parts]
-        centres = Centres.of_parts(interface, parts, home)
-        points, slave = centres.points_at(z), positions_of(z, centres.slave_nodes)
+        shares, nodes = _parts_on_faces(interface, parts, home)
+        corners = positions_of(z, nodes)
+        points, slave = _centre_points(corners, shares), corners[:, : shares.shape[-1]]
         return ContactPoints.on_faces(
             slave_segment=parts // N_PARTS,
             slave_shape=points.slave_shape[:, 0],
@@ -164,19 +130,30 @@ class FaceQuarters:
             active=active,
         )
 
-    @staticmethod
-    def _shares(centres: Centres) -> FloatArray:
-        """Return the corners of each part as shares of those of its face."""
-        return PARTS[centres.slave_nodes.shape[1]][centres.part]
+
+def _parts_on_faces(interface: Interface, parts: IntArray, master: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return for parts (n,), numbered through all slave faces, and master faces (n,) two arrays.
+
+    The corners of each part as shares of those of its face, (n, corners of a part, n_slave_corners), and the nodes of
+    the slave face, then of the master face (n, n_corners).
+    """
+    slave = interface.slave.faces[parts // N_PARTS]
+    nodes = np.concatenate([slave, interface.master.faces[master]], axis=1)
+    return PARTS[slave.shape[1]][parts % N_PARTS], nodes
 
 
-def _in_contact(interface: Interface, pairing: Pairing) -> tuple[Centres, PartCells, IntArray]:
-    """Return the centres in contact, the cells of their parts, and for each cell the number of its centre."""
+def _in_contact(
+    interface: Interface, pairing: Pairing
+) -> tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray], IntArray, IntArray]:
+    """Return the parts in contact, the same for each of their cells, the codes of the cells, and their parts' numbers.
+
+    A part has the master face under its centre, a cell its own. The numbers count parts in contact.
+    """
     active = pairing["active"]
     parts, in_contact = np.flatnonzero(active), active[pairing["part"]]
     part, master, codes = (pairing[name][in_contact] for name in ("part", "master_face", "corners"))
-    centres = Centres.of_parts(interface, parts, pairing["home"][parts])
-    return centres, PartCells.of_parts(interface, part, master, codes), np.searchsorted(parts, part)
+    centres = _parts_on_faces(interface, parts, pairing["home"][parts])
+    return centres, _parts_on_faces(interface, part, master), codes, np.searchsorted(parts, part)
 
 
 def _centre_points(corners: Array, shares: FloatArray) -> CellPoints:

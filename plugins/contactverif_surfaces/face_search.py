@@ -439,7 +439,6 @@ def grow_tree(boxes: FloatArray) -> Tree:
 
 @compile_kernel
 def _write_keys(keys: IntArray, places: IntArray) -> None:
-    """Interleave the bits of the places (n, 3)."""
     for i in range(len(keys)):
         key = 0
         for bit in range(BITS - 1, -1, -1):
