@@ -52,15 +52,15 @@ if TYPE_CHECKING:  # A name that is imported as itself is one that the package e
     from contactverif.contract.traits import Promises as Promises
     from contactverif.contract.traits import Rules as Rules
     from contactverif.contract.traits import Traits as Traits
-    from contactverif.mechanics.mesh_bodies import body_from_mesh as body_from_mesh
+    from contactverif.mechanics.bodies import Placing as Placing
+    from contactverif.mechanics.bodies import Rectangle as Rectangle
+    from contactverif.mechanics.bodies import block as block
+    from contactverif.mechanics.bodies import body_from_mesh as body_from_mesh
+    from contactverif.mechanics.bodies import rigid_surface as rigid_surface
+    from contactverif.mechanics.newton import End as End
+    from contactverif.mechanics.newton import Trace as Trace
     from contactverif.mechanics.newton import solve as solve
     from contactverif.mechanics.scene import Scene as Scene
-    from contactverif.mechanics.simple_bodies import Placing as Placing
-    from contactverif.mechanics.simple_bodies import Rectangle as Rectangle
-    from contactverif.mechanics.simple_bodies import block as block
-    from contactverif.mechanics.simple_bodies import rigid_surface as rigid_surface
-    from contactverif.mechanics.trace import End as End
-    from contactverif.mechanics.trace import Trace as Trace
     from contactverif.meshes.mesh_file import read_interface as read_interface
     from contactverif.meshes.mesh_scene import read_scene as read_scene
     from contactverif.plugins.registry import load_formulation as load_formulation
@@ -91,10 +91,9 @@ _HOMES = {
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),
     "contract.traits": ("Abilities", "Evidence", "PatchPromises", "Promises", "Rules", "Traits"),
-    "mechanics.mesh_bodies": ("body_from_mesh",),
+    "mechanics.bodies": ("Placing", "Rectangle", "block", "body_from_mesh", "rigid_surface"),
     "mechanics.newton": ("End", "Trace", "solve"),
     "mechanics.scene": ("Scene",),
-    "mechanics.simple_bodies": ("Placing", "Rectangle", "block", "rigid_surface"),
     "meshes.mesh_file": ("read_interface",),
     "meshes.mesh_scene": ("read_scene",),
     "plugins.registry": ("load_formulation", "load_properties"),

@@ -265,7 +265,9 @@ def ending_lines(outcome: Outcome) -> list[str]:
         kind, _, solution = name.partition(", ")
         iterations = details.get(name.replace("end", "iterations", 1))
         if kind == "end" and iterations is not None:
-            from contactverif.mechanics.trace import End  # It brings scipy, and is needed only where a property solved.
+            from contactverif.mechanics.newton import (
+                End,  # It brings scipy, and is needed only where a property solved.
+            )
 
             end = End(int(value))
             words = f"{end.label} after {iterations:g} iteration{'s' * (iterations != 1)}"

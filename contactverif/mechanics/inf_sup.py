@@ -17,7 +17,6 @@ Bathe, Computers & Structures 47 (1993) 537–545.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +48,11 @@ def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bo
     """Return the inf-sup constant of a formulation between two bodies that touch along a straight line."""
     interface = scene.interface
     forces = force_rows(scene, formulation)
-    gaps = _rescale(interface, gap_rows(scene, formulation), forces)
+    gaps = gap_rows(scene, formulation)
+    # Each gap row becomes as large on the slave as its force row, since a constraint may have any factor.
+    n = interface.dim * interface.n_slave_nodes
+    now, then = (np.linalg.norm(rows[:, :n], axis=1) for rows in (gaps, forces))
+    gaps = gaps * (then / np.where(now > 0, now, np.inf))[:, None]
     lengths = mean_node_lengths(interface, forces) if nodal else np.ones(len(forces))  # Unit pressures, not forces.
     on_slave = forces.reshape(len(forces), -1, 2)[:, : interface.n_slave_nodes]
     areas = lengths * np.linalg.norm(on_slave.sum(axis=1), axis=1)
@@ -72,10 +75,9 @@ def force_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
     interface = scene.interface
     state = _pressed_state(interface, formulation)
     n, count = interface.n_unknowns, state.size - interface.n_unknowns
-    pairing = formulation.pair(interface, state)
     states = np.tile(state, (count + 1, 1))
     states[1:, n:] += np.eye(count)
-    forces = np.concatenate([formulation.residual(interface, pairing, part)[:, :n] for part in _batches(states)])
+    forces = _residuals(interface, formulation, state, states)[:, :n]
     rows: FloatArray = forces[1:] - forces[0]
     return rows
 
@@ -88,7 +90,6 @@ def gap_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
     interface = scene.interface
     state = _pressed_state(interface, formulation)
     n, sides = interface.n_unknowns, (interface.slave, interface.master)
-    pairing = formulation.pair(interface, state)
     shortest = min(float(side.lengths(interface.nodes).min()) for side in sides)
     step = shortest * UNIT_ROUNDOFF ** (1 / 3)
     shifts = np.zeros((interface.n_nodes, state.size))
@@ -96,7 +97,7 @@ def gap_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
     for direction in (0, 1):
         shifts[np.arange(interface.n_nodes), 2 * np.arange(interface.n_nodes) + direction] = step * across[direction]
     states = np.concatenate([state + shifts, state - shifts])
-    values = np.concatenate([formulation.residual(interface, pairing, part)[:, n:] for part in _batches(states)])
+    values = _residuals(interface, formulation, state, states)[:, n:]
     derivatives = (values[: interface.n_nodes] - values[interface.n_nodes :]).T / (2 * step)
     rows: FloatArray = (derivatives[:, :, None] * across).reshape(len(derivatives), n)
     return rows
@@ -114,20 +115,15 @@ def mean_node_lengths(interface: Interface, forces: FloatArray) -> FloatArray:
     return means
 
 
-def _rescale(interface: Interface, gaps: FloatArray, forces: FloatArray) -> FloatArray:
-    """Return each gap row as large on the slave as its force row, since a constraint may have any factor."""
-    n = interface.dim * interface.n_slave_nodes
-    now, then = (np.linalg.norm(rows[:, :n], axis=1) for rows in (gaps, forces))
-    rescaled: FloatArray = gaps * (then / np.where(now > 0, now, np.inf))[:, None]
-    return rescaled
-
-
 def _pressed_state(interface: Interface, formulation: CheckedFormulation) -> FloatArray:
     """Return the reference positions with multipliers of 1, so that every point that faces something is active."""
     return np.concatenate([interface.nodes.reshape(-1), np.ones(formulation.n_multipliers(interface))])
 
 
-def _batches(states: FloatArray) -> Iterator[FloatArray]:
-    """Yield the states (n_states, n) in batches."""
-    for start in range(0, len(states), _BATCH):
-        yield states[start : start + _BATCH]
+def _residuals(
+    interface: Interface, formulation: CheckedFormulation, state: FloatArray, states: FloatArray
+) -> FloatArray:
+    """Return the residuals of states (n_states, n), in batches, on the pairing of one state."""
+    pairing = formulation.pair(interface, state)
+    batches = (states[start : start + _BATCH] for start in range(0, len(states), _BATCH))
+    return np.concatenate([formulation.residual(interface, pairing, batch) for batch in batches])

@@ -1,27 +1,219 @@
-"""Newton's method on the unknowns of a scene.
+"""Newton's method on the unknowns of a scene, and the history of a solution.
 
 The method is plain Newton, without line search, as a finite element code would run it with this formulation's tangent.
 The active set is decided anew at each iterate, by the pairing. Only where a tie leaves a singular matrix beside the
-solution, the matrix before is taken once more.
-
-Rule for the next editor: a solution that does not converge is data, not an error. Every iterate is recorded, `End` says
-how the iteration ended, and only a plugin that breaks the contract raises an exception.
+solution, the matrix before is taken once more. A solution that does not converge is data, not an error: every iterate
+is recorded, `End` says how the iteration ended, and only a plugin that breaks the contract raises an exception.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
-from contactverif.mechanics.linear import Step
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
-from contactverif.mechanics.trace import End, Record, Trace, largest_rounding
+
+
+class End(IntEnum):
+    """The way in which Newton's method ended. The numbers are those of a report.
+
+    `label` is short, for a table; `advice` says what happened and what to try next.
+
+    Examples
+    --------
+    >>> from contactverif import End
+    >>> End.CYCLE.label
+    '2-cycle'
+    >>> End.SINGULAR.advice
+    'the matrix has no inverse: is anything in contact? Lower a body until it touches'
+    """
+
+    CONVERGED = 0
+    CYCLE = 1
+    STAGNATED = 2
+    SINGULAR = 3
+    DIVERGED = 4
+    EXHAUSTED = 5
+
+    @property
+    def label(self) -> str:
+        """A few words for a table."""
+        return _TEXTS[self][0]
+
+    @property
+    def advice(self) -> str:
+        """One sentence that says what happened, and what to try next."""
+        return _TEXTS[self][1]
+
+
+_TEXTS = {
+    End.CONVERGED: ("converged", "the residual is down to its own roundoff"),
+    End.CYCLE: ("2-cycle", "two states and their pairings take turns; move the node that sits on a decision"),
+    End.STAGNATED: ("stagnated at roundoff", "the residual stays just above its roundoff; look at cancellation"),
+    End.SINGULAR: ("singular", "the matrix has no inverse: is anything in contact? Lower a body until it touches"),
+    End.DIVERGED: ("diverged", "the iterates left for infinity; try load steps, or a start nearer to the solution"),
+    End.EXHAUSTED: ("out of iterations", "still falling or wandering; try load steps or more iterations"),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """The whole history of a solution by Newton's method, iterate by iterate; `solve` returns it.
+
+    The iterates of all load steps stand in one row. The last entry of each array belongs to the last iterate.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene that was solved.
+    end : End
+        How the iteration ended.
+    u : FloatArray, shape (n_iterates, n_free + n_multipliers)
+        The unknowns: those of the scene, q, and the multipliers behind them.
+    factors : FloatArray, shape (n_iterates,)
+        The share of loads and imposed displacements, 1 in the last load step.
+    residuals : FloatArray, shape (n_iterates,)
+        The largest entry of the residual S q − g + R, a force. With multipliers, the constraint rows count too, each
+        with the factor that makes it comparable, see `contactverif.mechanics.linear.scale_factors`.
+    energies : FloatArray, shape (n_iterates,)
+        |Δu · residual| of the step that was taken from the iterate, an energy; NaN at the last iterate.
+    floors : FloatArray, shape (n_iterates,)
+        The part of the residual that roundoff alone may cause, a force.
+    roundings : FloatArray, shape (n_iterates,)
+        The largest ratio of an entry of the residual to what roundoff may cause in that entry. Up to 1 is converged.
+    changes : IntArray, shape (n_iterates,)
+        The number of entries of the pairing that differ from those of the iterate before; −1 where there is no pairing,
+        or no iterate before.
+    conditions : FloatArray, shape (n_iterates,)
+        An estimate of 1/cond of the matrix, 0 where it has no inverse; NaN at the last iterate.
+    deficiencies : IntArray, shape (n_iterates,)
+        The number of multipliers that were not unique in the step from the iterate; 0 where none was taken.
+    pairings : tuple[Pairing | None, ...]
+        The pairing at each iterate; None if the formulation has none.
+    forces : FloatArray, shape (n_unknowns + n_multipliers,)
+        The residual of the formulation alone at the last iterate.
+
+    Examples
+    --------
+    >>> from contactverif import load_formulation, load_scene, solve
+    >>> scene, subject = load_scene("c-prime"), load_formulation("vts-ppt")
+    >>> trace = solve(scene, subject.for_case(scene.case()))
+    >>> trace.converged, trace.n_iterations, trace.end.label
+    (True, 1, 'converged')
+    >>> stresses = scene.stresses(trace.solution)  # one array (n_cells, n_points, 3) for each body
+    >>> abs(stresses[0][..., 1] + 100.0).max() < 1e-9  # the stress across the interface is minus the pressure
+    np.True_
+    """
+
+    scene: Scene
+    end: End
+    u: FloatArray
+    factors: FloatArray
+    residuals: FloatArray
+    energies: FloatArray
+    floors: FloatArray
+    roundings: FloatArray
+    changes: IntArray
+    conditions: FloatArray
+    deficiencies: IntArray
+    pairings: tuple[Pairing | None, ...]
+    forces: FloatArray
+
+    @property
+    def pairing(self) -> Pairing | None:
+        """The pairing at the last iterate."""
+        return self.pairings[-1]
+
+    @property
+    def converged(self) -> bool:
+        """True if the last iterate is a solution."""
+        return self.end is End.CONVERGED
+
+    @property
+    def n_iterations(self) -> int:
+        """The number of linear systems that were solved."""
+        return int(np.isfinite(self.energies).sum())
+
+    @property
+    def q(self) -> FloatArray:
+        """The unknowns of the scene at each iterate (n_iterates, n_free)."""
+        return self.u[:, : self.scene.n_free]
+
+    @property
+    def solution(self) -> FloatArray:
+        """The unknowns of the scene at the last iterate (n_free,)."""
+        last: FloatArray = self.q[-1]
+        return last
+
+    @property
+    def multipliers(self) -> FloatArray:
+        """The multipliers at the last iterate (n_multipliers,)."""
+        return self.u[-1, self.scene.n_free :]
+
+    @property
+    def deficiency(self) -> int:
+        """The largest number of multipliers that were not unique in a step."""
+        return int(self.deficiencies.max(initial=0))
+
+    @property
+    def z(self) -> FloatArray:
+        """The state of the interface at the last iterate: positions (n_unknowns,), then multipliers."""
+        return np.concatenate([self.scene.positions(self.solution, float(self.factors[-1])), self.multipliers])
+
+
+@dataclass(slots=True)
+class Record:
+    """The trace of a solution that is still running."""
+
+    u: list[FloatArray] = field(default_factory=list)
+    factors: list[float] = field(default_factory=list)
+    residuals: list[float] = field(default_factory=list)
+    energies: list[float] = field(default_factory=list)
+    floors: list[float] = field(default_factory=list)
+    roundings: list[float] = field(default_factory=list)
+    changes: list[int] = field(default_factory=list)
+    conditions: list[float] = field(default_factory=list)
+    deficiencies: list[int] = field(default_factory=list)
+    pairings: list[Pairing | None] = field(default_factory=list)
+    forces: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    def add(
+        self, u: FloatArray, factor: float, residual: FloatArray, floor: FloatArray, comparable: Any, changes: int
+    ) -> None:
+        """Add an iterate. `comparable` are the factors (n,) of the entries of the residual, or one for all."""
+        self.u.append(u)
+        self.factors.append(factor)
+        self.residuals.append(float(np.abs(comparable * residual).max(initial=0.0)))
+        self.floors.append(float((comparable * floor).max(initial=0.0)))
+        self.roundings.append(largest_rounding(residual, floor))
+        self.changes.append(changes)
+        self.energies.append(np.nan)
+        self.conditions.append(np.nan)
+        self.deficiencies.append(0)
+
+    def trace(self, scene: Scene, end: End) -> Trace:
+        """Return the trace of the iterates so far."""
+        names = ("factors", "residuals", "energies", "floors", "roundings", "conditions", "forces")
+        arrays: dict[str, Any] = {name: freeze(getattr(self, name), np.float64) for name in names}
+        arrays |= {name: freeze(getattr(self, name), np.int64) for name in ("changes", "deficiencies")}
+        u = freeze(np.array(self.u), np.float64)
+        return Trace(scene, end, u, pairings=tuple(self.pairings), **arrays)
+
+
+def largest_rounding(residual: FloatArray, floor: FloatArray) -> float:
+    """Return the largest ratio of an entry of the residual (n,) to what roundoff may cause in it."""
+    with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
+        roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
+    return float(roundings.max(initial=0.0))
+
 
 MAX_ITERATIONS = 40
 STAGNATION_ITERATIONS = 4  # Newton's method stagnates if the residual has not decreased in so many iterations.
@@ -126,7 +318,7 @@ def _load_step(
     floor = np.zeros(system.size)
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
-        if not _is_near(u[:n_free], u, size):
+        if not np.isfinite(u).all() or np.abs(u[:n_free]).max(initial=0.0) > DIVERGENCE_FACTOR * size:
             return End.DIVERGED, u  # No plugin is called for such a state.
         pairing = system.pair(u)
         share = tolerance * (iteration > 0)
@@ -139,7 +331,9 @@ def _load_step(
         if system.is_balanced(residual, forces, share):
             record.add(u, system.factor, residual, floor, 1.0, changes)
             return End.CONVERGED, u
-        keeps = keep_matrix and _falls_fast(record, first, residual, floor)
+        # The matrix is kept while a residual is small enough against the last one of this load step.
+        falls = len(record.u) > first and largest_rounding(residual, floor) <= record.roundings[-1] / KEPT_FALL
+        keeps = keep_matrix and falls
         if not keeps:
             contact = system.contact_stiffness(u, pairing, tangent)
         matrix, floor = system.stiffness + contact, system.floor(u, contact, forces)
@@ -150,37 +344,19 @@ def _load_step(
             return end, u
         if iteration == iterations:
             return End.EXHAUSTED, u
-        step, last = _solve_for_step(system, matrix, last, -residual, floor, record.roundings[-1])
+        step = system.step(matrix, -residual, floor)
+        if step.change is None and last is not None and record.roundings[-1] <= NEAR_CONVERGENCE:
+            # Near the solution of a tie, where the residual is some units of its floor, roundoff decides who faces
+            # whom. If that leaves a singular matrix, the one before is as right.
+            step = system.step(last, -residual, floor)
+        else:
+            last = matrix
         record.conditions[-1], record.deficiencies[-1] = step.condition, step.deficiency
         if step.change is None:
             return End.SINGULAR, u
         record.energies[-1] = abs(float(step.change @ residual))
         u, before = u + step.change, pairing
     raise AssertionError("the loop returns")
-
-
-def _solve_for_step(
-    system: System, matrix: Any, last: Any, right: FloatArray, floor: FloatArray, rounding: float
-) -> tuple[Step, Any]:
-    """Return the step of a matrix (n, n), and that matrix.
-
-    Near the solution of a tie, where the residual is some `rounding` of its floor, roundoff decides who faces whom. If
-    that leaves a singular matrix, the one before, `last`, is as right.
-    """
-    step = system.step(matrix, right, floor)
-    if step.change is None and last is not None and rounding <= NEAR_CONVERGENCE:
-        return system.step(last, right, floor), last
-    return step, matrix
-
-
-def _is_near(q: FloatArray, u: FloatArray, size: float) -> bool:
-    """Return whether the unknowns u are finite, and the displacements q no longer than the interface many times."""
-    return bool(np.isfinite(u).all() and np.abs(q).max(initial=0.0) <= DIVERGENCE_FACTOR * size)
-
-
-def _falls_fast(record: Record, first: int, residual: FloatArray, floor: FloatArray) -> bool:
-    """Return whether a residual (n,) is small enough against the last one of this load step to keep the matrix."""
-    return len(record.u) > first and largest_rounding(residual, floor) <= record.roundings[-1] / KEPT_FALL
 
 
 def _end(record: Record, first: int, n_free: int, *, keeps: bool) -> End | None:
@@ -192,20 +368,15 @@ def _end(record: Record, first: int, n_free: int, *, keeps: bool) -> End | None:
         return End.CONVERGED
     if not np.isfinite(residuals[-1]) or residuals[-1] > DIVERGENCE_FACTOR * max(residuals[0], record.floors[first]):
         return End.DIVERGED
-    if _alternates([u[:n_free] for u in record.u[first:]]) and min(roundings[-4:]) > NEAR_CONVERGENCE:
-        return End.CYCLE
+    q = [u[:n_free] for u in record.u[first:][-5:]]
+    if len(q) > 4 and min(roundings[-4:]) > NEAR_CONVERGENCE:
+        returns = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)]
+        if max(returns) <= 2.0**-20 * np.abs(q[-1] - q[-2]).max():  # Two states alternate.
+            return End.CYCLE
     earlier, latest = roundings[:-STAGNATION_ITERATIONS], roundings[-STAGNATION_ITERATIONS:]
     if earlier and min(latest) >= min(earlier) <= NEAR_CONVERGENCE:
         return End.STAGNATED
     return None
-
-
-def _alternates(q: list[FloatArray]) -> bool:
-    """Return whether the last four iterates are two states that alternate."""
-    if len(q) <= 4:
-        return False
-    returns = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)]
-    return bool(max(returns) <= 2.0**-20 * np.abs(q[-1] - q[-2]).max())
 
 
 def _count_changes(pairing: Pairing | None, before: Pairing | None) -> int:

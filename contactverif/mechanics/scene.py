@@ -1,27 +1,29 @@
-"""A scene: elastic bodies around an interface.
+"""A scene: elastic bodies around an interface, condensed or whole, packed into a case, or posed to another code.
 
 Symbols: q are the unknowns of a scene, the free components of the nodes on the contact boundaries; S is the stiffness
 and g the load of the bodies, condensed onto q; z are the positions of the interface's nodes.
 
-Rules for the next editor: a body that no other can reach is no part of the interface and has none of the unknowns, so
-nothing of it is visited while contact is solved. A case that holds a scene gives the same scene back to the last bit.
+A body that no other can reach is no part of the interface and has none of the unknowns, so nothing of it is visited
+while contact is solved. A case that holds a scene gives the same scene back to the last bit. Whatever a code is spared,
+such as inclined axes, is undone here, so that its answer is measured on the scene itself.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections import OrderedDict
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.case import BODIES, Case
-from contactverif.contract.engine import SceneArrays
+from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.mechanics.bulk import (
@@ -29,13 +31,110 @@ from contactverif.mechanics.bulk import (
     DENSE_LIMIT,
     DENSE_SHARE,
     CondensedBody,
+    assemble_stiffness,
     condense,
     forget_condensed,
     free_on_contact,
     loose_modes,
 )
-from contactverif.mechanics.packed_bodies import body_name, pack_bodies, unpack_bodies
-from contactverif.mechanics.scene_arrays import Pose, pose_bodies
+
+_SAME = 64 * UNIT_ROUNDOFF  # Coordinates that differ by less, over the largest one, were equal before they were turned.
+
+
+def pack_bodies(bodies: Sequence[Body], slave: Sequence[int]) -> dict[str, FloatArray]:
+    """Return all bodies in a few arrays of floats, whose integers are exact; a triangle has −1 for its fourth node."""
+    counts = [len(body.nodes) for body in bodies]
+    first = np.cumsum([0, *counts[:-1]]).tolist()
+    contact = [body.contact + start for body, start in zip(bodies, first, strict=True)]
+    cells = np.full((sum(len(body.cells) for body in bodies), 4), -1.0)
+    row = 0
+    for body, start in zip(bodies, first, strict=True):
+        n_cells, n_corners = body.cells.shape
+        cells[row : row + n_cells, :n_corners] = body.cells + start
+        row += n_cells
+    stacks = {name: np.vstack([getattr(body, name) for body in bodies]) for name in ("nodes", "imposed", "load")}
+    rows = {name: np.array([getattr(body, name) for body in bodies]) for name in ("young", "poisson", "axis", "start")}
+    return {
+        "nodes": stacks["nodes"],
+        "cells": cells,
+        "contact": np.vstack(contact).astype(np.float64),
+        "fixed": np.vstack([body.fixed for body in bodies]).astype(np.float64),
+        "imposed": stacks["imposed"],
+        "load": stacks["load"],
+        "count": np.array(counts, dtype=np.float64),
+        "is_slave": np.array([index in slave for index in range(len(bodies))], dtype=np.float64),
+        **rows,
+    }
+
+
+def unpack_bodies(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], tuple[int, ...], tuple[int, ...]]:
+    """Return bodies, slave indices and master indices from the arrays that `pack_bodies` made."""
+    count = packed["count"].astype(np.int64)
+    ends = np.cumsum(count).tolist()
+    cells, contact = (packed[name].astype(np.int64) for name in ("cells", "contact"))
+    bodies = []
+    for index, (start, end) in enumerate(zip([0, *ends], ends, strict=False)):
+        corners = cells[(cells[:, 0] >= start) & (cells[:, 0] < end)] if len(cells) else cells.reshape(0, 4)
+        corners = corners[:, :3] if len(corners) and (corners[:, 3] < 0).all() else corners
+        bodies.append(
+            Body(
+                nodes=packed["nodes"][start:end],
+                cells=corners - start,
+                contact=contact[(contact[:, 0] >= start) & (contact[:, 0] < end)] - start,
+                young=float(packed["young"][index]),
+                poisson=float(packed["poisson"][index]),
+                fixed=packed["fixed"][start:end] != 0,
+                imposed=packed["imposed"][start:end],
+                load=packed["load"][start:end],
+                axis=packed["axis"][index],
+                start=packed["start"][index],
+                name=body_name(packed["is_slave"], index),
+            )
+        )
+    slave = np.flatnonzero(packed["is_slave"] != 0)
+    master = np.flatnonzero(packed["is_slave"] == 0)
+    return tuple(bodies), tuple(slave.tolist()), tuple(master.tolist())
+
+
+def body_name(is_slave: FloatArray, index: int) -> str:
+    """Return "slave" or "master", with a number where there are several."""
+    same = np.flatnonzero(is_slave == is_slave[index])
+    side = "slave" if is_slave[index] else "master"
+    return side if len(same) == 1 else f"{side} {int(np.searchsorted(same, index)) + 1}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Bodies as they are posed to a code: their arrays, and how an answer goes back to them."""
+
+    arrays: SceneArrays
+    turn: FloatArray  # (2, 2): from the axes of the arrays to those of the bodies.
+    lowered: FloatArray  # (n_nodes, 2): by how much nodes were moved beforehand, in the axes of the arrays.
+    scale: float  # The factor of all loads and imposed displacements.
+
+    def restore(self, answer: EngineAnswer) -> EngineAnswer:
+        """Return an answer for the bodies as they were: in global axes, and under their own loads."""
+        forces, pressures = answer.contact_forces, answer.pressures
+        return replace(
+            answer,
+            displacements=(self.lowered + answer.displacements) / self.scale @ self.turn.T,
+            contact_forces=None if forces is None else forces / self.scale @ self.turn.T,
+            pressures=None if pressures is None else pressures / self.scale,
+        )
+
+
+def _turn_back(nodes: FloatArray, turn: FloatArray) -> FloatArray:
+    """Return places (n, 2) in the axes of a rotation; coordinates that rounding alone tells apart become equal."""
+    upright = nodes @ turn
+    if (np.abs(turn) == np.eye(2)).all():
+        return upright
+    rounding = _SAME * float(np.abs(upright).max())
+    for column in upright.T:
+        order = np.argsort(column)
+        groups = np.cumsum(np.diff(column[order], prepend=column[order[0]]) > rounding)
+        firsts = np.flatnonzero(np.diff(groups, prepend=-1))
+        column[order] = column[order][firsts][groups]
+    return upright
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +370,41 @@ class Scene:
         MisuseError
             If it is to be upright, and its bodies have different axes.
         """
-        return pose_bodies(self.bodies, self.slave, self.penalty, upright=upright, lowered=lowered, scale=scale)
+        bodies = self.bodies
+        if upright and any((body.frame != bodies[0].frame).any() for body in bodies):
+            raise MisuseError("upright", "bodies with different axes", "bodies that have the same axes")
+        turn = bodies[0].frame if upright else np.eye(2)
+        packed = pack_bodies(bodies, self.slave)
+        body_of_node = np.repeat(np.arange(len(bodies)), packed["count"].astype(np.int64))
+        cells, contact = (packed[name].astype(np.int64) for name in ("cells", "contact"))
+        is_slave = packed["is_slave"][body_of_node[contact[:, 0]]] != 0
+        nodes = _turn_back(packed["nodes"], turn) if upright else packed["nodes"]
+
+        def at_nodes(starts: list[FloatArray]) -> FloatArray:
+            pairs = zip(bodies, starts, strict=True)
+            return np.vstack([np.broadcast_to(s @ body.frame.T, body.nodes.shape) for body, s in pairs]) @ turn
+
+        moves = at_nodes([body.start for body in bodies])
+        loose = at_nodes([np.where(body.fixed.any(axis=0), 0.0, body.start) for body in bodies])
+        moved = scale * loose if lowered else np.zeros_like(nodes)
+        arrays = SceneArrays(
+            nodes=nodes + moved,
+            cells=cells,
+            body_of_cell=body_of_node[cells[:, 0]] if len(cells) else np.zeros(0, np.int64),
+            body_of_node=body_of_node,
+            slave=contact[is_slave],
+            master=contact[~is_slave],
+            fixed=packed["fixed"] != 0,
+            imposed=packed["imposed"] * scale,
+            load=packed["load"] * scale,
+            start=scale * moves - moved,
+            axes=np.tile([1.0, 0.0], (len(bodies), 1)) if upright else packed["axis"],
+            young=packed["young"],
+            poisson=packed["poisson"],
+            penalty=self.penalty,
+            unit=max(float(np.ptp(body.nodes, axis=0).max()) for body in bodies),
+        )
+        return Pose(arrays, turn, moved, scale)
 
     def arrays(self, *, upright: bool = False, lowered: bool = False) -> SceneArrays:
         """Return the scene as plain arrays, which any contact code can read, see `pose`."""
@@ -350,3 +483,44 @@ def _solve_alone(condensed: CondensedBody, factor: float) -> FloatArray:
         raise MisuseError(f"supports of {condensed.body.name}", actual, "supports against every motion")
     alone: FloatArray = modes @ (modes.T @ (factor * condensed.load) / stiffnesses)
     return alone
+
+
+@dataclass(frozen=True, eq=False)
+class WholeScene(Scene):
+    """A scene whose unknowns are all free components of its bodies. `solve` takes it like any other scene."""
+
+    @classmethod
+    def of_scene(cls, scene: Scene) -> WholeScene:
+        """Return the same scene, uncondensed."""
+        return cls(scene.bodies, scene.slave, scene.master, scene.penalty, scene.facts, scene.name)
+
+    @cached_property
+    def unknowns(self) -> tuple[IntArray, ...]:
+        """The unknowns of each body within reach: 2 × node + component of all that is free."""
+        return tuple(np.flatnonzero(~self.bodies[index].fixed.reshape(-1)) for index in self.bodies_in_reach)
+
+    @cached_property
+    def stiffness(self) -> FloatArray | sparse.csr_array:
+        """The stiffness (n_free, n_free) of all bodies within reach: dense if it is small, else sparse."""
+        blocks = [rows[:, free] for rows, free in zip(self._rows, self.unknowns, strict=True)]
+        matrix = sparse.csr_array(sparse.block_diag(blocks))
+        return dense(matrix) if self.n_free <= DENSE_LIMIT else matrix
+
+    @cached_property
+    def load(self) -> FloatArray:
+        """The load (n_free,), a force: that of nodal forces and of imposed displacements."""
+        bodies = (self.bodies[index] for index in self.bodies_in_reach)
+        parts = zip(bodies, self._rows, self.unknowns, strict=True)
+        return np.concatenate(
+            [body.load.reshape(-1)[free] - rows @ body.imposed.reshape(-1) for body, rows, free in parts]
+        )
+
+    @cached_property
+    def _rows(self) -> tuple[Any, ...]:
+        """The rows (n_unknowns, 2 n_nodes) of the stiffness of each body within reach."""
+        rows = []
+        for index, free in zip(self.bodies_in_reach, self.unknowns, strict=True):
+            body = self.bodies[index]
+            nothing = (2 * len(body.nodes),) * 2
+            rows.append(sparse.csr_array(nothing if body.rigid else assemble_stiffness(body)[0])[free])
+        return tuple(rows)

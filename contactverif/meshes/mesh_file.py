@@ -1,14 +1,14 @@
 """A user's own mesh file becomes an `Interface`: the lines of two named groups, each with its body on the left.
 
-meshio reads the file, so a format is read as well as meshio reads it; `plain_mesh` says how.
-
-Rule for the next editor: whatever a mesh from elsewhere may have wrong is found here, before an `Interface` sees it,
-and is said in terms of the options of the command line.
+In space it is the triangles or quadrilaterals of two groups, each seen from outside its body. Whatever a mesh from
+elsewhere may have wrong is found here, before an `Interface` sees it, and is said in terms of the options of the
+command line.
 """
 
 from __future__ import annotations
 
 import sys
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,10 +16,12 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface
-from contactverif.meshes.mesh_groups import Group, groups_of, kinds_in, unknown_group_error
-from contactverif.meshes.plain_mesh import PlainMesh, read_mesh
-from contactverif.meshes.surface_mesh import FLAT, is_in_space, surfaces_of
+from contactverif.contract.faces import TRIANGLE, turns_of
+from contactverif.contract.interface import ONE_SIDED, Interface, Surface
+from contactverif.meshes.plain_mesh import Group, PlainMesh, groups_of, kinds_in, read_mesh, unknown_group_error
+
+FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
+_CORNERS = {"triangle": 3, "quad": 4}  # Numbers of corners.
 
 
 def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = False) -> Interface:
@@ -53,11 +55,9 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
 
         interface = read_interface("punch.msh", slave="punch", master="base")
     """
-    _check_names(slave, master)
-    mesh = read_mesh(path)
-    groups = groups_of(mesh)
-    if any(is_in_space(mesh, groups, name) for name in (slave, master)):
-        interface = surfaces_of(mesh, groups, (slave, master), flip=flip)
+    mesh, groups, in_space = _read_groups(path, slave, master)
+    if in_space:
+        interface = _surfaces_of(mesh, groups, (slave, master), flip=flip)
     else:
         sides = _sides_of(mesh, groups, slave=slave, master=master, flip=flip)
         interface = _renumber(sides.points, sides.slave, sides.master)
@@ -66,9 +66,13 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
     return interface
 
 
-def _check_names(slave: str, master: str) -> None:
+def _read_groups(path: str | Path, slave: str, master: str) -> tuple[PlainMesh, dict[str, Group], bool]:
+    """Return a mesh, its groups, and whether that of the slave or of the master consists of faces in space."""
     if slave == master:
         raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
+    mesh = read_mesh(path)
+    groups = groups_of(mesh)
+    return mesh, groups, any(_is_in_space(mesh, groups, name) for name in (slave, master))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,31 +88,32 @@ class MeshSides:
 
 def read_sides(path: str | Path, *, slave: str, master: str, flip: bool) -> MeshSides:
     """Read the lines of two groups, oriented; the arguments and errors are those of `read_interface`."""
-    _check_names(slave, master)
-    mesh = read_mesh(path)
-    groups = groups_of(mesh)
-    if any(is_in_space(mesh, groups, name) for name in (slave, master)):
+    mesh, groups, in_space = _read_groups(path, slave, master)
+    if in_space:
         raise MisuseError("--mesh", "faces in space", "lines in a plane: bodies in space are not solved")
     return _sides_of(mesh, groups, slave=slave, master=master, flip=flip)
 
 
 def _sides_of(mesh: PlainMesh, groups: dict[str, Group], *, slave: str, master: str, flip: bool) -> MeshSides:
     """Return the lines of two groups, oriented."""
-    names = (("--slave", slave), ("--master", master))
     points = _planar(mesh)
-    named = [(argument, _lines(mesh, groups, argument, name)) for argument, name in names]
+    named = [
+        (argument, _lines(mesh, groups, argument, name))
+        for argument, name in (("--slave", slave), ("--master", master))
+    ]
     shared = np.intersect1d(named[0][1], named[1][1])
     if len(shared):
         actual = f"a node of the slave surface too, at {describe_place(points, shared[0])}"
         raise MisuseError("--master", actual, "surfaces without a common node")
     inside = _directed_edges(mesh, points)
-    oriented = [_orient(argument, lines, inside, points) for argument, lines in named]
-    if flip:
-        every = all(by_cells.all() for _, by_cells in oriented)
-        oriented = [
-            (np.where((every | ~by_cells)[:, None], lines[:, ::-1], lines), by_cells) for lines, by_cells in oriented
-        ]
-    return MeshSides(mesh, points, groups, oriented[0][0], oriented[1][0])
+    oriented = [_orient_lines(argument, lines, inside, points) for argument, lines in named]
+    return MeshSides(mesh, points, groups, *_flip(oriented, flip=flip))
+
+
+def _flip(oriented: list[tuple[IntArray, BoolArray]], *, flip: bool) -> list[IntArray]:
+    """Return the corners of both sides; `flip` turns what has no cells beside it, or all if everything has some."""
+    every = all(by_cells.all() for _, by_cells in oriented)
+    return [np.where((flip & (every | ~by_cells))[:, None], side[:, ::-1], side) for side, by_cells in oriented]
 
 
 def check_facing(interface: Interface) -> None:
@@ -199,7 +204,7 @@ def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
     return np.unique(np.concatenate(edges))
 
 
-def _orient(argument: str, lines: IntArray, inside: IntArray, points: FloatArray) -> tuple[IntArray, BoolArray]:
+def _orient_lines(argument: str, lines: IntArray, inside: IntArray, points: FloatArray) -> tuple[IntArray, BoolArray]:
     """Reverse lines (n_lines, 2) so that each chain runs one way with its body on the left.
 
     The cells inside show the side, by their directed edges. The second array (n_lines,) says for which lines they do.
@@ -275,4 +280,150 @@ def _renumber(points: FloatArray, slave: IntArray, master: IntArray) -> Interfac
 
 def describe_place(points: FloatArray, node: int) -> str:
     """Return the position of a node in words."""
-    return f"({points[node, 0]:g}, {points[node, 1]:g})"
+    return f"({', '.join(f'{part:g}' for part in points[node])})"
+
+
+def _is_in_space(mesh: PlainMesh, groups: dict[str, Group], name: str) -> bool:
+    """Return whether a mesh lies in no plane of constant z, and a group of it has faces and no lines."""
+    if mesh.points.shape[1] == 2 or name not in groups:
+        return False
+    dims = {block.dim for block, members in zip(mesh.cells, groups[name], strict=True) if members.any()}
+    if 2 not in dims or 1 in dims:
+        return False
+    used = np.unique(np.concatenate([block.data.reshape(-1) for block in mesh.cells]))
+    extent = np.ptp(mesh.points[used], axis=0)
+    return bool(extent[2] > FLAT * extent.max())
+
+
+def _surfaces_of(mesh: PlainMesh, groups: dict[str, Group], names: tuple[str, str], *, flip: bool) -> Interface:
+    """Return the interface of the faces of two groups, slave first, each face seen from outside its body.
+
+    Volume cells beside faces show on which side the body lies. Faces that hang together without any run as the first of
+    them in the file.
+    """
+    arguments = "--slave", "--master"
+    sides = [_faces(mesh, groups, argument, name) for argument, name in zip(arguments, names, strict=True)]
+    shared = np.intersect1d(sides[0], sides[1])
+    if len(shared):
+        actual = f"a node of the slave surface too, at {describe_place(mesh.points, shared[0])}"
+        raise MisuseError("--master", actual, "surfaces without a common node: two nodes where the bodies touch")
+    if not np.isfinite(mesh.points[np.unique(np.concatenate([side.reshape(-1) for side in sides]))]).all():
+        raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
+    oriented = [_orient_faces(argument, mesh, faces) for argument, faces in zip(arguments, sides, strict=True)]
+    interface = _renumber(mesh.points, *_flip(oriented, flip=flip))
+    _check_facing_in_space(interface)
+    return interface
+
+
+def _faces(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
+    """Return the corners (n_faces, 3 or 4) of the faces of a group, in the order of the file."""
+    if name not in groups:
+        raise unknown_group_error(mesh, groups, argument, name)
+    group = groups[name]
+    kinds = kinds_in(mesh, group)
+    if len(kinds) != 1 or kinds[0] not in _CORNERS:
+        needed = "triangles alone or quadrilaterals alone, at first order (Gmsh: recombine a whole surface, or none)"
+        raise MisuseError(argument, f"{name!r} with elements {', '.join(kinds) or 'none'}", needed)
+    parts = [
+        np.where(members[:, None] < 0, block.data[:, ::-1], block.data)[members != 0]
+        for block, members in zip(mesh.cells, group, strict=True)
+        if block.type == kinds[0]
+    ]
+    faces: IntArray = np.concatenate(parts)
+    if len(np.unique(np.sort(faces, axis=1), axis=0)) < len(faces):
+        raise MisuseError(argument, "the same face twice", "each face once")
+    return faces
+
+
+def _orient_faces(argument: str, mesh: PlainMesh, faces: IntArray) -> tuple[IntArray, BoolArray]:
+    """Turn faces (n_faces, n_corners) so that all are seen from outside the body.
+
+    The second array (n_faces,) says of which a volume cell shows the body.
+    """
+    neighbours = _neighbours(argument, mesh.points, faces)
+    outward = _outward(argument, mesh, faces)
+    turned, by_cells = np.zeros(len(faces), dtype=bool), np.zeros(len(faces), dtype=bool)
+    visited = np.zeros(len(faces), dtype=bool)
+    for first in range(len(faces)):
+        if visited[first]:
+            continue
+        visited[first], queue, patch = True, deque([first]), [first]
+        while queue:
+            face = queue.popleft()
+            for other, same_way in neighbours[face]:
+                if not visited[other]:
+                    visited[other], turned[other] = True, turned[face] ^ same_way
+                    queue.append(other)
+                    patch.append(other)
+                elif turned[other] != turned[face] ^ same_way:
+                    place = describe_place(mesh.points, faces[other, 0])
+                    raise MisuseError(argument, f"a surface with one side, at {place}", "the surface of a body")
+        signs = outward[patch] * np.where(turned[patch], -1, 1)
+        if signs.min() < 0 < signs.max():
+            place = describe_place(mesh.points, faces[np.array(patch)[signs < 0][0], 0])
+            raise MisuseError(
+                argument, f"a surface that changes the side of its body, at {place}", "one body on one side"
+            )
+        turned[patch] ^= bool(signs.min() < 0)
+        by_cells[patch] = bool(signs.any())
+    return np.where(turned[:, None], faces[:, ::-1], faces), by_cells
+
+
+def _neighbours(argument: str, points: FloatArray, faces: IntArray) -> list[list[tuple[int, bool]]]:
+    """Return for each face its neighbours, and whether both run the same way along their edge: one is turned then."""
+    owners: dict[tuple[int, int], list[tuple[int, bool]]] = {}
+    for face, corners in enumerate(faces.tolist()):
+        for start, end in zip(corners, [*corners[1:], corners[0]], strict=True):
+            owners.setdefault((min(start, end), max(start, end)), []).append((face, start < end))
+    neighbours: list[list[tuple[int, bool]]] = [[] for _ in faces]
+    for edge, those in owners.items():
+        if len(those) > 2:
+            place = describe_place(points, edge[0])
+            raise MisuseError(argument, f"{len(those)} faces on one edge, at {place}", "at most two faces on an edge")
+        if len(those) == 2:
+            (first, way), (second, other_way) = those
+            neighbours[first].append((second, way == other_way))
+            neighbours[second].append((first, way == other_way))
+    return neighbours
+
+
+def _outward(argument: str, mesh: PlainMesh, faces: IntArray) -> IntArray:
+    """Return 1 for each face that is seen from outside of the volume cell beside it, −1 from inside, 0 without any."""
+    at_node: dict[int, set[tuple[int, int]]] = {}
+    for number, block in enumerate(mesh.cells):
+        if block.dim == 3:
+            touching = np.isin(block.data, faces)
+            for cell, place in zip(*np.nonzero(touching & (touching.sum(axis=1) >= TRIANGLE)[:, None]), strict=True):
+                at_node.setdefault(int(block.data[cell, place]), set()).add((number, int(cell)))
+    signs = np.zeros(len(faces), dtype=np.int64)
+    for face, corners in enumerate(faces.tolist()):
+        beside = set.intersection(*(at_node.get(node, set()) for node in corners))
+        if len(beside) > 1:
+            place = describe_place(mesh.points, corners[0])
+            raise MisuseError(
+                argument, f"a face with cells on both sides, at {place}", "faces on the boundary of a body"
+            )
+        for number, cell in beside:
+            places = mesh.points[corners]
+            way = mesh.points[mesh.cells[number].data[cell]].mean(axis=0) - places.mean(axis=0)
+            signs[face] = -int(np.sign(turns_of(places[None]).sum(axis=1)[0] @ way))
+    return signs
+
+
+def _check_facing_in_space(interface: Interface) -> None:
+    """Refuse two surfaces whose mean normals, weighted by area, do not oppose each other; a closed one has none."""
+    normals = []
+    for surface in (interface.slave, interface.master):
+        turns = turns_of(interface.nodes[surface.faces]).sum(axis=1)
+        normals.append(turns.sum(axis=0) / np.linalg.norm(turns, axis=1).sum())
+    slave, master = normals
+    if slave @ master < 0 or min(np.linalg.norm(normals, axis=1)) < ONE_SIDED:
+        return
+    words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in normals]
+    raise MisuseError(
+        "--mesh",
+        f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other",
+        "surfaces that face each other, each seen from outside its body. Keep the volume cells in the file, they tell "
+        "the side; or give --flip where only one surface has cells beside it (it turns the faces without cells, and "
+        "both surfaces where neither or each has cells)",
+    )

@@ -21,6 +21,7 @@ from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
+from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
 from contactverif.meshes.mesh_file import (
     MeshSides,
@@ -29,7 +30,7 @@ from contactverif.meshes.mesh_file import (
     describe_place,
     read_sides,
 )
-from contactverif.meshes.mesh_groups import unknown_group_error
+from contactverif.meshes.plain_mesh import unknown_group_error
 
 YOUNG, POISSON = 1.0, 0.3  # The material of a body that the user says nothing about.
 STIFFNESS = 1.0  # The distributed stiffness ε̂ h / E of a scene, soft enough for Newton's method on bent surfaces.
@@ -90,7 +91,9 @@ def read_scene(
     parts = _parts(sides)
     _set_materials(sides, parts, materials or {})
     _set_supports(sides, parts, supports or {})
-    _hold_others(parts)
+    for part in parts:
+        if len(part.cells) and not part.has_supports:
+            part.fixed[_far_nodes(part)] = True
     scene = _scene(parts)
     check_facing(scene.interface)
     if not any(part.imposed.any() for part in parts):
@@ -145,7 +148,7 @@ class _Part:
 
 def _parts(sides: MeshSides) -> list[_Part]:
     """Return the bodies that slave or master lines belong to, slaves first, without material and supports."""
-    blocks = [_turn_counter_clockwise(sides.points, corners) for corners in corners_of_cells(sides.mesh)]
+    blocks = [turn_counter_clockwise(sides.points, corners) for corners in corners_of_cells(sides.mesh)]
     labels = _label_bodies(len(sides.points), [*blocks, sides.slave, sides.master])
     of_slave, of_master = np.unique(labels[sides.slave]), np.unique(labels[sides.master])
     if both := set(of_slave.tolist()) & set(of_master.tolist()):
@@ -188,13 +191,6 @@ def _one_shape(blocks: list[IntArray]) -> IntArray:
     return np.vstack(blocks)
 
 
-def _turn_counter_clockwise(points: FloatArray, corners: IntArray) -> IntArray:
-    """Return the corners of cells (n_cells, n_corners), those of clockwise cells in opposite order."""
-    x, y = np.moveaxis(points[corners], -1, 0)
-    twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-    return np.where(twice_area[:, None] < 0, corners[:, ::-1], corners)
-
-
 def _label_bodies(n_points: int, cells: list[IntArray]) -> IntArray:
     """Return a number for each point: points that cells or lines join have the same."""
     pairs = [np.column_stack([block[:, 0], corner]) for block in cells for corner in block.T[1:]]
@@ -219,18 +215,14 @@ def _set_materials(sides: MeshSides, parts: list[_Part], materials: Mapping[str,
         if not bodies:
             actual = f"{name!r}, no member of which belongs to an elastic body"
             raise MisuseError("--material", actual, "a group with members in the body of slave or master")
-        _check_material(name, young, poisson)
+        if not (0 < young < np.inf and -1 < poisson < 0.5):
+            needed = "Young's modulus E > 0 and Poisson's ratio −1 < ν < 0.5"
+            raise MisuseError("--material", f"E = {young:g}, ν = {poisson:g} of {name!r}", needed)
         for part in bodies:
             if part.material_of and part.material != (young, poisson):
                 actual = f"two materials of one body, those of {part.material_of!r} and {name!r}"
                 raise MisuseError("--material", actual, "one for each body, whose cells share nodes")
             part.material, part.material_of = (young, poisson), name
-
-
-def _check_material(name: str, young: float, poisson: float) -> None:
-    if not (0 < young < np.inf and -1 < poisson < 0.5):
-        needed = "Young's modulus E > 0 and Poisson's ratio −1 < ν < 0.5"
-        raise MisuseError("--material", f"E = {young:g}, ν = {poisson:g} of {name!r}", needed)
 
 
 def _set_supports(sides: MeshSides, parts: list[_Part], supports: Mapping[str, Support]) -> None:
@@ -247,13 +239,6 @@ def _set_supports(sides: MeshSides, parts: list[_Part], supports: Mapping[str, S
                     part.fixed[nodes, component] = True
                     # A rigid body moves as a whole.
                     part.imposed[nodes if len(part.cells) else slice(None), component] = value
-
-
-def _hold_others(parts: list[_Part]) -> None:
-    """Hold the elastic bodies about whose supports the user says nothing."""
-    for part in (part for part in parts if len(part.cells)):
-        if not part.has_supports:
-            part.fixed[_far_nodes(part)] = True
 
 
 def _far_nodes(part: _Part) -> IntArray:

@@ -1,6 +1,7 @@
-"""A mesh file as plain arrays: meshio reads it in a child process, and what comes back is checked here.
+"""Mesh files as plain arrays: meshio reads them in a child process, and writes scenes.
 
-Rule for the next editor: whoever gets a `PlainMesh` may rely on every statement of its docstring.
+What comes back is checked here: whoever gets a `PlainMesh` may rely on every statement of its docstring. Its groups are
+sets of cells and physical groups by name, and numbered groups by number as text.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import os
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from difflib import get_close_matches
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ import msgspec
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.engine import SceneArrays
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
 from contactverif.isolation.wire import PackedArray
@@ -59,13 +62,12 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
     try:
         packed = read_in_child(f"{__name__}:pack_mesh", os.path.abspath(name), limits_for(size))
         stored = msgspec.msgpack.decode(packed, type=_PackedMesh)
-        mesh = _unpack(stored)
+        return _unpack(stored)
     except ReadError as error:
         needed = "a whole mesh file in a format that meshio knows"
         raise MisuseError("--mesh", f"{name!r}, which meshio cannot read ({error})", needed) from error
     except (msgspec.DecodeError, ValueError) as error:
         raise MisuseError("--mesh", f"{name!r} with {error}", "a mesh whose parts fit each other") from error
-    return mesh
 
 
 class _PackedMesh(msgspec.Struct, array_like=True):
@@ -84,14 +86,10 @@ def _unpack(stored: _PackedMesh) -> PlainMesh:
     cells = tuple(_block(type_, dim, packed, len(points)) for type_, dim, packed in stored.cells)
     sets = {name: _whole(name, parts) for name, parts in stored.cell_sets.items()}
     data = {key: _whole(key, parts) for key, parts in stored.cell_data.items()}
-    _check_data(cells, data)
-    return PlainMesh(points.astype(np.float64), cells, sets, data, stored.field_data, stored.warnings)
-
-
-def _check_data(cells: tuple[Block, ...], data: dict[str, list[IntArray]]) -> None:
     for key, parts in data.items():
         if [part.shape for part in parts] != [(len(block),) for block in cells]:
             raise ValueError(f"{key} that is not one number for each cell")
+    return PlainMesh(points.astype(np.float64), cells, sets, data, stored.field_data, stored.warnings)
 
 
 def _block(type_: str, dim: int, packed: PackedArray, n_points: int) -> Block:
@@ -121,23 +119,23 @@ def pack_mesh(path: str) -> bytes:
     stored = _PackedMesh(
         points=PackedArray.pack(mesh.points, "points"),
         cells=[(block.type, block.dim, PackedArray.pack(block.data, block.type)) for block in mesh.cells],
-        cell_sets={name: _parts(parts) for name, parts in mesh.cell_sets.items() if _is_whole_set(mesh, name, parts)},
-        cell_data={key: _parts(mesh.cell_data[key]) for key in TAGS if key in mesh.cell_data},
+        # A set has members for each block, and is none of those that Gmsh makes for its own use.
+        cell_sets={
+            name: [PackedArray.pack(part) for part in parts]
+            for name, parts in mesh.cell_sets.items()
+            if len(parts) == len(mesh.cells)
+            and all(isinstance(part, np.ndarray) for part in parts)
+            and "gmsh:" not in name
+        },
+        cell_data={
+            key: [PackedArray.pack(part) for part in mesh.cell_data[key]] for key in TAGS if key in mesh.cell_data
+        },
         field_data={  # Gmsh stores the number and the dimension of a name here.
             name: (int(value[0]), int(value[1])) for name, value in mesh.field_data.items() if np.shape(value) == (2,)
         },
         warnings=warnings[:_LONGEST_WARNING],
     )
     return msgspec.msgpack.encode(stored)
-
-
-def _parts(parts: Any) -> list[PackedArray]:
-    return [PackedArray.pack(part) for part in parts]
-
-
-def _is_whole_set(mesh: Any, name: str, parts: Any) -> bool:
-    """Return whether a set has members for each block, and is none of those that Gmsh makes for its own use."""
-    return len(parts) == len(mesh.cells) and all(isinstance(part, np.ndarray) for part in parts) and "gmsh:" not in name
 
 
 def _read(path: Path) -> tuple[Any, str]:
@@ -153,3 +151,108 @@ def _read(path: Path) -> tuple[Any, str]:
         raise ValueError(output.getvalue() + warnings.getvalue()) from error
     except ImportError as error:
         raise ValueError(f"its format needs the package {error.name}, which is not installed") from error
+
+
+Group = list[IntArray]  # For each block of cells in the file: 0 no member, 1 a member, −1 a member to be reversed.
+
+MOST_MEMBERS = 10**8  # Groups times cells: so many take 1 GB. A mesh of a million cells may have a hundred groups.
+
+
+def groups_of(mesh: PlainMesh) -> dict[str, Group]:
+    """Return all groups of a mesh: sets of cells and physical groups by name, numbered groups by number as text."""
+    numbers = [np.arange(len(block)) for block in mesh.cells]
+    named: dict[str, Group] = {
+        name: [np.isin(every, part).astype(np.int64) for every, part in zip(numbers, sets, strict=True)]
+        for name, sets in mesh.cell_sets.items()
+    }
+    numbered = _tagged_cells(mesh)
+    for name, (number, dim) in mesh.field_data.items():
+        group = numbered.get(str(number), [np.zeros(len(block), dtype=np.int64) for block in mesh.cells])
+        _include(named, name, [part * (block.dim == dim) for block, part in zip(mesh.cells, group, strict=True)])
+        # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
+        _include(numbered, str(number), named[name])
+    return numbered | named
+
+
+def _tagged_cells(mesh: PlainMesh) -> dict[str, Group]:
+    """Return the groups that the cell data number, by number as text."""
+    groups: dict[str, Group] = {}
+    n_cells = sum(map(len, mesh.cells))
+    for key, parts in mesh.cell_data.items():
+        tags = sorted({int(tag) for values in parts for tag in np.unique(values)} - {0})
+        if len(tags) * n_cells > MOST_MEMBERS:
+            raise MisuseError("--mesh", f"{len(tags)} groups of {n_cells} cells", "fewer groups")
+        for tag in tags:
+            group = [np.asarray(values == tag, dtype=np.int64) for values in parts]
+            if key == "gmsh:physical" and tag < 0:  # In Gmsh, a negative number reverses the lines of a curve.
+                _include(groups, str(-tag), [-part for part in group])
+            else:
+                _include(groups, str(tag), group)
+    return groups
+
+
+def _include(groups: dict[str, Group], name: str, group: Group) -> None:
+    """Add the members of a group to those that the name has already."""
+    known = groups.get(name, group)
+    groups[name] = [np.where(part != 0, part, more) for part, more in zip(known, group, strict=True)]
+
+
+def kinds_in(mesh: PlainMesh, group: Group) -> list[str]:
+    """Return the types of the cells in a group."""
+    return sorted({block.type for block, members in zip(mesh.cells, group, strict=True) if members.any()})
+
+
+def unknown_group_error(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> MisuseError:
+    """Return the error for a group that the file does not have; it names near groups and lists all."""
+    listed = ", ".join(f"{each!r} ({', '.join(kinds_in(mesh, group)) or 'empty'})" for each, group in groups.items())
+    by_case = {each.casefold(): each for each in groups}
+    near = [repr(by_case[each]) for each in get_close_matches(name.casefold(), by_case)]
+    needed = (f"{' or '.join(near)}? The groups are " if near else "one of ") + listed
+    return MisuseError(argument, f"{name!r}, which is no group of the file", needed if listed else "groups in the file")
+
+
+SLAVE, MASTER = 1, 2  # The roles of contact edges in a file; 0 is neither.
+
+
+def write_arrays(arrays: SceneArrays, path: str | Path) -> None:
+    """Write a scene to a file of which meshio knows the format by its ending, such as `.vtu` or `.msh`.
+
+    Parameters
+    ----------
+    arrays : SceneArrays
+        The scene. Its contact edges are lines of the mesh.
+    path : str | Path
+        The file.
+
+    Raises
+    ------
+    MisuseError
+        If meshio does not know the ending.
+    """
+    triangles = arrays.cells[:, 3] < 0
+    blocks: list[tuple[str, Any, Any, int]] = [  # (kind, corners, body, role)
+        ("line", arrays.slave, np.full(len(arrays.slave), -1), SLAVE),
+        ("line", arrays.master, np.full(len(arrays.master), -1), MASTER),
+        ("triangle", arrays.cells[triangles, :3], arrays.body_of_cell[triangles], 0),
+        ("quad", arrays.cells[~triangles], arrays.body_of_cell[~triangles], 0),
+    ]
+    blocks = [block for block in blocks if len(block[1])]
+    mesh = meshio.Mesh(
+        np.column_stack([arrays.nodes, np.zeros(len(arrays.nodes))]),
+        [(kind, corners) for kind, corners, _, _ in blocks],
+        point_data={
+            "fixed": arrays.fixed.astype(np.int64),
+            "imposed": arrays.imposed,
+            "load": arrays.load,
+            "start": arrays.start,
+            "body": arrays.body_of_node,
+        },
+        cell_data={
+            "body_of_cell": [body for _, _, body, _ in blocks],
+            "role": [np.full(len(corners), role) for _, corners, _, role in blocks],
+        },
+    )
+    try:
+        mesh.write(path)
+    except meshio.ReadError as error:
+        raise MisuseError("path", f"{path} ({error})", "an ending that meshio writes, such as .vtu") from None

@@ -20,8 +20,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
 from contactverif.isolation.wire import PackedArray
-from contactverif.mechanics.packed_bodies import pack_bodies, unpack_bodies
-from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.scene import Scene, pack_bodies, unpack_bodies
 
 OPTION = "--scene-file"
 _NEEDED = "FILE.py:FUNCTION, a function without arguments that returns a contactverif.Scene"
@@ -72,7 +71,7 @@ def pack_scene(text: str) -> bytes:
     answer = _call(path, name)
     scene = getattr(answer, "scene", answer)  # That of a `ProblemInstance`.
     if not isinstance(scene, Scene):
-        raise ValueError(f"{name} returns {_describe(answer)}")
+        raise ValueError(f"{name} returns {'nothing' if answer is None else f'a {type(answer).__name__}, no Scene'}")
     bodies = pack_bodies(scene.bodies, scene.slave)
     return msgspec.msgpack.encode(
         _PackedScene(
@@ -103,10 +102,6 @@ def _call(path: str, name: str) -> Any:
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
         words = ": ".join(filter(None, (type(error).__name__, str(error)))) if lines else str(error)
         raise ValueError(words + (f", line {lines[-1]}" if lines else "")) from None
-
-
-def _describe(answer: Any) -> str:
-    return "nothing" if answer is None else f"a {type(answer).__name__}, no Scene"
 
 
 def _unpack(stored: _PackedScene) -> Scene:

@@ -20,7 +20,7 @@ from math import cos, radians, sin
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle
+from contactverif.mechanics.bodies import UPRIGHT, Placing, Rectangle
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY, load_scene_case
 from contactverif.problems.flat_states import TINY_MESHES, TINY_PENALTIES

@@ -15,8 +15,8 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
+from contactverif.mechanics.bodies import UPRIGHT, Placing, Rectangle, block, rigid_surface
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import UPRIGHT, Placing, Rectangle, block, rigid_surface
 
 
 def two_blocks(

@@ -27,9 +27,9 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import parse_name, unknown_name_error
+from contactverif.mechanics.bodies import Placing, Rectangle
 from contactverif.mechanics.newton import DIVERGENCE_FACTOR
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.disk import DiskProblem, disk_on_foundation
 

@@ -27,8 +27,8 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
+from contactverif.mechanics.bodies import Rectangle, block, grid_cells
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle, block, grid_cells
 from contactverif.problems.hertz import LinePressure, half_width, layer_half_width, solve_winkler_contact
 
 # Lengths in half-widths of the contact after Hertz.

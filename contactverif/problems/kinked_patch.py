@@ -20,8 +20,8 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.traits import Traits
+from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import grid_cells
 from contactverif.problems.problem import Problem, ProblemInstance, Variation
 from contactverif.problems.uniform_stress import pose_uniform
 

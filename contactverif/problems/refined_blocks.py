@@ -21,8 +21,8 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
+from contactverif.mechanics.bodies import Rectangle
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
 
 LENGTH, HEIGHT = 4.0, 1.0  # Of each block, lengths.

@@ -19,7 +19,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.contract.interface import Interface
-from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.mechanics.bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
 
 TURN = (3.0, 4.0)  # The rotation by cos = 3/5 and sin = 4/5.

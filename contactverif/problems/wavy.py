@@ -28,8 +28,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
+from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import grid_cells
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, Problem, ProblemInstance, Studies, Variation
 
 UPPER, LOWER = 0, 1

@@ -19,8 +19,8 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
+from contactverif.mechanics.bodies import Placing, Rectangle
 from contactverif.mechanics.scene import Scene, has_bodies
-from contactverif.mechanics.simple_bodies import Placing, Rectangle
 from contactverif.problems.blocks import is_uniform, overhangs, two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.strategies.samples import Motion, ends_of, lengths, motions, repeat_cyclically, seeds

@@ -30,11 +30,10 @@ from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.isolation.remote import RemoteFormulation
 from contactverif.isolation.worker import MethodCalls
-from contactverif.mechanics.scene import forget_bodies
-from contactverif.mechanics.solving import solution_of, solve_in_tries
+from contactverif.mechanics.accuracy import solution_of, solve_in_tries
+from contactverif.mechanics.newton import Trace
+from contactverif.mechanics.scene import WholeScene, forget_bodies
 from contactverif.mechanics.system import System
-from contactverif.mechanics.trace import Trace
-from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.problems.problem import ProblemInstance
 from contactverif.studies.bench_plan import is_solved, largest_errors, pose
 from contactverif_reports.bench_results import COUNTS, RULE, VARIANTS, Cell, Outcome

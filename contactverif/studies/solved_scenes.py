@@ -16,9 +16,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.newton import solve
+from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.trace import End, Trace
 from contactverif.problems.blocks import is_uniform, pressure_of
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_reports.plot.solved_scene import PointPressures, Solution, SolvedScene

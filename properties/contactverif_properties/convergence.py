@@ -20,8 +20,7 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Measure, Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, traction_forces
-from contactverif.mechanics.solving import solve_for_accuracy
+from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces
 from contactverif.problems.arcs import Arcs
 from contactverif.problems.hertz_boxes import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies

@@ -30,10 +30,10 @@ from contactverif.contract.measurement import CheckedNumber, Measurement, Quanti
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
+from contactverif.mechanics.accuracy import solve_by_engine
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
-from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
 from contactverif.problems import block_scenes, flat_states, hard_corner_states
 from contactverif.problems.blocks import pressure_of

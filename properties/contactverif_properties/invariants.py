@@ -26,10 +26,9 @@ from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Proper
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics import changed_scenes
-from contactverif.mechanics.accuracy import Solution
+from contactverif.mechanics.accuracy import Solution, solve_by_engine
+from contactverif.mechanics.bodies import Placing, Rectangle, block
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.simple_bodies import Placing, Rectangle, block
-from contactverif.mechanics.solving import solve_by_engine
 from contactverif.oracle import default_points, nearest_segments
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.general import closed_cases

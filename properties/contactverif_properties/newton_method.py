@@ -26,10 +26,9 @@ from contactverif.contract.property import Property
 from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import change_units, move, snap
 from contactverif.mechanics.linear import Step, scale_factors
-from contactverif.mechanics.newton import MAX_ITERATIONS, solve
+from contactverif.mechanics.newton import MAX_ITERATIONS, End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
-from contactverif.mechanics.trace import End, Trace
 from contactverif.strategies.solids import closed_cases, solid_cases
 from contactverif_properties import applicability
 from contactverif_properties.kinks import find_kink

@@ -20,11 +20,9 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import Solution, shape_integrals
-from contactverif.mechanics.newton import solve
+from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine, solve_for_accuracy
+from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.solving import solve_by_engine, solve_for_accuracy
-from contactverif.mechanics.trace import End, Trace
 from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
 from contactverif.problems.problem import FORCES
 from contactverif.problems.shrink_fit import FIT, SEGMENTS, FiniteFit, RingStudy, Role, shrink_fit

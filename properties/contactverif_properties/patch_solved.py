@@ -23,11 +23,9 @@ from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.mechanics.accuracy import Solution, shape_integrals
-from contactverif.mechanics.newton import NEAR_CONVERGENCE, solve
+from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine
+from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.solving import solve_by_engine
-from contactverif.mechanics.trace import Trace
 from contactverif.oracle import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of

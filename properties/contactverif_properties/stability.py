@@ -20,9 +20,8 @@ from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import shape_integrals
+from contactverif.mechanics.accuracy import shape_integrals, solve_by_engine
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.mechanics.solving import solve_by_engine
 from contactverif.mechanics.system import System
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems import refined_blocks

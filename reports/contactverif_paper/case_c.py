@@ -15,7 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import IntArray
 from contactverif.mechanics import newton
-from contactverif.mechanics.trace import End
+from contactverif.mechanics.newton import End
 from contactverif.problems import catalogue
 from contactverif_paper.paper_columns import WORDS, Column
 from contactverif_paper.paper_formulations import NTS_AR, VTS_ME, VTS_PPT, subject_of

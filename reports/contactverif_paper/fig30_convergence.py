@@ -22,8 +22,8 @@ from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.columns import Group
 from contactverif.mechanics import newton
+from contactverif.mechanics.newton import Trace
 from contactverif.mechanics.system import System
-from contactverif.mechanics.trace import Trace
 from contactverif.problems import catalogue
 from contactverif_paper.disk_solutions import steps_until_energy
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_decades

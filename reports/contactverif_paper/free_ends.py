@@ -16,8 +16,8 @@ from typing import Annotated
 import numpy as np
 from matplotlib.figure import Figure
 
+from contactverif.mechanics.bodies import Rectangle
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
 from contactverif_paper.figure_style import Series, add_legend, line_style, new_panels, plot_logarithmic
 from contactverif_paper.paper_columns import Formulations, series_columns

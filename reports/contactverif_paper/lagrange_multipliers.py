@@ -16,8 +16,8 @@ import numpy as np
 
 from contactverif.contract.columns import Group
 from contactverif.mechanics import newton
+from contactverif.mechanics.bodies import Rectangle
 from contactverif.mechanics.scene import Scene
-from contactverif.mechanics.simple_bodies import Rectangle
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks

@@ -18,7 +18,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.mechanics import newton
-from contactverif.mechanics.trace import Trace
+from contactverif.mechanics.newton import Trace
 from contactverif.problems import catalogue
 from contactverif_paper.paper_columns import Column, Formulations
 from contactverif_paper.paper_formulations import BASIC, STS, VTS_ME, VTS_PPT, PaperFormulation, measure, subject_of

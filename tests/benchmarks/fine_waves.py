@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contactverif.mechanics.solving import solve_for_accuracy
-from contactverif.mechanics.whole_scene import WholeScene
+from contactverif.mechanics.accuracy import solve_for_accuracy
+from contactverif.mechanics.scene import WholeScene
 from contactverif.plugins.registry import load_formulation
 from contactverif.problems.wavy import pose_wavy
 from contactverif.studies.bench_cells import TURNS, evaluate

@@ -20,8 +20,8 @@ import numpy as np
 
 from contactverif import Case, Property, Subject, judge_case, load_formulation, load_properties
 from contactverif.mechanics import bulk
+from contactverif.mechanics.newton import Record, Trace
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
-from contactverif.mechanics.trace import Record, Trace
 from contactverif.sampling.draw import draw_cases
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contactverif import Subject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
-from contactverif.mechanics.solving import solve_for_accuracy
+from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.plugins.registry import the_subject
 from contactverif.problems.hertz_boxes import HERTZ_STUDIES, HertzStudy
 from contactverif.problems.problem import FORCES

@@ -13,9 +13,9 @@ from plain_engine import Plain
 from contactverif import MisuseError, Scene, load_scene
 from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.isolation.plain_msgpack import decode, encode
+from contactverif.mechanics.accuracy import engine_solution
 from contactverif.mechanics.changed_scenes import turn
-from contactverif.mechanics.solving import engine_solution
-from contactverif.meshes.arrays_file import write_arrays
+from contactverif.meshes.plain_mesh import write_arrays
 
 
 def test_arrays_make_the_scene_again() -> None:

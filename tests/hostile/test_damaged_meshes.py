@@ -103,6 +103,6 @@ def test_a_reader_without_an_end_is_stopped(tmp_path: Path, monkeypatch: pytest.
 
 def test_so_many_groups_are_no_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_text(tmp_path / "a.msh", "1 1 2 1 1 1 2\n2 1 2 2 2 2 3\n")
-    monkeypatch.setattr("contactverif.meshes.mesh_groups.MOST_MEMBERS", 3)
+    monkeypatch.setattr("contactverif.meshes.plain_mesh.MOST_MEMBERS", 3)
     with pytest.raises(MisuseError, match="found 2 groups of 2 cells; needed fewer groups"):
         read_interface(path, slave="1", master="2")

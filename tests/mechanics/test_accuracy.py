@@ -14,9 +14,9 @@ from contactverif.mechanics.accuracy import (
     force_error,
     pressure_error,
     shape_integrals,
+    solve_for_accuracy,
     traction_forces,
 )
-from contactverif.mechanics.solving import solve_for_accuracy
 
 INTERFACE = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[3, 0], [0, 0]])
 

@@ -12,7 +12,7 @@ from subjects import change_verbs, load_subject
 
 from contactverif import CheckedFormulation, Interface, Pairing, Rectangle, Scene, Subject, solve, two_blocks
 from contactverif.contract.arrays import FloatArray, dense
-from contactverif.mechanics.force_differences import Differences
+from contactverif.mechanics.system import Differences
 from contactverif.problems import catalogue
 
 PENETRATION, STEP = 1e-3, 1e-6

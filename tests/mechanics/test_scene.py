@@ -16,10 +16,9 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.geometry import projection
 from contactverif.mechanics import newton
 from contactverif.mechanics import scene as scene_module
+from contactverif.mechanics.bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.mechanics.bulk import assemble_stiffness
-from contactverif.mechanics.scene import Scene, has_bodies, scene_of
-from contactverif.mechanics.simple_bodies import Placing, Rectangle, block, rigid_surface
-from contactverif.mechanics.whole_scene import WholeScene
+from contactverif.mechanics.scene import Scene, WholeScene, has_bodies, scene_of
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, two_blocks
 from contactverif_nts import nts_force, walk

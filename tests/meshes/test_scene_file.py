@@ -9,7 +9,7 @@ import pytest
 
 from contactverif import MisuseError, load_scene
 from contactverif.isolation import file_reader
-from contactverif.mechanics.packed_bodies import pack_bodies
+from contactverif.mechanics.scene import pack_bodies
 from contactverif.meshes.scene_file import digest_scene_file, load_scene_file
 
 FILE = """

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from contactverif.mechanics import newton
-from contactverif.mechanics.trace import End
+from contactverif.mechanics.newton import End
 from contactverif.problems import catalogue
 from contactverif.run.worker_pool import worker_pool
 from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3

@@ -12,7 +12,7 @@ from test_forces import PENALTY
 import contactverif_nts
 from contactverif import Abilities, Interface, Pairing, Promises, Scene, Subject, Trace, Traits, solve, two_blocks
 from contactverif.contract.errors import ContractError
-from contactverif.mechanics.simple_bodies import Rectangle
+from contactverif.mechanics.bodies import Rectangle
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_nts import two_pass

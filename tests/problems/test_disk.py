@@ -18,8 +18,7 @@ from subjects import load_subject
 from contactverif import Body, End, MisuseError, Scene, Surface
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.mechanics import newton
-from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, traction_forces
-from contactverif.mechanics.solving import solve_for_accuracy
+from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, solve_for_accuracy, traction_forces
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Errors, ProblemInstance

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contactverif import MisuseError, load_formulation, solve
-from contactverif.mechanics.solving import solution_of
+from contactverif.mechanics.accuracy import solution_of
 from contactverif.problems.problem import ProblemInstance, Variation
 from contactverif.problems.wavy import WAVY
 

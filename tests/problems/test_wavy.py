@@ -8,9 +8,8 @@ import pytest
 from subjects import load_subject
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.mechanics.accuracy import Solution
+from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
 from contactverif.mechanics.bulk import elasticity
-from contactverif.mechanics.solving import solve_for_accuracy
 from contactverif.problems.problem import Variation
 from contactverif.problems.wavy import LOWER, UPPER, WAVY, WavyProblem, wavy_scene
 

@@ -12,7 +12,7 @@ from wave_strangers import Heights
 
 import contactverif_nts
 from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
-from contactverif.mechanics.solving import solve_for_accuracy
+from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.hertz_boxes import (
     BOX,
     COARSEST,

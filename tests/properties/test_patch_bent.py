@@ -10,7 +10,7 @@ from subjects import Changed, change_verbs, judge_as, load_property, load_subjec
 import contactverif_mortar
 from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
-from contactverif.mechanics.solving import solve_for_accuracy
+from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.kinked_patch import KinkedPatch, kinked_patch
 from contactverif.problems.shrink_fit import FIT, RingStudy
 from contactverif_properties import patch_bent

@@ -33,10 +33,10 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.process import Question
 from contactverif.isolation.remote import RemoteSubject
 from contactverif.isolation.wire import Answer
+from contactverif.mechanics.accuracy import solution_of, solve_for_accuracy, solve_in_tries
 from contactverif.mechanics.bulk import condense
-from contactverif.mechanics.solving import solution_of, solve_for_accuracy, solve_in_tries
+from contactverif.mechanics.scene import WholeScene
 from contactverif.mechanics.system import System
-from contactverif.mechanics.whole_scene import WholeScene
 from contactverif.plugins import registry
 from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation

@@ -1,18 +1,21 @@
-"""Bodies that need no mesh generator: a rectangle of quadrilaterals, and a rigid surface.
+"""Bodies: a rectangle of quadrilaterals, a rigid surface, and a mesh of scikit-fem with named boundaries.
 
-Both are drawn upright, in a plane of their own, and then placed: rotated, shifted and scaled. Rule for the next editor:
-`Body` checks whatever can be wrong with a body. This file checks grid lines and what is lost once the body is made.
+The first two are drawn upright, in a plane of their own, and then placed: rotated, shifted and scaled. `Body` checks
+whatever can be wrong with a body; what is lost once it is made is checked here, by the name of the argument.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, Literal
 
 import numpy as np
+import skfem
 from numpy.typing import ArrayLike
 
-from contactverif.contract.arrays import FloatArray, IntArray, as_floats, freeze
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, as_floats, freeze
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
@@ -135,7 +138,7 @@ def block(
     as_floats(f"{name}: shift", placing.shift, (2,))
     if contact not in ("bottom", "top"):
         raise MisuseError(f"{name}: contact", repr(contact), "'bottom' or 'top'")
-    number = _node_numbers(len(y), len(x))
+    number = np.arange(len(y) * len(x)).reshape(len(y), len(x))
     near, far = (number[0], number[-1]) if contact == "bottom" else (number[-1], number[0])
     walk = near if contact == "bottom" else near[::-1]  # The body is on the left.
     towards_contact, scale = -1.0 if contact == "bottom" else 1.0, placing.scale
@@ -220,15 +223,10 @@ def _grid_lines(argument: str, values: ArrayLike) -> FloatArray:
     return coordinates
 
 
-def _node_numbers(n_rows: int, n_columns: int) -> IntArray:
-    """Return the numbers of the nodes of a rectangle (n_rows, n_columns), row by row."""
-    return np.arange(n_rows * n_columns).reshape(n_rows, n_columns)
-
-
 @lru_cache(maxsize=256)
 def _cells_of_grid(n_rows: int, n_columns: int) -> IntArray:
     """Return the cells (n_cells, 4) of a rectangle with so many rows and columns of nodes."""
-    return freeze(grid_cells(_node_numbers(n_rows, n_columns)), np.int64)
+    return freeze(grid_cells(np.arange(n_rows * n_columns).reshape(n_rows, n_columns)), np.int64)
 
 
 def grid_cells(number: IntArray) -> IntArray:
@@ -246,3 +244,137 @@ def _weights(x: FloatArray, low: float, high: float) -> FloatArray:
     weights[1:] += towards_second
     weights[:-1] += covered - towards_second
     return weights
+
+
+def body_from_mesh(
+    mesh: Any,
+    *,
+    contact: str,
+    supports: Mapping[str, Literal["along", "across", "both"]],
+    young: float = 1.0,
+    poisson: float = 0.0,
+    displacements: Mapping[str, tuple[float, float]] | None = None,
+    pressures: Mapping[str, float] | None = None,
+    name: str = "mesh",
+) -> Body:
+    """Return a body from a scikit-fem mesh of first-order triangles or quadrilaterals with named boundaries.
+
+    Parameters
+    ----------
+    mesh : skfem.MeshTri or skfem.MeshQuad
+        The mesh. ``mesh.with_boundaries({name: function})`` names its boundaries.
+    contact : str
+        The boundary that may touch something.
+    supports : Mapping[str, Literal['along', 'across', 'both']]
+        The components that are fixed on each supported boundary: "along" the x-axis, "across" it, or "both".
+    young : float
+        Young's modulus E > 0, force per length squared.
+    poisson : float
+        Poisson's ratio, −1 < ν < 1/2.
+    displacements : Mapping[str, tuple[float, float]] | None
+        The displacement (along, across), a length each, of each supported boundary that moves.
+    pressures : Mapping[str, float] | None
+        The pressure on each loaded boundary, force per length, positive towards the body.
+    name : str
+        The name of the body in messages and drawings.
+
+    Returns
+    -------
+    Body
+        The body on the nodes and cells of the mesh; its axes are x and y.
+
+    Raises
+    ------
+    MisuseError
+        If the mesh has no such boundary, a displacement is imposed where nothing is fixed, or as `Body` does.
+
+    Examples
+    --------
+    >>> import numpy as np, skfem
+    >>> from contactverif import body_from_mesh
+    >>> mesh = skfem.MeshTri().refined(2).with_boundaries({"low": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
+    >>> body = body_from_mesh(mesh, contact="low", supports={"top": "both"}, displacements={"top": (0.0, -0.1)})
+    >>> len(body.contact), body.fixed.sum()
+    (4, np.int64(10))
+    """
+    if getattr(mesh, "elem", None) not in (skfem.ElementTriP1, skfem.ElementQuad1):
+        raise MisuseError("mesh", f"a {type(mesh).__name__}", "a MeshTri or a MeshQuad of first order")
+    if not isinstance(supports, Mapping):
+        raise MisuseError("supports", f"a {type(supports).__name__}", "{boundary: 'along', 'across' or 'both'}")
+    displacements, pressures = displacements or {}, pressures or {}
+    points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
+    cells = turn_counter_clockwise(points, cells)
+    edges = {tag: _edges(mesh, cells, tag) for tag in dict.fromkeys([contact, *supports, *pressures])}
+    fixed, imposed = _supports(points, edges, supports, displacements)
+    load = _loads(points, edges, pressures)
+    return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
+
+
+def _supports(
+    points: FloatArray,
+    edges: Mapping[str, IntArray],
+    supports: Mapping[str, str],
+    displacements: Mapping[str, tuple[float, float]],
+) -> tuple[BoolArray, FloatArray]:
+    """Return which components are fixed, and the displacements imposed there, both (n_nodes, 2)."""
+    fixed, imposed = np.zeros(points.shape, bool), np.zeros(points.shape)
+    for tag, direction in supports.items():
+        components = {"along": [0], "across": [1], "both": [0, 1]}.get(direction)
+        if components is None:
+            raise MisuseError(f"supports[{tag!r}]", repr(direction), "'along', 'across' or 'both'")
+        nodes = np.unique(edges[tag])
+        displacement = _check_displacement(tag, displacements.get(tag, (0.0, 0.0)), components)
+        for component in components:
+            fixed[nodes, component] = True
+            imposed[nodes, component] = displacement[component]
+    if unsupported := set(displacements) - set(supports):
+        needed = "a boundary that supports name"
+        raise MisuseError(f"displacements[{min(unsupported)!r}]", "no supports there", needed)
+    return fixed, imposed
+
+
+def _loads(points: FloatArray, edges: Mapping[str, IntArray], pressures: Mapping[str, float]) -> FloatArray:
+    """Return the nodal forces (n_nodes, 2) of pressures on boundaries."""
+    load = np.zeros(points.shape)
+    for tag, pressure in pressures.items():
+        if np.ndim(pressure) != 0 or np.asarray(pressure).dtype.kind not in "fiu":
+            raise MisuseError(f"pressures[{tag!r}]", repr(pressure), "a number")
+        first, second = edges[tag].T
+        along = points[second] - points[first]
+        for end in (first, second):
+            np.add.at(load, end, pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]]))
+    return load
+
+
+def _check_displacement(tag: str, values: Any, components: list[int]) -> FloatArray:
+    """Return the displacement (2,) of a boundary, checked: 0 where nothing is fixed."""
+    try:
+        displacement = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        displacement = np.zeros(0)
+    if displacement.shape != (2,):
+        raise MisuseError(f"displacements[{tag!r}]", repr(values), "two numbers, along and across")
+    if displacement[[component for component in (0, 1) if component not in components]].any():
+        raise MisuseError(f"displacements[{tag!r}]", "a displacement of a free component", "0 where nothing is fixed")
+    return displacement
+
+
+def turn_counter_clockwise(points: FloatArray, corners: IntArray) -> IntArray:
+    """Return the corners of cells (n_cells, n_corners), those of clockwise cells in opposite order."""
+    x, y = np.moveaxis(points[corners], -1, 0)
+    twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    return np.where(twice_area[:, None] < 0, corners[:, ::-1], corners)
+
+
+def _edges(mesh: Any, cells: IntArray, tag: str) -> IntArray:
+    """Return the edges (n, 2) of a named boundary, each with its cell on the left."""
+    tags = getattr(mesh, "boundaries", None) or {}
+    if tag not in tags:
+        needed = f"one of {', '.join(sorted(tags))}" if tags else "a mesh with named boundaries (mesh.with_boundaries)"
+        raise MisuseError("mesh", f"no boundary {tag!r}", needed)
+    if not len(tags[tag]):
+        raise MisuseError("mesh", f"no edges on boundary {tag!r}", "a boundary that has some")
+    wanted = {tuple(sorted(edge)) for edge in np.asarray(mesh.facets).T[np.asarray(tags[tag])].tolist()}
+    following = np.roll(cells, -1, axis=1)
+    every = np.stack([cells, following], axis=-1).reshape(-1, 2).tolist()
+    return np.array([edge for edge in every if tuple(sorted(edge)) in wanted], dtype=np.int64).reshape(-1, 2)
