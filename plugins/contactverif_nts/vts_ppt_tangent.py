@@ -235,14 +235,8 @@ class Cut(NamedTuple):
     """An end of an area of competence that a master node e cuts in the frame of a master segment, and its Δc."""
 
     is_cut: bool
-    e: int  # first unknowns of the node e and of those of the frame
-    frame_1: int
-    frame_2: int
-    by_a: Vector  # Δc for a displacement of A, B, e and the nodes of the frame
-    by_b: Vector
-    by_e: Vector
-    by_1: Vector
-    by_2: Vector
+    columns: tuple[int, int, int, int, int]  # first unknowns of A, B, e and the two nodes of the frame
+    by: tuple[Vector, Vector, Vector, Vector, Vector]  # Δc for their displacements
 
 
 class LinearizedNode(NamedTuple):
@@ -276,6 +270,7 @@ class Ends(NamedTuple):
 
 
 _N_CORE = 4  # A, B, 1 and 2
+_N_CUTTING = 5  # The nodes of a `Cut`.
 _FIXED = Ends(0.0, 0.0, 0.0, 0.0)
 _NO_VARIATION = Variation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -306,21 +301,21 @@ def _pressure_on_master(
 
 @compile_inline
 def _cut_end(
-    x: FloatArray, master: IntArray, slots: IntArray, v: VirtualSlaveNode, c: float, segment: int, e: int
+    x: FloatArray, master: IntArray, slots: IntArray, v: VirtualSlaveNode, at: Places, c: float, segment: int, e: int
 ) -> Cut:
     """Return the end c of an area, cut by the master node e in the frame of a master segment unless e is NOT_CUT.
 
     Δc = −[t·(Δx_c − Δx_e) + ((x_c − x_e)·n) ω] / (t·(x_B − x_A)/2), Δx_c at fixed c.
     """
     if e == NOT_CUT:
-        return Cut(False, 0, 0, 0, ZERO, ZERO, ZERO, ZERO, ZERO)
+        return Cut(False, (0, 0, 0, 0, 0), (ZERO, ZERO, ZERO, ZERO, ZERO))
     node_1, node_2 = master[segment, 0], master[segment, 1]
     l_12, t, normal = frame(node(x, node_1), node(x, node_2))
     half = dot(minus(v.x_b, v.x_a), t) / 2
     lever = dot(arm(node(x, e), PointOnSegment(v.x_a, v.x_b, c)), normal)
-    by_a, by_b, by_e = times(-(1 - c) / 2 / half, t), times(-(1 + c) / 2 / half, t), times(1 / half, t)
-    by_1, by_2 = times(lever / (l_12 * half), normal), times(-lever / (l_12 * half), normal)
-    return Cut(True, slots[e], slots[node_1], slots[node_2], by_a, by_b, by_e, by_1, by_2)
+    along = times(-(1 - c) / 2 / half, t), times(-(1 + c) / 2 / half, t), times(1 / half, t)
+    turning = times(lever / (l_12 * half), normal), times(-lever / (l_12 * half), normal)
+    return Cut(True, (at.a, at.b, slots[e], slots[node_1], slots[node_2]), (*along, *turning))
 
 
 @compile_inline
@@ -421,13 +416,6 @@ def _variation_on_part(d: Variation, ends: Ends, force: Force, pressure: Pressur
 
 
 @compile_inline
-def _variation_of_sum(d_s: float, pressure: Pressure, part: Part) -> tuple[float, float]:
-    """Return Δ of −pressure × W_f and of −pressure × W_m where a free end moves that S reaches to, by ΔS."""
-    d_p = pressure.size * d_s / pressure.s
-    return part.w_f * d_p, part.w_m * d_p
-
-
-@compile_inline
 def _variation_of_constraint(d: Variation, v: VirtualSlaveNode, force: Force) -> float:
     """Return Δ(−g × size)."""
     return -(force.size * d.g + v.g * _variation_of_size(d, force))
@@ -460,9 +448,7 @@ def _sweep(
     slots, runs, local, push = room
     for number in range(end - begin + len(others)):
         coupling = begin + number if number < end - begin else others[number - (end - begin)]
-        start, n_coupled = starts[coupling], starts[coupling + 1] - starts[coupling]
-        if has_multipliers:
-            n_coupled -= 1
+        start, n_coupled = starts[coupling], starts[coupling + 1] - starts[coupling] - has_multipliers
         width = 2 * n_coupled
         for q in range(n_coupled):
             slots[nodes[start + q]] = 2 * q
@@ -483,8 +469,8 @@ def _sweep(
             at = Places(slots[node_a], slots[node_b], slots[node_1], slots[node_2], width)
             stiffness, e = (1.0, -multipliers[i]) if has_multipliers else (penalty, v.g)
             force = _force_at(v, l_ab, stiffness, e, has_multipliers, current_area)
-            p_cut = _cut_end(x, master, slots, v, v.c_p, area.frame, area.cut_p)
-            q_cut = _cut_end(x, master, slots, v, v.c_q, area.frame, area.cut_q)
+            p_cut = _cut_end(x, master, slots, v, at, v.c_p, area.frame, area.cut_p)
+            q_cut = _cut_end(x, master, slots, v, at, v.c_q, area.frame, area.cut_q)
             point = LinearizedNode(v, force, at, p_cut, q_cut)
             if only[coupling] in (WHOLE, area.first):
                 _add_segment_forces(local, push, point, True)
@@ -503,9 +489,8 @@ def _sweep(
                     j = neighbours[j, 1] if j != j_last else NO_NODE
         find_runs(runs, nodes, start, n_coupled)
         add_local_matrix(csr, nodes, start, n_coupled, runs, local, owner, part)
-        _add_push(rows, nodes, start, n_coupled, push, owner, part)
-        if has_multipliers:
-            _add_multiplier(rows, csr, nodes, start, n_coupled, len(x), local, push, owner, part)
+        multiplier = nodes[start + n_coupled] if has_multipliers else NO_NODE
+        _add_push_and_multiplier(rows, csr, nodes, start, n_coupled, multiplier, local, push, owner, part, len(x))
 
 
 @compile_inline
@@ -517,35 +502,29 @@ def _clear(local: FloatArray, push: FloatArray, width: int) -> None:
 
 
 @compile_inline
-def _add_push(
-    rows: FloatArray, nodes: NumberArray, start: int, n_coupled: int, push: FloatArray, owner: NumberArray, part: int
-) -> None:
-    for q in range(n_coupled):
-        row = nodes[start + q]
-        if owner[row] == part:
-            rows[2 * row] += push[2 * q]
-            rows[2 * row + 1] += push[2 * q + 1]
-
-
-@compile_inline
-def _add_multiplier(
+def _add_push_and_multiplier(
     rows: FloatArray,
     csr: Csr,
     nodes: NumberArray,
     start: int,
     n_coupled: int,
-    n_nodes: int,
+    multiplier: int,
     local: FloatArray,
     push: FloatArray,
     owner: NumberArray,
     part: int,
+    n_nodes: int,
 ) -> None:
-    number, width = nodes[start + n_coupled], 2 * n_coupled
-    unknown, is_mine = n_nodes + number, owner[number] == part
+    """Add the forces of a coupling, and row, column and constraint of its `multiplier` unless that is NO_NODE."""
+    width, unknown = 2 * n_coupled, n_nodes + multiplier
+    is_mine = multiplier != NO_NODE and owner[multiplier] == part
     for q in range(n_coupled):
         row = nodes[start + q]
         if owner[row] == part:
-            add_column(csr, row, unknown, local[2 * q, width], local[2 * q + 1, width])
+            rows[2 * row] += push[2 * q]
+            rows[2 * row + 1] += push[2 * q + 1]
+            if multiplier != NO_NODE:
+                add_column(csr, row, unknown, local[2 * q, width], local[2 * q + 1, width])
         if is_mine:
             add_row(csr, unknown, row, local[width, 2 * q], local[width, 2 * q + 1])
     if is_mine:
@@ -574,22 +553,13 @@ def _add_block(
 
 
 @compile_inline
-def _add_cut_blocks(local: FloatArray, row: int, gain: float, v: VirtualSlaveNode, at: Places, cut: Cut) -> None:
+def _add_cut_blocks(local: FloatArray, row: int, gain: float, v: VirtualSlaveNode, cut: Cut) -> None:
     """Add n gain Δc, where c is the end of an area that is cut, and a force n F gains this for each unit of c."""
-    if not cut.is_cut:
-        return
-    _add_outer(local, row, at.a, gain, v.normal, cut.by_a)
-    _add_outer(local, row, at.b, gain, v.normal, cut.by_b)
-    _add_outer(local, row, cut.e, gain, v.normal, cut.by_e)
-    _add_outer(local, row, cut.frame_1, gain, v.normal, cut.by_1)
-    _add_outer(local, row, cut.frame_2, gain, v.normal, cut.by_2)
-
-
-@compile_inline
-def _add_outer(local: FloatArray, row: int, column: int, factor: float, first: Vector, second: Vector) -> None:
-    for k in range(2):
-        for m in range(2):
-            local[row + k, column + m] += factor * first[k] * second[m]
+    if cut.is_cut:
+        for q in range(_N_CUTTING):
+            for k in range(2):
+                for m in range(2):
+                    local[row + k, cut.columns[q] + m] += gain * v.normal[k] * cut.by[q][m]
 
 
 @compile_inline
@@ -618,8 +588,8 @@ def _add_segment_forces(local: FloatArray, push: FloatArray, point: LinearizedNo
     if p_cut.is_cut or q_cut.is_cut:
         for d, cut in _variations_of_cuts(point):
             on_1, on_2 = _variation_on_segment(d, v, force, share_1, share_2, is_slave)
-            _add_cut_blocks(local, first, on_1, v, at, cut)
-            _add_cut_blocks(local, second, on_2, v, at, cut)
+            _add_cut_blocks(local, first, on_1, v, cut)
+            _add_cut_blocks(local, second, on_2, v, cut)
     if force.by_gap == 0.0:
         _add_unit(local, first, -share_1 * force.size, v, at)
         _add_unit(local, second, -share_2 * force.size, v, at)
@@ -655,16 +625,17 @@ def _add_part_forces(
         _add_block(local, f, column, v, 0.0, d_f, 0.0)
         _add_block(local, m, column, v, 0.0, d_m, 0.0)
     if pressure.is_balanced:
+        # S reaches to this free end, whose displacement moves it.
         for moves, d_s, column in ((pressure.p_moves, -1.0, free_ends[0]), (pressure.q_moves, 1.0, free_ends[1])):
             if moves == 0.0:
-                d_f, d_m = _variation_of_sum(d_s, pressure, part)
-                _add_block(local, f, column, v, 0.0, d_f, 0.0)
-                _add_block(local, m, column, v, 0.0, d_m, 0.0)
+                d_p = pressure.size * d_s / pressure.s
+                _add_block(local, f, column, v, 0.0, part.w_f * d_p, 0.0)
+                _add_block(local, m, column, v, 0.0, part.w_m * d_p, 0.0)
     if p_cut.is_cut or q_cut.is_cut:
         for d, cut in _variations_of_cuts(point):
             d_f, d_m = _variation_on_part(d, _FIXED, force, pressure, part)
-            _add_cut_blocks(local, f, d_f, v, at, cut)
-            _add_cut_blocks(local, m, d_m, v, at, cut)
+            _add_cut_blocks(local, f, d_f, v, cut)
+            _add_cut_blocks(local, m, d_m, v, cut)
     if force.by_gap == 0.0:
         _add_unit(local, f, pressure.unit * part.w_f, v, at)
         _add_unit(local, m, pressure.unit * part.w_m, v, at)
@@ -684,12 +655,6 @@ def _add_constraint(local: FloatArray, push: FloatArray, point: LinearizedNode) 
     for d, cut in _variations_of_cuts(point):
         gain = _variation_of_constraint(d, v, force)
         if cut.is_cut:
-            for column, by in (
-                (at.a, cut.by_a),
-                (at.b, cut.by_b),
-                (cut.e, cut.by_e),
-                (cut.frame_1, cut.by_1),
-                (cut.frame_2, cut.by_2),
-            ):
-                local[row, column] += gain * by[0]
-                local[row, column + 1] += gain * by[1]
+            for q in range(_N_CUTTING):
+                local[row, cut.columns[q]] += gain * cut.by[q][0]
+                local[row, cut.columns[q] + 1] += gain * cut.by[q][1]
