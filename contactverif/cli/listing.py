@@ -34,7 +34,7 @@ _YES_OR_NO = (  # (trait, statement where it is true, statement where it is fals
 
 def list_installed(options: RunOptions, *, every_trait: bool) -> None:
     """Show four tables; of the traits the most important ones or all."""
-    table = Table([Column("name"), _wrapped("in"), _wrapped("promises")], "formulations")
+    table = Table([Column("name"), _wrapping_column("in"), _wrapping_column("promises")], "formulations")
     for item in load_formulations(options.limits()):
         if isinstance(item, NotLoaded):
             table.add(item.formulation, "", _not_loaded(item))
@@ -42,7 +42,7 @@ def list_installed(options: RunOptions, *, every_trait: bool) -> None:
             dimensions = item.traits.abilities.dimensions if isinstance(item, Subject) else ()
             table.add(item.name, _dimensions(*dimensions), _promises(item, every_trait))
     show(table.terminal())
-    table = Table([Column("id"), _wrapped("in"), _wrapped("asks")], "properties")
+    table = Table([Column("id"), _wrapping_column("in"), _wrapping_column("asks")], "properties")
     for question in load_properties():
         if isinstance(question, NotLoaded):
             table.add(question.formulation, "", _not_loaded(question))
@@ -50,17 +50,17 @@ def list_installed(options: RunOptions, *, every_trait: bool) -> None:
             dimensions = (2,) if question.cases_in_space is None else (2, 3)
             table.add(question.id, _dimensions(*dimensions), question.summary)
     show(table.terminal())
-    table = Table([Column("name"), _wrapped("what bench solves")], "problems")
+    table = Table([Column("name"), _wrapping_column("what bench solves")], "problems")
     for name, problem in load_problems().items():
         table.add(name, _not_loaded(problem) if isinstance(problem, NotLoaded) else problem.label)
     show(table.terminal())
-    table = Table([Column("name"), _wrapped("what it is")], "engines")
+    table = Table([Column("name"), _wrapping_column("what it is")], "engines")
     for name, words in describe_engines().items():
         table.add(name, words)
     show(table.terminal())
 
 
-def _wrapped(head: str) -> Column:
+def _wrapping_column(head: str) -> Column:
     """Return a column that gives way on a narrow screen; names do not."""
     return Column(head, wrap=True)
 

@@ -91,31 +91,33 @@ def spell_out(command: Callable[..., int | None]) -> Callable[..., int | None]:
     A group is a dataclass whose fields are options; of `RunOptions` the command says which ones it takes.
     """
     hints = get_type_hints(command, include_extras=True)
-    own = inspect.signature(command).parameters
+    parameters = inspect.signature(command).parameters
     groups: dict[str, tuple[Any, dict[str, Any]]] = {}  # {parameter: its class, its fields}
     single: dict[str, inspect.Parameter] = {}
 
     def add(name: str) -> None:
-        parameter = own[name].replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+        parameter = parameters[name].replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
         single.setdefault(name, parameter)
 
     for name, hint in hints.items():
         kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-        if name in own and not is_dataclass(kind):
+        if name in parameters and not is_dataclass(kind):
             add(name)
-        elif name in own:
+        elif name in parameters:
             declared = declared_options(kind)
             takes = next((extra for extra in extras if isinstance(extra, Takes)), Takes([*declared]))
             defaults = {option: getattr(kind(), option) for option in declared}
             for each in takes.names:
-                if each in own:
+                if each in parameters:
                     add(each)
                     continue
                 for option in group_names(each) if kind is RunOptions else [each]:
-                    single[option] = _typed(option, *declared[option], defaults[option], takes.words.get(option))
+                    single[option] = _make_parameter(
+                        option, *declared[option], defaults[option], takes.words.get(option)
+                    )
             groups[name] = (
                 kind,
-                {option: defaults[option] for option in declared if option in single and option not in own},
+                {option: defaults[option] for option in declared if option in single and option not in parameters},
             )
 
     @functools.wraps(command)
@@ -129,7 +131,7 @@ def spell_out(command: Callable[..., int | None]) -> Callable[..., int | None]:
     return spelled_out
 
 
-def _typed(name: str, kind: Any, option: Option, default: Any, words: str | None) -> inspect.Parameter:
+def _make_parameter(name: str, kind: Any, option: Option, default: Any, words: str | None) -> inspect.Parameter:
     """Return an option as a parameter of typer: what has several values is a list, and None where nothing is typed."""
     several = next((part for part in (kind, *get_args(kind)) if get_origin(part) in (tuple, dict)), None)
     if several is not None:

@@ -108,8 +108,8 @@ def _sampling(run: Run, options: RunOptions) -> Sampling:
     """Return the size and the seed of a run, and the place where it asked."""
     stored, typed = run.provenance.get("place", ""), options.place_words
     if stored != typed:
-        found = f"a run with {stored or 'no place'}, and here {typed or 'none'}"
-        raise MisuseError("REPORT", found, "the same options")
+        difference = f"a run with {stored or 'no place'}, and here {typed or 'none'}"
+        raise MisuseError("REPORT", difference, "the same options")
     try:
         examples, seed = (int(run.provenance[name]) for name in ("examples", "seed"))
     except (KeyError, ValueError):

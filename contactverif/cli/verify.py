@@ -228,8 +228,8 @@ class Job:
             return
         plan, outputs = self.plan(), tuple(self.files.paths.values())
         folder = journal_folder(self.files.paths[self.output.suffix.lower()])
-        held = hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs)
-        with held as aside:
+        journal = hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs)
+        with journal as aside:
             if aside:
                 folder_aside = self.output.parent / aside
                 echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", to_stderr=True)
@@ -245,7 +245,7 @@ def new_job(options: RunOptions, *, fresh_seed: int | None = None, command: str 
     """Return the job of options as they were typed. Where nothing says the seed it is the fresh one, or a new one."""
     files = OutputFiles.check(options.out, RUN_FILES)
     folder = picture_folder(options.pictures)
-    return Job(options.settled(fresh_seed), files, folder, read_place(options), command=command)
+    return Job(options.settle(fresh_seed), files, folder, read_place(options), command=command)
 
 
 def resumed_job(output: Path, typed: RunOptions, command: str = VERIFY) -> Job:
@@ -447,8 +447,8 @@ def _judge_last_failed(job: Job) -> int:
     ]
     if others:
         raise MisuseError("--last-failed", f"{' and '.join(others)} beside it", "--last-failed alone")
-    asked, memory = (job.options.names, job.options.properties), FailureMemory()
-    failures = memory.recall(*asked)
+    names, memory = (job.options.names, job.options.properties), FailureMemory()
+    failures = memory.recall(*names)
     if not failures:
         words = f"no failure of {', '.join(map(repr, job.options.names))} in .contactverif"
         raise MisuseError("--last-failed", words, "a run of `verify` here in which something fails")
@@ -458,6 +458,6 @@ def _judge_last_failed(job: Job) -> int:
     memory.update(result.rows)
     print_plugin_output()
     show(RunScreen(result))
-    left = len(memory.recall(*asked))  # What cannot be judged now is left, too.
+    left = len(memory.recall(*names))  # What cannot be judged now is left, too.
     show(f"{left} of {len(failures)} failures of earlier runs are left.")
     return 0 if result.promises_kept else 1

@@ -38,7 +38,7 @@ class Isolation(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """How an option is typed, and what its setting needs. A flag that is typed changes a default of True or False."""
+    """The words and the needs of an option. A flag that is typed changes a default of True or False."""
 
     help: str
     metavar: str | None = None
@@ -223,7 +223,7 @@ class RunOptions:
         known = {name: reason for name, reason in settings.known.items() if name in matching}
         return replace(options, known=self.known | known)
 
-    def settled(self, fresh_seed: int | None = None) -> RunOptions:
+    def settle(self, fresh_seed: int | None = None) -> RunOptions:
         """Return the options with all that a journal must know: ids for patterns, numbers of the profile, the place.
 
         Where nothing says the seed it is the fresh one, or a new one. Options that are obeyed before are not kept.

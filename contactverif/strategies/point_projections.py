@@ -172,11 +172,11 @@ def projections(*, kinds: Collection[str] | None = None) -> SearchStrategy[Proje
     >>> tie.tied, tie.find_mistake(1), tie.find_mistake(2)
     ((1, 2), '', '')
     """
-    chosen = tuple(KINDS) if kinds is None else tuple(kinds)
-    unknown = [kind for kind in chosen if kind not in KINDS]
-    if unknown or not chosen:
+    selection = tuple(KINDS) if kinds is None else tuple(kinds)
+    unknown = [kind for kind in selection if kind not in KINDS]
+    if unknown or not selection:
         raise MisuseError("kinds", ", ".join(map(repr, unknown)) or "none", f"some of {', '.join(KINDS)}")
-    return st.sampled_from(chosen).flatmap(_projections)
+    return st.sampled_from(selection).flatmap(_projections)
 
 
 @st.composite
@@ -197,7 +197,7 @@ class _Scene:
     closed: Collection[int] = ()  # The places of the chains whose last node is joined to the first.
     order: Sequence[int] | None = None  # The segments in another order.
 
-    def moved(self, motion: Callable[[complex], complex]) -> _Scene:
+    def move(self, motion: Callable[[complex], complex]) -> _Scene:
         return _Scene([[*map(motion, chain)] for chain in self.chains], motion(self.point), self.closed, self.order)
 
     def project(self, kind: str) -> Projection:
@@ -271,13 +271,13 @@ def _moved_exactly(draw: DrawFn, scene: _Scene) -> _Scene:
     turn, reach = draw(_EXACT_TURNS), 2 ** draw(st.integers(0, 20))
     way = complex(draw(st.integers(-reach, reach)), draw(st.integers(-reach, reach)))
     scale = math.ldexp(1, draw(st.integers(-12, 4)))
-    return scene.moved(lambda place: (place * turn + way) * scale)
+    return scene.move(lambda place: (place * turn + way) * scale)
 
 
 def _moved_anyhow(draw: DrawFn, scene: _Scene, reach: float = 8.0, scale: float = 1.0) -> _Scene:
     """Turn a scene by any angle and move it; each coordinate fills its mantissa."""
     turn, way = _direction(draw), complex(_real(draw, -reach, reach), _real(draw, -reach, reach))
-    return scene.moved(lambda place: (place * turn + way) * scale)
+    return scene.move(lambda place: (place * turn + way) * scale)
 
 
 def _beside(draw: DrawFn, first: complex, second: complex, low: int = -30, high: int = -2) -> complex:
@@ -381,7 +381,7 @@ def _tiny_gap(draw: DrawFn) -> _Scene:
     sixteenths = draw(st.integers(1, 15).filter(lambda k: k != 8))
     turn = draw(st.sampled_from([1, 1j, *(complex(a, b) for a, b in _PYTHAGOREAN)])) / 2**8
     scene = _Scene([chain], first + sixteenths / 16 * (second - first))
-    return _one_ulp_off(draw, scene.moved(lambda place: (place - (first + second) / 2) * turn))
+    return _one_ulp_off(draw, scene.move(lambda place: (place - (first + second) / 2) * turn))
 
 
 def _cavity(draw: DrawFn) -> _Scene:
@@ -417,9 +417,9 @@ def _thin_body(draw: DrawFn) -> _Scene:
     body = _polygon(draw, 8, 20, flat=_power(draw, -8, -4))
     way = complex(2, -_real(draw, 0.4, 0.6))
     behind = [node + way for node in _rough_chain(draw, 4, 4, steepest=0.02)]
-    one, other = draw(st.permutations(body))[:2]
+    first, second = draw(st.permutations(body))[:2]
     share = 0.5 + draw(_SIGNS) * _power(draw, -30, -3)
-    return _moved_anyhow(draw, _Scene([body, behind], one + share * (other - one), closed=[0]))
+    return _moved_anyhow(draw, _Scene([body, behind], first + share * (second - first), closed=[0]))
 
 
 def _seam(draw: DrawFn) -> _Scene:
@@ -449,7 +449,7 @@ def _tiny_segment(draw: DrawFn) -> _Scene:
     before, behind = _rough_chain(draw, 1, 4), _rough_chain(draw, 1, 4)
     tiny, turn = -1e-9 * _turn(_real(draw, -0.3, 0.3)), _direction(draw)
     chain = [*(node - before[-1] for node in before), *(node + tiny for node in behind)]
-    return _Scene([chain], _power(draw, -33, -1) * _direction(draw)).moved(lambda place: place * turn)
+    return _Scene([chain], _power(draw, -33, -1) * _direction(draw)).move(lambda place: place * turn)
 
 
 def _far_away(draw: DrawFn) -> _Scene:
@@ -459,7 +459,7 @@ def _far_away(draw: DrawFn) -> _Scene:
 
 def _other_units(draw: DrawFn) -> _Scene:
     factor = math.ldexp(1, 60 * draw(_SIGNS))
-    return _inside(draw).moved(lambda place: place * factor)
+    return _inside(draw).move(lambda place: place * factor)
 
 
 def _long_chain(draw: DrawFn) -> _Scene:
@@ -506,27 +506,27 @@ def _is_before_sharp_tip(projection: Projection) -> bool:
 KINDS: dict[str, tuple[Callable[[DrawFn], _Scene], Callable[[Projection], bool]]] = {
     "inside": (_inside, _has_inner_foot),
     "free-end": (_free_end, _is_past_free_end),
-    "convex-vertex": (lambda draw: _vertex(draw, 1), lambda it: _lies_off_a_vertex(it) and it.side > 0),
-    "concave-vertex": (lambda draw: _vertex(draw, -1), lambda it: _lies_off_a_vertex(it) and it.side < 0),
+    "convex-vertex": (lambda draw: _vertex(draw, 1), lambda case: _lies_off_a_vertex(case) and case.side > 0),
+    "concave-vertex": (lambda draw: _vertex(draw, -1), lambda case: _lies_off_a_vertex(case) and case.side < 0),
     "valley": (_valley, _has_inner_foot),
     "bisector": (_bisector, _is_tie),
-    "node-hit": (_node_hit, lambda it: it.side != 0 and any(near.xi in (0, 1) for near in it._exact.segments)),
+    "node-hit": (_node_hit, lambda case: case.side != 0 and any(near.xi in (0, 1) for near in case._exact.segments)),
     "node-almost-hit": (_node_almost_hit, _almost_hits_node),
     "near-tie": (_near_tie, _has_inner_foot),
-    "three-feet": (_three_feet, lambda it: len(it.tied) >= 3),
-    "touching": (_touching, lambda it: it.squared_distance == 0),
-    "tiny-gap": (_tiny_gap, lambda it: _has_inner_foot(it) and 0 < it.squared_distance <= 1e-30),
+    "three-feet": (_three_feet, lambda case: len(case.tied) >= 3),
+    "touching": (_touching, lambda case: case.squared_distance == 0),
+    "tiny-gap": (_tiny_gap, lambda case: _has_inner_foot(case) and 0 < case.squared_distance <= 1e-30),
     "node-elsewhere": (_cavity, _is_nearer_to_another_node),
     "sharp-tip": (_sharp_tip, _is_before_sharp_tip),
-    "several-chains": (_several_chains, lambda it: True),
-    "thin-body": (_thin_body, lambda it: it.side < 0),
-    "seam": (_seam, lambda it: len(it.segments) - 1 in it.tied),
-    "offset-1e6": (lambda draw: _offset(draw, 1e6), lambda it: True),
-    "offset-1e8": (lambda draw: _offset(draw, 1e8), lambda it: True),
-    "tiny-segment": (_tiny_segment, lambda it: True),
-    "far-away": (_far_away, lambda it: True),
+    "several-chains": (_several_chains, lambda case: True),
+    "thin-body": (_thin_body, lambda case: case.side < 0),
+    "seam": (_seam, lambda case: len(case.segments) - 1 in case.tied),
+    "offset-1e6": (lambda draw: _offset(draw, 1e6), lambda case: True),
+    "offset-1e8": (lambda draw: _offset(draw, 1e8), lambda case: True),
+    "tiny-segment": (_tiny_segment, lambda case: True),
+    "far-away": (_far_away, lambda case: True),
     "other-units": (_other_units, _has_inner_foot),
-    "long-chain": (_long_chain, lambda it: True),
+    "long-chain": (_long_chain, lambda case: True),
 }
 
 

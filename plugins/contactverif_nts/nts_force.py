@@ -221,7 +221,7 @@ def area_length(x: Array, slave: IntArray, segment: int, other: int) -> float:
 
 
 class Variation(NamedTuple):
-    """What the numbers of a point gain for a displacement of one node."""
+    """The change of the numbers of a point for a displacement of one node."""
 
     omega: Vector
     g: Vector

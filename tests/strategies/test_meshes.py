@@ -36,7 +36,7 @@ def test_a_state_is_one_of_the_interface(data: st.DataObject, smooth: bool) -> N
 
 def test_faces_may_have_either_number_of_corners() -> None:
     for corners in (3, 4):
-        find(faces(corners=(4, 3)), lambda it, corners=corners: it.slave.faces.shape[1] == corners)  # type: ignore[misc]
+        find(faces(corners=(4, 3)), lambda case, corners=corners: case.slave.faces.shape[1] == corners)  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
