@@ -17,11 +17,16 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.names import unknown_name_error
 from contactverif.contract.result import Run
 from contactverif.explanations.case_numbers import case_text
-from contactverif.explanations.known_failures import stated_failures
-from contactverif.explanations.markdown import without_links
-from contactverif.explanations.property_text import property_text
-from contactverif.explanations.terms import list_of_terms, symbol_meanings, term_text, term_texts
-from contactverif.explanations.trait_text import trait_names, trait_text
+from contactverif.explanations.property_text import property_text, stated_failures
+from contactverif.explanations.terms import (
+    list_of_terms,
+    symbol_meanings,
+    term_text,
+    term_texts,
+    trait_names,
+    trait_text,
+    without_links,
+)
 from contactverif.plugins.registry import load_formulations, property_ids, the_property
 from contactverif.run.run_options import RunOptions
 from contactverif_reports.netcdf.read import read_run

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from contactverif.contract.arrays import Array, FloatArray, dense
 from contactverif.contract.errors import ContractError
-from contactverif.contract.subject import Subject
+from contactverif.contract.interface import Interface
+from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state
 from contactverif.diagnosis.force_patterns import diagnose_forces
-from contactverif.diagnosis.scale_patterns import diagnose_scale
-from contactverif.diagnosis.state_patterns import diagnose_memory
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
-OF_MEMORY = ("purity",)
-OF_TANGENTS = ("tangent.", "newton.")
-OF_DIGITS = ("stability.",)
+_OF_MEMORY = ("purity",)
+_OF_TANGENTS = ("tangent.", "newton.")
+_OF_DIGITS = ("stability.",)
 
 
 def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> str:
@@ -26,21 +27,92 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
     """
     try:
         with np.errstate(all="ignore"):
-            if property_id.startswith(OF_MEMORY):  # Other patterns mean nothing then.
-                return diagnose_memory(subject)
+            if property_id.startswith(_OF_MEMORY):  # Other patterns mean nothing then.
+                return _diagnose_memory(subject)
             every = (property_id, *others)
-            if all(name.startswith(OF_TANGENTS) for name in every):
-                return _introduce(diagnose_tangent(subject))
+            if all(name.startswith(_OF_TANGENTS) for name in every):
+                text = diagnose_tangent(subject)
+                return f"only the tangent fails: {text}" if text else ""
             in_full = property_id.startswith("patch.") or subject.traits.promises.patch.flat is True
             text = diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
-            if not text and not property_id.startswith((*OF_DIGITS, *OF_TANGENTS)):
-                text = diagnose_scale(subject)
-            return text or (diagnose_tangent(subject) if property_id.startswith(OF_TANGENTS) else "")
+            if not text and not property_id.startswith((*_OF_DIGITS, *_OF_TANGENTS)):
+                text = _diagnose_scale(subject)
+            return text or (diagnose_tangent(subject) if property_id.startswith(_OF_TANGENTS) else "")
     except ContractError:
         return ""
 
 
-def _introduce(text: str) -> str:
-    """Return what is said of a tangent where no property of forces fails; empty if there is nothing to say."""
-    return f"only the tangent fails: {text}" if text else ""
+_SCALES = range(0, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
+# A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
+_SAME_SCALED = 2.0**-20
+
+
+def _diagnose_scale(subject: Subject) -> str:
+    """Return at which size of the mesh forces over size are others than before; empty if they never are."""
+    if subject.traits.rules.enforcement != "penalty":
+        return ""
+    reference = _scaled_forces(subject, 1.0)
+    for sign, word in ((-1, "smaller"), (1, "larger")):
+        for power in _SCALES[1:]:
+            factor = 2.0 ** (sign * power)
+            forces = _scaled_forces(subject, factor)
+            if np.abs(forces - reference).max() > _SAME_SCALED * np.abs(reference).max():
+                sizes = f"gaps of {factor * DEPTH:.1e} on segments of about {factor:.1e}"
+                return f"forces do not scale with a mesh 2^{power} times {word} ({sizes}): look for an absolute length"
+    return ""
+
+
+def _scaled_forces(subject: Subject, factor: float) -> FloatArray:
+    """Return the forces (n_unknowns,) on a mesh of another size, over the square of its size."""
+    case = flat_state().case
+    interface, z = case.interface.at(case.interface.nodes * factor), case.z * factor
+    formulation = subject.for_interface(interface, case.penalty)
+    forces: FloatArray = formulation.residual(interface, formulation.pair(interface, z), z)
+    return forces / factor**2  # A force is ε̂ |g| times a length.
+
+
+_TILT = 2.0**-4  # The slope of a slave that has other normals.
+_SLIDE = 0.625  # The way along the surface after which most slave nodes face another segment.
+
+
+def _diagnose_memory(subject: Subject) -> str:
+    """Return which call lets a later one answer otherwise; empty if none of these does."""
+    state = flat_state()
+    interface, z = state.case.interface, state.case.z
+    slid = z.copy()
+    slid[: 2 * state.n_slave_nodes : 2] += _SLIDE
+    others = {
+        "at which the slave is tilted": flat_state(slope=1.0, depth=_TILT).case.z,
+        "at which nodes face other segments": slid,
+    }
+    for call in ("residual", "tangent") if "tangent" in subject.provides else ("residual",):
+        if text := _what_changes(call, subject, interface, z, others):
+            return text
+    return ""
+
+
+def _what_changes(call: str, subject: Subject, interface: Interface, z: Array, others: Mapping[str, Array]) -> str:
+    """Return which call lets one answer otherwise at a state than a new instance does."""
+    first = _answer(call, subject.for_interface(interface, PENALTY), interface, z)
+    if not np.array_equal(_answer(call, subject.for_interface(interface, PENALTY), interface, z), first):
+        return f"something is kept outside of the instance: `{call}` of a new one answers otherwise"
+    before = {"when it is asked the same again": (call, z)}
+    for words, at in others.items():
+        before |= {f"after `{other}` of a state {words}": (other, at) for other in ("pair", call)}
+    for words, (other, at) in before.items():
+        formulation = subject.for_interface(interface, PENALTY)
+        _answer(other, formulation, interface, at)
+        if not np.array_equal(_answer(call, formulation, interface, z), first):
+            return f"something is kept between calls: `{call}` answers otherwise {words}"
+    return ""
+
+
+def _answer(call: str, formulation: CheckedFormulation, interface: Interface, z: Array) -> FloatArray:
+    """Return what a formulation answers at a state; of the pairing nothing, since it may hold what it likes."""
+    pairing = formulation.pair(interface, z)
+    if call == "pair":
+        return np.empty(0)
+    if call == "residual":
+        return formulation.residual(interface, pairing, z)
+    return dense(formulation.tangent(interface, pairing, z))

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import Subject
@@ -23,6 +23,9 @@ FINE = np.array([0.0, 0.5, 1.0, 1.625, 2.0, 2.625, 3.125]), np.array([3.625, 1.2
 COARSE = np.array([0.0, 3.125]), MASTER
 DEPTH = 2.0**-10  # So small that a slave that is tilted by it is as long as its projection, to 5e-7.
 PENALTY = 2.0**10
+# Two sizes are the same within this share of the largest. A tilt of the state by DEPTH changes them by less, and so do
+# all roundings, even if forces are summed in single precision.
+SAME = 1e-4
 _GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)  # Two points integrate cubic functions exactly.
 
 
@@ -107,3 +110,14 @@ def pushes_of(subject: Subject, state: FlatState) -> FloatArray:
     forces: FloatArray = -formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
     sides = np.where(np.arange(len(forces)) < state.n_slave_nodes, 1.0, -1.0)
     return forces * sides[:, None]
+
+
+def equal(a: FloatArray, b: FloatArray) -> BoolArray:
+    """Return which numbers are the same, over the largest of the second list."""
+    result: BoolArray = np.abs(a - b) <= SAME * np.abs(b).max()
+    return result
+
+
+def same(a: FloatArray, b: FloatArray) -> bool:
+    """Return whether all numbers are the same, over the largest of the second list."""
+    return bool(equal(a, b).all())

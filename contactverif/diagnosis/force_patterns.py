@@ -9,16 +9,26 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import COARSE, DEPTH, FINE, PENALTY, FlatState, flat_state, pushes_of
-from contactverif.diagnosis.lost_places import diagnose_lost_places
+from contactverif.diagnosis.flat_state import (
+    COARSE,
+    DEPTH,
+    FINE,
+    PENALTY,
+    SAME,
+    FlatState,
+    equal,
+    flat_state,
+    pushes_of,
+    same,
+)
 from contactverif.diagnosis.other_states import (
     diagnose_balance,
     diagnose_digits,
     diagnose_law,
+    diagnose_lost_places,
     diagnose_open_segment,
     diagnose_turned,
 )
-from contactverif.diagnosis.piece_patterns import SAME, equal, of_pieces, same
 
 _MEANINGS = {  # {factor: what it may mean}
     2.0: "two passes that each have the whole penalty, or a factor 2",
@@ -57,13 +67,21 @@ def _diagnose_uniform(subject: Subject, *, in_full: bool) -> str:
     """Return the pattern of the forces of a uniform penetration, on the mesh on which no two segments are alike."""
     state = flat_state()
     forces = pushes_of(subject, state)
-    return _uniform_pattern(state, forces, in_full=in_full) or _along_the_surface(forces)
+    if text := _uniform_pattern(state, forces, in_full=in_full):
+        return text
+    if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
+        return "the forces have a part along the surface, where both normals are the same"
+    return ""
 
 
 def _diagnose_linear(subject: Subject) -> str:
     """Return the pattern of the forces of a penetration that grows along the slave."""
     state = flat_state(slope=1.0)
-    return _linear_pattern(state, pushes_of(subject, state)[:, 1])
+    pushes = pushes_of(subject, state)[:, 1]
+    if same(pushes, state.exact):
+        return ""
+    # Other rules of integration give other forces, and are not wrong.
+    return _exchange(state, pushes, master=False) or _exchange(state, pushes, master=True)
 
 
 def _on_other_meshes(subject: Subject, *, in_full: bool) -> str:
@@ -90,12 +108,18 @@ def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> 
         or _segment_pattern("master", state.pieces, state.master_segment, pushes)
         or _exchange(state, pushes, master=True)
     )
-    return text or (_pattern_in_full(state, pushes) if in_full else _whole_springs(pushes[:n]))
-
-
-def _pattern_in_full(state: FlatState, pushes: FloatArray) -> str:
-    """Return the pattern of forces that are wrong because they are not the consistent ones."""
-    return of_pieces(state, pushes) or _whole_springs(pushes[: state.n_slave_nodes]) or _side_pattern(state, pushes)
+    if text or not in_full:
+        return text or _whole_springs(pushes[:n])
+    return (
+        _single_piece(state, pushes)
+        or _piece_factors(state, pushes)
+        or _halves(state, pushes)
+        or _nearest_nodes(state, pushes)
+        or _whole_segments(state, pushes)
+        or _shifted_points(state, pushes)
+        or _whole_springs(pushes[:n])
+        or _side_pattern(state, pushes)
+    )
 
 
 def _whole_springs(pushes: FloatArray) -> str:
@@ -149,21 +173,6 @@ def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
     return f"the forces are wrong on both sides{total}"
 
 
-def _along_the_surface(forces: FloatArray) -> str:
-    """Return whether the forces have a part along a flat surface, on which all normals are the same."""
-    if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
-        return "the forces have a part along the surface, where both normals are the same"
-    return ""
-
-
-def _linear_pattern(state: FlatState, pushes: FloatArray) -> str:
-    """Return the pattern of the forces of a penetration that grows along the slave, if one is known."""
-    if same(pushes, state.exact):
-        return ""
-    # Other rules of integration give other forces, and are not wrong.
-    return _exchange(state, pushes, master=False) or _exchange(state, pushes, master=True)
-
-
 def _node_pattern(pushes: FloatArray, exact: FloatArray) -> str:
     """Return what factor the ends of the slave have, if all nodes between them are right."""
     inner = equal(pushes, exact)[1:-1].all()
@@ -182,7 +191,8 @@ def _segment_pattern(side: str, pieces: FloatArray, of_pieces: IntArray, pushes:
         return ""
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
-        return f"{_list(side, missed)} {'is' if len(missed) == 1 else 'are'} left out{_ends(missed, len(segments))}"
+        listed = f"{side} segment{'s' * (len(missed) > 1)} {', '.join(map(str, missed))}"
+        return f"{listed} {'is' if len(missed) == 1 else 'are'} left out{_ends(missed, len(segments))}"
     words = ", ".join(f"{side} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
     ends = _ends(segments[wrong].tolist(), len(segments))
     return f"segments have forces of another size: {words} the exact one, all others right{ends}"
@@ -223,5 +233,114 @@ def _times(factor: float) -> str:
     return f"{factor:.4g} times"
 
 
-def _list(side: str, segments: Sequence[int]) -> str:
-    return f"{side} segment{'s' * (len(segments) > 1)} {', '.join(map(str, segments))}"
+_MOST_POINTS = 4  # More are used by hardly anybody.
+
+
+def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
+    """Return which pieces are left out, or whether a length of the master is counted, if the pieces have factors."""
+    factors = np.asarray(np.linalg.lstsq(state.pieces.T, pushes, rcond=None)[0], dtype=np.float64)
+    if not same(state.pieces.T @ factors, pushes):
+        return ""
+    of_slave = np.diff(state.along[: state.n_slave_nodes])[state.slave_segment]
+    of_master = -np.diff(state.along[state.n_slave_nodes :])[state.master_segment]
+    lengths = {
+        "is counted, too": of_master,
+        "divides the force": 1 / of_master,
+        "stands where that of the slave segment belongs": of_master / of_slave,
+    }
+    for words, ratios in lengths.items():
+        if same(factors, ratios):
+            return f"the length of the master segment {words}"
+    places = [
+        f"slave segment {slave} on master segment {master}"
+        for slave, master, factor in zip(state.slave_segment, state.master_segment, factors, strict=True)
+        if abs(factor) < SAME
+    ]
+    rest = factors[np.abs(factors) >= SAME]
+    return f"parts are left out: {', '.join(places)}" if places and same(rest, np.ones(len(rest))) else ""
+
+
+def _single_piece(state: FlatState, pushes: FloatArray) -> str:
+    """Return whether each wrong node has the force of one piece, or one segment, where several are to be added."""
+    parts = [*state.pieces]
+    for of_pieces in (state.slave_segment, state.master_segment):
+        parts += [state.pieces[of_pieces == segment].sum(axis=0) for segment in np.unique(of_pieces)]
+    wrong = ~equal(pushes, state.exact)
+    alike = [np.abs(part - pushes) <= SAME * np.abs(state.exact).max() for part in parts]
+    if not (np.any(alike, axis=0) & (pushes != 0))[wrong].all():
+        return ""
+    return "nodes that belong to several pieces have the force of one alone: the others are overwritten, and not added"
+
+
+def _halves(state: FlatState, pushes: FloatArray) -> str:
+    """Return whether both nodes of a master segment take the same force, wherever it acts."""
+    n, halves = state.n_slave_nodes, np.zeros(len(pushes))
+    for piece, segment in zip(state.pieces, state.master_segment, strict=True):
+        halves[state.case.interface.master.segments[segment]] += piece[n:].sum() / 2
+    if not same(pushes[:n], state.exact[:n]) or not same(pushes[n:], halves[n:]):
+        return ""
+    return "both nodes of a master segment take half of its force, wherever it acts: the shape functions are ½"
+
+
+def _nearest_nodes(state: FlatState, pushes: FloatArray) -> str:
+    """Return whether the whole force of a point of integration is that of the nearer node of a side."""
+    interface, along, n = state.case.interface, state.along, state.n_slave_nodes
+    sides = {
+        "slave": (interface.slave.segments[state.slave_segment], slice(None, n)),
+        "master": (interface.master.segments[state.master_segment], slice(n, None)),
+    }
+    for side, (segments, nodes) in sides.items():
+        for n_points in range(1, _MOST_POINTS + 1):
+            forces = np.zeros(len(pushes))
+            for start, length, of_piece in zip(state.starts, state.lengths, segments, strict=True):
+                places, weights = np.polynomial.legendre.leggauss(n_points)
+                distances = np.abs(along[of_piece] - (start + (places[:, None] + 1) / 2 * length))
+                np.add.at(forces, of_piece[distances.argmin(axis=1)], PENALTY * DEPTH * length * weights / 2)
+            if same(pushes[nodes], forces[nodes]):
+                return f"the whole force of a point of integration goes to the nearer node of the {side} segment"
+    return ""
+
+
+def _whole_segments(state: FlatState, pushes: FloatArray) -> str:
+    """Return whether the forces are those of points of whole slave segments, which nodes of the master do not cut."""
+    for n_points in range(1, _MOST_POINTS + 1):
+        places, weights = np.polynomial.legendre.leggauss(n_points)
+        if same(pushes, _sum_at_points(state, (places + 1) / 2, weights / 2)):
+            return (
+                f"the points of integration are the {n_points} of whole slave segments, not cut at the master's nodes"
+            )
+    return ""
+
+
+def _shifted_points(state: FlatState, pushes: FloatArray) -> str:
+    """Return by which share of its length the force of each piece acts beside the middle, if it is the same for all."""
+    shifts = np.zeros(len(pushes))  # The change of the forces if the share is 1.
+    interface, along = state.case.interface, state.along
+    sides = (interface.slave.segments[state.slave_segment], interface.master.segments[state.master_segment])
+    for segments in sides:
+        change = PENALTY * DEPTH * state.lengths**2 / (along[segments[:, 1]] - along[segments[:, 0]])
+        np.add.at(shifts, segments, np.stack([-change, change], axis=1))
+    share = float(shifts @ (pushes - state.exact) / (shifts @ shifts))
+    if not same(pushes, state.exact + share * shifts):
+        return ""
+    end = "end" if share > 0 else "start"
+    return (
+        f"the force of each part acts {abs(share):.3g} of its length nearer to the part's {end}: look at the places of "
+        "the points of integration and at their weights"
+    )
+
+
+def _sum_at_points(state: FlatState, places: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the forces (n_nodes,) of a uniform pressure that is summed at places 0 to 1 of each slave segment."""
+    interface, along, forces = state.case.interface, state.along, np.zeros(len(state.along))
+    for nodes in interface.slave.segments:
+        length = along[nodes[1]] - along[nodes[0]]
+        for place, weight in zip(places, weights, strict=True):
+            x = along[nodes[0]] + place * length
+            shares = (x - along[interface.master.segments[:, 0]]) / np.diff(along[interface.master.segments], axis=1)[
+                :, 0
+            ]
+            (segment,) = np.flatnonzero((shares >= 0) & (shares < 1))
+            for ends, share in ((nodes, place), (interface.master.segments[segment], shares[segment])):
+                forces[ends] += PENALTY * DEPTH * length * weight * np.array([1 - share, share])
+    return forces

@@ -15,8 +15,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
-from contactverif.explanations.markdown import plain
-from contactverif.explanations.terms import symbol_meanings
+from contactverif.explanations.terms import plain, symbol_meanings
 
 # A word, or a product of two symbols such as uX; what follows may make it another symbol: h_m, K', P1.
 _WORD = re.compile(r"ΣH/M|ε̂|[A-Za-z]+|[^\W\d_]", re.UNICODE)

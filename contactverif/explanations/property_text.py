@@ -1,18 +1,77 @@
-"""The text that explains a property: what it asks, why, what it measures, and against which tolerance."""
+"""The text that explains a property: what it asks, why, what it measures, its tolerance, and its known failures."""
 
 from __future__ import annotations
 
+import csv
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from functools import cache
 from itertools import combinations
 
 from contactverif.contract.measurement import Quantity
 from contactverif.contract.property import Property
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.explanations.case_numbers import symbols_of
-from contactverif.explanations.known_failures import known_failures
-from contactverif.explanations.markdown import plain, sentence
-from contactverif.explanations.terms import symbol_meanings
+from contactverif.explanations.terms import plain, read_text, sentence, symbol_meanings
+
+_MOST_MISTAKES = 4
+
+
+@cache
+def _table(name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(read_text(name).splitlines()))
+
+
+def planted_mistakes(property_id: str) -> list[str]:
+    """Return the mistakes that a property is meant to catch, the plainest first, as the table has them."""
+    return [row["mutant"] for row in _table("kills.csv") if row["caught by"] == property_id]
+
+
+def smallest_mesh(property_id: str) -> str:
+    """Return in words the smallest mesh on which a planted mistake failed a property; empty if none was shrunk."""
+    sizes = [
+        (tuple(map(int, row["seed 0"].split())), row["mutant"])
+        for row in _table("smallest_cases.csv")
+        if row["caught by"] == property_id
+    ]
+    if not sizes:
+        return ""
+    (n_slave, n_master, _), mutant = min(sizes, key=lambda item: (sum(item[0][:2]), item[0]))
+    segments = f"{n_slave} slave segment{'s' * (n_slave > 1)} on {n_master} of the master"
+    return f"{segments}, for the mistake “{plain(mutant)}”"
+
+
+def known_failures(question: Property) -> str:
+    """Return in Markdown which mistakes fail a property, and how small the mesh is that shows it."""
+    facts = []
+    if mistakes := planted_mistakes(question.id):
+        listed = "; ".join(map(plain, mistakes[:_MOST_MISTAKES]))
+        others = f"; and {len(mistakes) - _MOST_MISTAKES} more" if len(mistakes) > _MOST_MISTAKES else ""
+        facts.append(f"- **Usual causes:** it is meant to catch mistakes such as these: {listed}{others}.")
+    if mesh := smallest_mesh(question.id):
+        facts.append(f"- **Smallest failing mesh:** {mesh}.")
+    elif mistakes:
+        facts.append("- **Smallest failing mesh:** the cases are a list, none of which is made smaller.")
+    return "\n".join(["## Known failures\n", *facts]) + "\n"
+
+
+def stated_failures(question: Property, installed: Iterable[object]) -> str:
+    """Return in Markdown which of the installed formulations state that they fail a property, and by which witness.
+
+    What is installed may be a wrapper, or may not load; neither states anything.
+    """
+    failing = [
+        f"`{subject.name}` (`{subject.traits.witness(question.id)}`)"
+        for subject in installed
+        if isinstance(subject, Subject)
+        and question.promise(subject.traits) is False
+        and not question.refusal_of(subject)
+    ]
+    if not failing:
+        return "No installed formulation states that it fails.\n"
+    return f"These formulations state that they fail, each with a witness: {', '.join(failing)}.\n"
+
 
 _VALUES = {
     "flat": (True,),
@@ -49,18 +108,12 @@ def promised_by(question: Property) -> str:
     names = Traits().by_name().keys()
     singles = [(name, value) for name, values in _VALUES.items() if name in names for value in values]
     for sets in (zip(singles), combinations(singles, 2)):
-        hits = [dict(hit) for hit in sets if len(dict(hit)) == len(hit) and _promises(question, hit)]
+        hits = [
+            dict(hit) for hit in sets if len(dict(hit)) == len(hit) and question.promise(Traits().revise(**dict(hit)))
+        ]
         if hits:
-            return " or ".join(map(_words_of_traits, hits))
+            return " or ".join(" with ".join(f"`{name}={hit[name]!r}`" for name in sorted(hit)) for hit in hits)
     return "no trait"
-
-
-def _words_of_traits(values: Mapping[str, object]) -> str:
-    return " with ".join(f"`{name}={values[name]!r}`" for name in sorted(values))
-
-
-def _promises(question: Property, values: Iterable[tuple[str, object]]) -> bool:
-    return bool(question.promise(Traits().revise(**dict(values))))
 
 
 def property_text(question: Property) -> str:
@@ -108,7 +161,7 @@ def _tolerances(quantities: Sequence[Quantity]) -> str:
         sign = "≤" if quantity.sense == "at most" else "≥"
         groups.setdefault((f"{sign} {quantity.tolerance}", quantity.unit), []).append(quantity.name)
     lines = [
-        f"- **{plain('; '.join(names))}** {plain(tolerance)} ({_unit(unit)})"
+        f"- **{plain('; '.join(names))}** {plain(tolerance)} ({'ratio' if unit == '1' else unit})"
         for (tolerance, unit), names in groups.items()
     ]
     return "\n".join(lines) + "\n"
@@ -118,8 +171,9 @@ def _reasons(quantities: Sequence[Quantity]) -> str:
     """Return the list of the reasons of tolerances: first those that all quantities share."""
     owners: dict[str, list[str]] = {}
     for quantity in quantities:
-        for clause in _clauses(quantity.reason):
-            owners.setdefault(clause, []).append(quantity.name)
+        for part in re.split(r";|\.(?= )", quantity.reason):  # Its sentences, or parts between semicolons.
+            if clause := part.strip(" ."):
+                owners.setdefault(clause, []).append(quantity.name)
     everywhere = [clause for clause, names in owners.items() if len(names) == len(quantities)]
     lines = [f"- {sentence(plain(clause))}" for clause in everywhere]
     lines += [
@@ -135,12 +189,3 @@ def _symbols(quantities: Sequence[Quantity]) -> str:
     symbols = dict.fromkeys(symbol for quantity in quantities for symbol in symbols_of(quantity.tolerance))
     lines = [f"- {symbol}: {plain(symbol_meanings()[symbol])}" for symbol in symbols]
     return "\n".join(["The symbols:\n", *lines]) + "\n" if lines else ""
-
-
-def _clauses(reason: str) -> list[str]:
-    """Return the sentences of a reason, or its parts between semicolons."""
-    return [clause.strip(" .") for clause in re.split(r";|\.(?= )", reason) if clause.strip(" .")]
-
-
-def _unit(unit: str) -> str:
-    return "ratio" if unit == "1" else unit

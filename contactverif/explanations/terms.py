@@ -1,11 +1,39 @@
-"""The words of the project and the symbols of the tolerances, by the names under which a user looks them up."""
+"""The words of the project, the symbols of the tolerances and the traits, by the names that a user looks up."""
 
 from __future__ import annotations
 
+import inspect
 import re
 from functools import cache
+from importlib.resources import files
 
-from contactverif.explanations.markdown import read_text
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules
+
+
+def read_text(name: str) -> str:
+    """Return the text of a file of this folder."""
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def sentence(text: str) -> str:
+    """Return the text with a capital first letter, unless that is a symbol, and a full stop."""
+    text = text.strip()
+    if not text:
+        return ""
+    first = text[0].upper() if re.match(r"[a-z]{2}|a ", text) else text[0]
+    return first + text[1:] + ("" if text[-1] in ".!?…" else ".")
+
+
+def plain(text: str) -> str:
+    """Return running text with the signs escaped that Markdown would read as markup or HTML."""
+    outside = re.split(r"(`[^`]*`)", text)
+    return "".join(part if part.startswith("`") else re.sub(r"([*_<\[])", r"\\\1", part) for part in outside)
+
+
+def without_links(text: str) -> str:
+    """Return Markdown in which a link is its words alone, since a terminal has no page to go to."""
+    return re.sub(r"(?<![\\!])\[([^\]]+)\]\([^)]*\)", r"\1", text)
+
 
 _SYMBOL_ROW = re.compile(r"^\| (\S+) \| (.+) \|$", re.MULTILINE)
 
@@ -25,7 +53,9 @@ def term_texts() -> dict[str, str]:
     for section in sections:
         heading, _, body = section.partition("\n")
         text = body.partition("\n## ")[0].strip()
-        texts |= dict.fromkeys(_names(heading), f"# {heading}\n\n{text}\n")
+        parts = re.split(r",| and |[()]", heading.replace("`", ""))  # `Node-to-segment (NTS)`, `Slave and master`
+        names = [name.strip().lower() for name in (heading, *parts) if name.strip()]
+        texts |= dict.fromkeys(names, f"# {heading}\n\n{text}\n")
     return texts
 
 
@@ -43,7 +73,37 @@ def list_of_terms() -> str:
     return f"# Terms\n\n{terms}\n\nSymbols of the tolerances: {symbols}. `contactverif list` lists the properties.\n"
 
 
-def _names(heading: str) -> list[str]:
-    """Return the names in a heading, `Node-to-segment (NTS)` or `Slave and master`, in small letters."""
-    parts = re.split(r",| and |[()]", heading.replace("`", ""))
-    return [name.strip().lower() for name in (heading, *parts) if name.strip()]
+_GROUPS = {
+    "patch=PatchPromises": PatchPromises,
+    "promises=Promises": Promises,
+    "rules=Rules": Rules,
+    "abilities=Abilities": Abilities,
+    "evidence=Evidence": Evidence,
+}
+_ENTRY = re.compile(r"^(?P<names>\w+(?:, \w+)*) : (?P<kind>[^\n]+)\n(?P<text>(?:    [^\n]*\n?|\n)+)", re.MULTILINE)
+
+
+def trait_names() -> list[str]:
+    """Return the names of all traits."""
+    return [name for kind in _GROUPS.values() for name, *_ in _entries(kind)]
+
+
+def trait_text(name: str) -> str:
+    """Return in Markdown what a trait states; `name` may have a value behind it. Empty if there is no such trait."""
+    wanted, _, _ = name.partition("=")
+    for place, kind in _GROUPS.items():
+        for entry, values, text in _entries(kind):
+            if entry == wanted:
+                form = f"{place}({entry}=…)" if kind is not PatchPromises else f"promises=Promises({place}({entry}=…))"
+                return f"# {entry}\n\nA trait, `Traits({form})`: `{values}`.\n\n{text}\n"
+    return ""
+
+
+def _entries(kind: type) -> list[tuple[str, str, str]]:
+    """Return (name, values, text) of each trait of a group."""
+    attributes = (inspect.getdoc(kind) or "").partition("Attributes\n----------\n")[2]
+    return [
+        (name, match["kind"], inspect.cleandoc(f"\n{match['text']}"))
+        for match in _ENTRY.finditer(f"{attributes}\n")
+        for name in match["names"].split(", ")
+    ]

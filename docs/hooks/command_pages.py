@@ -19,7 +19,7 @@ from page_text import table
 from typer.models import ArgumentInfo, OptionInfo
 
 from contactverif.cli.app import app
-from contactverif.explanations.markdown import plain
+from contactverif.explanations.terms import plain
 
 _METAVARS = {int: "INTEGER", float: "NUMBER", Path: "FILE", str: "TEXT"}
 

@@ -8,7 +8,7 @@ from page_text import table
 from repository_pages import relink
 
 from contactverif import Subject, Traits
-from contactverif.explanations.markdown import plain
+from contactverif.explanations.terms import plain
 from contactverif.plugins.registry import load_formulations
 
 _COLUMNS = {

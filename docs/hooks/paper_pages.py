@@ -12,7 +12,7 @@ import xarray as xr
 from page_text import table
 from repository_pages import relink
 
-from contactverif.explanations.markdown import plain, sentence
+from contactverif.explanations.terms import plain, sentence
 
 FOLDER = Path("reports") / "paper"
 

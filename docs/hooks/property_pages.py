@@ -9,9 +9,8 @@ from pathlib import Path
 from page_text import table
 
 from contactverif import Property
-from contactverif.explanations.known_failures import stated_failures
-from contactverif.explanations.markdown import plain, sentence
-from contactverif.explanations.property_text import property_text
+from contactverif.explanations.property_text import property_text, stated_failures
+from contactverif.explanations.terms import plain, sentence
 
 
 def property_page(question: Property, installed: Iterable[object]) -> str:

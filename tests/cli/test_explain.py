@@ -13,7 +13,7 @@ from contactverif.cli.explain import TerminalMarkdown
 from contactverif.cli.run_tables import _COLUMNS
 from contactverif.contract.result import Result
 from contactverif.contract.traits import Traits
-from contactverif.explanations.known_failures import planted_mistakes, smallest_mesh, stated_failures
+from contactverif.explanations.property_text import planted_mistakes, smallest_mesh, stated_failures
 from contactverif.explanations.terms import symbol_meanings, term_text, term_texts
 from contactverif.plugins.registry import load_formulations, property_ids
 
