@@ -164,7 +164,7 @@ def _column(number: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Checks:
+class _Checks:
     """The largest relative difference of each formula from its check."""
 
     difference: Annotated[FloatArray, Column("formula", "1", "largest relative difference")]
@@ -173,10 +173,9 @@ class Checks:
     check: Annotated[tuple[str, ...], Column("formula", WORDS, "what it is compared with")] = _column(2)
 
 
-def compute(report_progress: Progress) -> Checks:
-    """Check every formula."""
+def _compute(report_progress: Progress) -> _Checks:
     report_progress("Appendix A")
-    return Checks(errors(Increment))
+    return _Checks(errors(Increment))
 
 
 def errors(increment: Callable[[Geometry, np.ndarray], Increment]) -> FloatArray:
@@ -245,8 +244,7 @@ def _length(vector: Vector) -> Any:
     return np.sqrt(vector @ vector)
 
 
-def statements(checks: Checks) -> Iterator[Statement]:
-    """Count the formulas that are right."""
+def _statements(checks: _Checks) -> Iterator[Statement]:
     wrong = [checks.formula[row] for row in np.flatnonzero(~(checks.difference <= TOLERANCE))]
     text = f"each agrees with its check, within {number(float(checks.difference.max()), 2)}"
     yield Statement(
@@ -257,8 +255,7 @@ def statements(checks: Checks) -> Iterator[Statement]:
     )
 
 
-def tables(checks: Checks) -> Iterator[PageTable]:
-    """Yield a line for each formula."""
+def _tables(checks: _Checks) -> Iterator[PageTable]:
     marks = [f"{'✓' if error <= TOLERANCE else '✗'} {number(error, 2)}" for error in checks.difference.tolist()]
     rows = zip(checks.formula, checks.text, checks.check, marks, strict=True)
     yield PageTable(
@@ -274,10 +271,10 @@ def tables(checks: Checks) -> Iterator[PageTable]:
 ITEM = Item(
     name="appendix_a",
     title="Appendix A: the formulas of the consistent tangent",
-    compute=compute,
-    statements=statements,
+    compute=_compute,
+    statements=_statements,
     attributes={"formulation": VTS_PPT.name},
-    tables=tables,
+    tables=_tables,
     text="f and n are the first and the second node of a segment, 1 and 2 those of V’s own one, M is the middle of the "
     "slave segment AB; Δ(ε̂ g l n) stands for ε̂ Δg l n + ε̂ g Δl n + ε̂ g l Δn. A11 is checked by Δl of the last segment.",
 )

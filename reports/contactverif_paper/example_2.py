@@ -27,7 +27,7 @@ from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_sty
 from contactverif_paper.paper_columns import Column, Formulations, variables_of
 from contactverif_paper.paper_formulations import NTS_AR, VTS_G, VTS_ME, VTS_PPT
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
-from contactverif_paper.patch_plots import edges_of
+from contactverif_paper.patch_tests import edges_of
 from contactverif_reports.html.pages import number
 
 FORMULATIONS = (NTS_AR, VTS_G, VTS_ME, VTS_PPT)
@@ -43,7 +43,7 @@ _CLOSE_UP = np.array([[-0.8, -0.5], [0.8, 0.7]])  # Lower left and upper right c
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Example2:
+class _Example2:
     """Solutions on the base meshes, and the exact answers for half-planes."""
 
     solutions: tuple[DiskSolution, ...]  # From a disk lowered about as far as it ends; for each of `FORMULATIONS`.
@@ -61,8 +61,7 @@ class Example2:
     formulations: Formulations = FORMULATIONS
 
 
-def compute(report_progress: Progress) -> Example2:
-    """Solve the base meshes with every formulation, from two first guesses."""
+def _compute(report_progress: Progress) -> _Example2:
     solutions, touching = [], []
     for formulation in FORMULATIONS:
         report_progress(f"Example 2, {formulation.name}")
@@ -70,7 +69,7 @@ def compute(report_progress: Progress) -> Example2:
         touching.append(solve_disk(formulation, lowered=TOUCHING))
     layer = PAPER.winkler_contact()
     places = np.linspace(0.0, layer.half_width, _PLACES)
-    return Example2(
+    return _Example2(
         tuple(solutions),
         tuple(touching),
         tuple(solution.iterations for solution in touching),
@@ -82,15 +81,9 @@ def compute(report_progress: Progress) -> Example2:
     )
 
 
-def statements(example: Example2) -> Iterator[Statement]:
-    """Compare pressures and numbers of iterations."""
-    yield _peak_statement(example)
-    yield _iteration_statement(example)
-
-
-def _peak_statement(example: Example2) -> Statement:
+def _statements(example: _Example2) -> Iterator[Statement]:
     peaks, widths = ([getattr(solution, name) for solution in example.solutions] for name in ("peak", "half_width"))
-    return Statement(
+    yield Statement(
         "Fig. 38",
         "Example 2: the axis of the close-up ends at 1.61e6, and curves are nearly the same for all",
         f"{number(min(peaks), 4)} to {number(max(peaks), 4)}; half-width {min(widths):.3f} to {max(widths):.3f}. "
@@ -99,13 +92,10 @@ def _peak_statement(example: Example2) -> Statement:
         Agreement.decide(all(abs(peak / PRINTED_PEAK - 1) <= PEAK_TOLERANCE for peak in peaks)),
         "fig38",
     )
-
-
-def _iteration_statement(example: Example2) -> Statement:
     near, far = (sorted({solution.by_energy for solution in row}) for row in (example.solutions, example.touching))
     near_words, far_words = (", ".join(map(str, counts)) for counts in (near, far))
     ours = sorted({solution.iterations for solution in example.solutions})
-    return Statement(
+    yield Statement(
         "Section 7.2",
         "Example 2: every algorithm needs the same number of iterations, 4, to an energy norm of 1e−15; the first "
         "guess is not said",
@@ -117,8 +107,7 @@ def _iteration_statement(example: Example2) -> Statement:
     )
 
 
-def tables(example: Example2) -> Iterator[PageTable]:
-    """Yield the table of the page."""
+def _tables(example: _Example2) -> Iterator[PageTable]:
     rows = [(row.formulation.legend, row.peak, row.half_width, str(row.iterations)) for row in example.solutions]
     rows += [("Hertz", *example.hertz, "–"), ("Hertz on springs ε̂", *example.winkler, "–")]
     yield PageTable.of_numbers(
@@ -133,8 +122,7 @@ def tables(example: Example2) -> Iterator[PageTable]:
     "Example 2: (a) the meshes of the disk (black) and of the foundation (blue, 160 × 30 elements); (b) "
     "close-up of the contact zone. The paper draws them and prints no coordinates: the grading is ours.",
 )
-def plot_meshes(example: Example2) -> Figure:
-    """Draw all of the meshes, and the contact zone from near."""
+def _plot_meshes(example: _Example2) -> Figure:
     figure, (whole, near) = new_panels(5.0, 2)
     nodes = np.vstack([body.nodes for body in example.bodies])
     _draw_meshes(whole, example.bodies, np.array([nodes.min(axis=0), nodes.max(axis=0)]), 0.15)
@@ -148,8 +136,7 @@ def plot_meshes(example: Example2) -> Figure:
     "fig38",
     "Example 2: (a) contact pressure; (b) close-up of its middle. Pressures are negative, as in the paper.",
 )
-def plot_pressures(example: Example2) -> Figure:
-    """Draw the pressures on the paper's axes, where they are negative."""
+def _plot_pressures(example: _Example2) -> Figure:
     figure, panels = new_panels(3.9, 2)
     for axes, (x_axis, axis) in zip(panels, (WHOLE, MIDDLE), strict=True):
         axes.plot(example.winkler_x, -example.winkler_pressure / _MEGA, **REFERENCE_LINE)
@@ -176,8 +163,7 @@ def _draw_meshes(axes: Axes, bodies: tuple[Body, ...], box: FloatArray, width: f
     axes.set_axis_off()
 
 
-def datasets(example: Example2) -> dict[str, Group]:
-    """Return pressures, half-widths and iterations."""
+def _datasets(example: _Example2) -> dict[str, Group]:
     attributes = {
         "figure": "Figs. 37, 38",
         "scene": "example-2",
@@ -263,11 +249,11 @@ def _extend(
 ITEM = Item(
     name="example_2",
     title="Example 2: a disk on a foundation",
-    compute=compute,
-    statements=statements,
-    datasets=datasets,
-    figures=(plot_meshes, plot_pressures),
-    tables=tables,
+    compute=_compute,
+    statements=_statements,
+    datasets=_datasets,
+    figures=(_plot_meshes, _plot_pressures),
+    tables=_tables,
     choices={
         "Example 2": "plane strain, the whole disk held on its axis, a foundation 20 wide and 10 deep, clamped below, "
         "free at its sides, 160 × 30 elements of which 61 are equally wide over |x| ≤ 0.6; four segments of the disk "

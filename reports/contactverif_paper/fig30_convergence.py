@@ -45,7 +45,7 @@ _STEPS_BEYOND = 6  # Newton steps that are taken behind the solution, for the st
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class History:
+class _History:
     """The way of Newton's method to a solution."""
 
     formulation: PaperFormulation
@@ -65,12 +65,10 @@ class History:
 
     @property
     def n_iterations(self) -> int:
-        """The number of linear systems solved up to the solution."""
         return len(self.residuals) - 1
 
     @property
     def rate(self) -> Annotated[float, Column("", "1", "ratio of residuals, late", fill=np.nan)]:
-        """The mean ratio of residuals in the last five steps well above roundoff; NaN if there are fewer."""
         return late_rate(self.residuals, self.floor)
 
     def steps_until_residual(self, bound: float) -> int:
@@ -79,7 +77,7 @@ class History:
         return int(below[0]) if len(below) else -1
 
 
-RULES: Mapping[str, Callable[[History], int]] = {
+RULES: Mapping[str, Callable[[_History], int]] = {
     "residual at its own roundoff (ours)": lambda history: history.n_iterations,
     "residual below 1e−11: in the last decade of the printed axis": lambda h: h.steps_until_residual(_LAST_DECADE),
     "residual below 1e−12: at the end of the printed axis": lambda h: h.steps_until_residual(_AXIS_END),
@@ -91,7 +89,7 @@ RULES: Mapping[str, Callable[[History], int]] = {
 class Convergence:
     """Residual histories, and the linear rate of the basic version over the penalty."""
 
-    histories: tuple[tuple[History, ...], ...]  # A row for each of `RATIOS`, a history for each of `FORMULATIONS`.
+    histories: tuple[tuple[_History, ...], ...]  # A row for each of `RATIOS`, a history for each of `FORMULATIONS`.
     radius: Annotated[FloatArray, Column("penalty", "1", "spectral radius of I − K_basic⁻¹ K_consistent")]
     # The ratio of successive residuals that Newton's method shows.
     rate: Annotated[FloatArray, Column("penalty", "1", "rate of the basic version", fill=np.nan, name="basic_rate")]
@@ -113,8 +111,7 @@ class Convergence:
         return np.array([[rule(row[column]) for row in self.histories] for rule in RULES.values()], dtype=np.int64)
 
 
-def compute(report_progress: Progress) -> Convergence:
-    """Compute histories at ε̂ = E for both materials, and rates over ε̂/E for equal ones."""
+def _compute(report_progress: Progress) -> Convergence:
     report_progress("Fig. 30, convergence")
     histories = tuple(tuple(_history(row, ratio) for row in FORMULATIONS) for ratio in RATIOS)
     rates = np.array([_rate(stiffness) for stiffness in STIFFNESS])
@@ -135,7 +132,7 @@ def late_rate(residuals: FloatArray, floor: float) -> float:
     return float((above[-1] / above[-6]) ** (1 / 5)) if len(above) > 6 else np.nan
 
 
-def _history(formulation: PaperFormulation, ratio: float) -> History:
+def _history(formulation: PaperFormulation, ratio: float) -> _History:
     trace = solve(formulation, ratio, 1.0)
     system = System(trace.scene, subject_of(formulation).for_case(trace.scene.case()))
     q, beyond = trace.solution, []
@@ -147,7 +144,7 @@ def _history(formulation: PaperFormulation, ratio: float) -> History:
         q = q + step.change
         beyond.append(float(np.abs(system.residual(q, system.pair(q))).max()))
     energies = trace.energies[np.isfinite(trace.energies)]
-    return History(formulation, trace.residuals, energies, np.array(beyond), float(trace.floors[-1]), trace.end.label)
+    return _History(formulation, trace.residuals, energies, np.array(beyond), float(trace.floors[-1]), trace.end.label)
 
 
 def _rate(stiffness: float) -> tuple[float, float]:
@@ -164,14 +161,7 @@ def _rate(stiffness: float) -> tuple[float, float]:
     return radius, late_rate(trace.residuals, float(trace.floors[-1]))
 
 
-def statements(convergence: Convergence) -> Iterator[Statement]:
-    """Compare the numbers of iterations and the rate."""
-    yield _basic_statement(convergence)
-    yield _quick_statement(convergence)
-    yield _rate_statement(convergence)
-
-
-def _basic_statement(convergence: Convergence) -> Statement:
+def _statements(convergence: Convergence) -> Iterator[Statement]:
     counts = convergence.counts(BASIC)
     by_rule = "; ".join(f"{rule}: {', '.join(map(str, row))}" for rule, row in zip(RULES, counts.tolist(), strict=True))
     bounds = [_bounds(row[FORMULATIONS.index(BASIC)]) for row in convergence.histories]
@@ -180,7 +170,7 @@ def _basic_statement(convergence: Convergence) -> Statement:
         f"from {number(low, 2)} to {number(high, 2)} ({material})"
         for (low, high), material in zip(bounds, MATERIALS, strict=True)
     )
-    return Statement(
+    yield Statement(
         "Fig. 30",
         f"case C: the axis runs from 10⁶ to 10⁻¹², 18 decades, and the basic version needs {PRINTED_ITERATIONS} "
         "iterations; no stopping rule is given for this figure (for Example 2 it is an energy norm of 1e−15)",
@@ -189,34 +179,22 @@ def _basic_statement(convergence: Convergence) -> Statement:
         "fig30",
         f"Newton’s method stops when the largest residual is below a bound {words_}" if possible else "",
     )
-
-
-def _bounds(history: History) -> tuple[float, float]:
-    """Return the bounds of the residual between which a stopping rule gives `PRINTED_ITERATIONS`."""
-    residuals = np.concatenate([history.residuals, history.beyond])
-    return float(residuals[PRINTED_ITERATIONS]), float(residuals[:PRINTED_ITERATIONS].min())
-
-
-def _quick_statement(convergence: Convergence) -> Statement:
     quick = (VTS_ME, VTS_PPT)
-    counts = {row.legend: convergence.counts(row)[0].tolist() for row in quick}
+    quick_counts = {row.legend: convergence.counts(row)[0].tolist() for row in quick}
     slow = convergence.counts(BASIC)[0]
-    words_ = "; ".join(f"{legend} {', '.join(map(str, row))}" for legend, row in counts.items())
-    return Statement(
+    quick_words = "; ".join(f"{legend} {', '.join(map(str, row))}" for legend, row in quick_counts.items())
+    yield Statement(
         "Fig. 30",
         "case C: VTS-ME and the consistent version of VTS-PPT need a few iterations, far fewer than the basic version",
-        f"to the residual's own roundoff, with {MATERIALS[0]} and with the {MATERIALS[1]}: {words_}; VTS-PPT basic "
-        f"{', '.join(map(str, slow.tolist()))}",
-        Agreement.decide(max(max(row) for row in counts.values()) <= 5 < 2 * 5 < slow.min()),
+        f"to the residual's own roundoff, with {MATERIALS[0]} and with the {MATERIALS[1]}: {quick_words}; VTS-PPT "
+        f"basic {', '.join(map(str, slow.tolist()))}",
+        Agreement.decide(max(max(row) for row in quick_counts.values()) <= 5 < 2 * 5 < slow.min()),
         "fig30",
     )
-
-
-def _rate_statement(convergence: Convergence) -> Statement:
     basic = convergence.histories[0][FORMULATIONS.index(BASIC)]
     apart = float(np.nanmax(np.abs(convergence.rate / convergence.radius - 1)))
     radius = convergence.radius
-    return Statement(
+    yield Statement(
         "Section 6.1",
         "with the tangent of VTS-ME convergence is no longer quadratic; no rate is given",
         f"it is linear: each step leaves {basic.rate:.3f} of the residual at ε̂ = E, and {radius.min():.2f} to "
@@ -227,8 +205,13 @@ def _rate_statement(convergence: Convergence) -> Statement:
     )
 
 
-def tables(convergence: Convergence) -> Iterator[PageTable]:
-    """Yield the iterations by stopping rule."""
+def _bounds(history: _History) -> tuple[float, float]:
+    """Return the bounds of the residual between which a stopping rule gives `PRINTED_ITERATIONS`."""
+    residuals = np.concatenate([history.residuals, history.beyond])
+    return float(residuals[PRINTED_ITERATIONS]), float(residuals[:PRINTED_ITERATIONS].min())
+
+
+def _tables(convergence: Convergence) -> Iterator[PageTable]:
     heads = [f"{row.legend}, {material}" for row in FORMULATIONS for material in MATERIALS]
     columns = np.hstack([convergence.counts(row) for row in FORMULATIONS])
     yield PageTable.of_numbers(
@@ -247,8 +230,7 @@ def tables(convergence: Convergence) -> Iterator[PageTable]:
     "method stops here in the grey band, which is the residual’s own roundoff. (c) ours: the linear rate of the basic "
     "version over the penalty, and the spectral radius of I − K_basic⁻¹ K_consistent.",
 )
-def plot(convergence: Convergence) -> Figure:
-    """Draw both histories on the paper's axes, and the rate over the penalty."""
+def _plot(convergence: Convergence) -> Figure:
     figure, panels = new_panels(4.0, 3)
     for axes, histories, material in zip(panels, convergence.histories, ("equal E", "master E/2"), strict=False):
         for history in histories:
@@ -275,8 +257,7 @@ def plot(convergence: Convergence) -> Figure:
     return figure
 
 
-def datasets(convergence: Convergence) -> dict[str, Group]:
-    """Return histories, rates and counts."""
+def _datasets(convergence: Convergence) -> dict[str, Group]:
     variables = variables_of(convergence) | variables_of(convergence.histories, "ratio formulation")
     return {"": Group(variables, {"figure": "Fig. 30", "scene": "c"})}
 
@@ -284,11 +265,11 @@ def datasets(convergence: Convergence) -> dict[str, Group]:
 ITEM = Item(
     name="fig30_convergence",
     title="Fig. 30: Newton’s method with both tangents",
-    compute=compute,
-    statements=statements,
-    datasets=datasets,
-    figures=(plot,),
-    tables=tables,
+    compute=_compute,
+    statements=_statements,
+    datasets=_datasets,
+    figures=(_plot,),
+    tables=_tables,
     choices={
         "Fig. 30": "ε̂ = E, p = E/100, free sides, the slave begins where it touches; both blocks alike, or the master "
         "half as stiff",

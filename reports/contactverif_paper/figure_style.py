@@ -7,19 +7,16 @@ so that they read in grey; a formulation has the same pen in every figure. Axes 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from contactverif.contract.arrays import FloatArray
 from contactverif_paper.paper_formulations import PaperFormulation
 from contactverif_paper.paper_item import PaperFigure
 from contactverif_reports.plot.scene_figures import choose_pen
@@ -39,26 +36,6 @@ _STYLE: dict[Any, Any] = {
     "hatch.linewidth": 0.4,
     "lines.linewidth": 1.2,
 }
-_LOWEST = 1e-17  # A number that is exactly zero is drawn here on a logarithmic axis.
-_ROUND_STEPS = (1, 2, 5, 10)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Series:
-    """A number of each formulation over a parameter."""
-
-    formulations: tuple[PaperFormulation, ...]  # The rows.
-    at: FloatArray  # (n_places,) The parameter.
-    values: FloatArray  # (n_formulations, n_places) The numbers.
-
-    def row(self, formulation: PaperFormulation) -> FloatArray:
-        """Return the numbers (n_places,) of one formulation."""
-        values: FloatArray = self.values[self.formulations.index(formulation)]
-        return values
-
-    def near(self, formulation: PaperFormulation, place: float) -> float:
-        """Return the number of one formulation at the place that is nearest."""
-        return float(self.row(formulation)[np.argmin(np.abs(self.at - place))])
 
 
 def render_figure(figure: PaperFigure, data: Any) -> Figure:
@@ -105,18 +82,6 @@ def add_legend(
     figure.legend(handles=handles, loc="outside lower center", ncols=min(columns, len(handles)))
 
 
-def plot_series(axes: Axes, series: Series, *, markers: bool = True) -> None:
-    """Plot each row of the series."""
-    for formulation, values in zip(series.formulations, series.values, strict=True):
-        axes.plot(series.at, values, **line_style(formulation, 1 if markers else 1000))
-
-
-def plot_logarithmic(axes: Axes, series: Series) -> None:
-    """Plot each row over a logarithmic axis; zeros are drawn at its lower end."""
-    plot_series(axes, replace(series, values=np.maximum(series.values, _LOWEST)))
-    use_decades(axes)
-
-
 def use_decades(axes: Axes, n_ticks: int = 6) -> None:
     """Make the vertical axis logarithmic, with few ticks."""
     axes.set_yscale("log")
@@ -127,4 +92,4 @@ def use_decades(axes: Axes, n_ticks: int = 6) -> None:
 def use_round_ticks(axes: Axes, n_ticks: int = 5) -> None:
     """Give both axes a few round ticks."""
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(n_ticks, steps=list(_ROUND_STEPS)))
+        axis.set_major_locator(MaxNLocator(n_ticks, steps=[1, 2, 5, 10]))

@@ -66,16 +66,6 @@ def name_columns(dims: str) -> tuple[Column, Column]:
     )
 
 
-def series_columns(axis: str, units: str, at: str, meaning: str, fill: float | None = None) -> tuple[Column, Column]:
-    """Return the columns of a `Series`: its parameter, and its numbers without dimension."""
-    return Column(axis, units, at, part="at", name=axis), values_column(axis, meaning, fill)
-
-
-def values_column(axis: str, meaning: str, fill: float | None = None) -> Column:
-    """Return the column of the numbers of a `Series`, which have no dimension."""
-    return Column(f"formulation {axis}", "1", meaning, fill=fill, part="values")
-
-
 Formulations = Annotated[tuple[PaperFormulation, ...], name_columns("formulation")]
 
 

@@ -1,12 +1,8 @@
-"""The contract of an item: one table, figure, group of figures, section or defect of the paper.
+"""The contract of an item: one table, figure, group of figures or section of the paper.
 
-Rules for the next editor:
-
-1. An item is one file. It computes its data, draws its figures, declares its numbers for `paper.nc`, states its claims
-   and fills its tables. One line in `items.py` registers it.
-2. `paper_run`, `paper_columns`, `paper_page` and the template work on any list of items and name none of them.
-3. A statement sets side by side what the paper says and what was computed. Its verdict follows from numbers, never
-   from the author's hand.
+An item computes its data, draws its figures, declares its numbers for `paper.nc`, states its claims and fills its
+tables. `items.py` registers it; `paper_columns`, `paper_page` and the template name no item. A statement sets side by
+side what the paper says and what was computed; its verdict follows from numbers, never from the author's hand.
 """
 
 from __future__ import annotations
@@ -32,7 +28,6 @@ class Agreement(IntEnum):
     AGREES = 0
     DIFFERS = 1
     SILENT = 2
-    DEFECT = 3
     CONDITIONAL = 4
 
     @property

@@ -31,7 +31,6 @@ LOOKS: Mapping[Agreement, tuple[str, str]] = {  # {verdict: (mark, CSS class)}
     Agreement.AGREES: ("✓", "good"),
     Agreement.DIFFERS: ("✗", "bad"),
     Agreement.SILENT: ("–", "soft"),
-    Agreement.DEFECT: ("!", "warn"),
     Agreement.CONDITIONAL: ("(✓)", "warn"),
 }
 

@@ -31,7 +31,7 @@ from contactverif_paper.paper_formulations import (
     PaperFormulation,
 )
 from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
-from contactverif_paper.patch_solutions import (
+from contactverif_paper.patch_tests import (
     FAILS,
     FAILURE,
     PASSES,
@@ -65,7 +65,7 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PassTable:
+class _PassTable:
     """The largest error of a stress over the pressure, and what the paper says."""
 
     stress_error: Annotated[
@@ -92,8 +92,7 @@ class PassTable:
         return same
 
 
-def compute(report_progress: Progress) -> PassTable:
-    """Solve every scene with every formulation."""
+def _compute(report_progress: Progress) -> _PassTable:
     errors = np.full((len(FORMULATIONS), len(SCENES)), np.nan)
     for row, formulation in enumerate(FORMULATIONS):
         report_progress(f"patch tests of {formulation.name}")
@@ -101,11 +100,10 @@ def compute(report_progress: Progress) -> PassTable:
     printed = [[PRINTED.get(formulation, {}).get(scene, SILENT) for scene in SCENES] for formulation in FORMULATIONS]
     scenes = [catalogue.make_scene(scene) for scene in SCENES]
     tolerances = np.array([condition_tolerance(scene, scene.penalty) for scene in scenes])
-    return PassTable(errors, tolerances, np.array(printed))
+    return _PassTable(errors, tolerances, np.array(printed))
 
 
-def statements(table: PassTable) -> Iterator[Statement]:
-    """Count the verdicts that the paper shares."""
+def _statements(table: _PassTable) -> Iterator[Statement]:
     spoken = table.printed != SILENT
     names = list(SCENES)
     wrong = [
@@ -123,12 +121,12 @@ def statements(table: PassTable) -> Iterator[Statement]:
     yield Statement(
         "Sections 4, 5, 7.1",
         "no numbers are given for errors, materials, supports, heights or penalties of the patch tests",
-        _gap(table),
+        _range_words(table),
         Agreement.SILENT,
     )
 
 
-def _gap(table: PassTable) -> str:
+def _range_words(table: _PassTable) -> str:
     between = int((table.verdicts == "between").sum())
     if between:
         n_errors = table.stress_error.size
@@ -136,8 +134,7 @@ def _gap(table: PassTable) -> str:
     return f"errors of the stress are at roundoff or above {FAILS:g} at ε̂ = 10 E/h; nothing lies between"
 
 
-def tables(table: PassTable) -> Iterator[PageTable]:
-    """Yield the table of the page."""
+def _tables(table: _PassTable) -> Iterator[PageTable]:
     yield PageTable(
         "Elastic patch tests of Sections 4, 5 and 7.1: largest error of a stress over the pressure",
         ("Formulation", *SCENES.values()),
@@ -148,7 +145,7 @@ def tables(table: PassTable) -> Iterator[PageTable]:
     )
 
 
-def _cell(table: PassTable, row: int, column: int) -> Cell:
+def _cell(table: _PassTable, row: int, column: int) -> Cell:
     word = str(table.verdicts[row, column])
     text = {"pass": "✓ pass", "fail": "✗ fail"}.get(word, word)
     if table.printed[row, column] != SILENT:
@@ -160,10 +157,10 @@ def _cell(table: PassTable, row: int, column: int) -> Cell:
 ITEM = Item(
     name="pass_table",
     title="Who passes the elastic patch test",
-    compute=compute,
-    statements=statements,
+    compute=_compute,
+    statements=_statements,
     attributes={"comment": f"elastic patch tests at the penalty 10 E/h; an error above {FAILS:g} fails"},
-    tables=tables,
+    tables=_tables,
     text="Largest error of a stress at a Gauss point over the pressure, at ε̂ = 10 E/h. Pass: roundoff, at most "
     f"{CONDITION_TOLERANCE} with κ = ε̂h/E and the smallest ratio r of two segments. Fail: above {FAILS:g}. “=” stands "
     "where the paper says the same, “≠” where it says otherwise; neither where it is silent.",

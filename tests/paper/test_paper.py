@@ -2,7 +2,7 @@
 
 Numbers are compared up to rounding, not bitwise. A solved number is a sum of some hundred terms behind a matrix with a
 condition below 1e6: 2⁻⁵³ × 1e2 × 1e6 of the largest number of its variable, 1e-8. A component of a vector is held to
-the largest component. With springs of 1e8 E/h, as in the item on locking, the condition is 1e8.
+the largest component.
 """
 
 import re
@@ -16,22 +16,18 @@ from reports.page_reader import Page
 
 from contactverif import MisuseError
 from contactverif.cli import app as cli
-from contactverif_paper import compute, force_transmission, paper_formulations, pass_table, steps
+from contactverif_paper import compute, force_transmission, pass_table, steps
 from contactverif_paper.figure_style import render_figure
-from contactverif_paper.items import ITEMS, ORDER
+from contactverif_paper.items import ITEMS
 from contactverif_paper.paper_item import Agreement, Paper
 from contactverif_paper.paper_page import check_folder, page, summary, svg, tree_of, write
 from contactverif_reports.netcdf.file_groups import write_tree
 
 STORED = Path(__file__).parents[2] / "reports" / "paper"
 SOLVED = 2.0**-53 * 1e2 * 1e6
-STIFF = dict.fromkeys(("drift", "roughness"), 2.0**-53 * 1e2 * 1e8)
 # Numbers that are themselves rounding errors where all is right, and need only stay small there.
 ROUNDING = {
     "stress_error": 1e-9,
-    "force": 1e-9,
-    "moment": 1e-9,
-    "jump": 1e-9,
     "unequal": 1e-9,
     "error": 1e-12,
     "difference": 1e-12,
@@ -93,7 +89,7 @@ def difference(name: str, new: xr.DataArray, old: xr.DataArray, scale: float) ->
         both = np.isfinite(a) & np.isfinite(b)
         floor = 1e-8  # Ten times what the file itself calls the floor.
         return "" if np.allclose(a[both], b[both], rtol=1e2 * SOLVED, atol=floor) else f"{a} for {b}"
-    slack = (ROUNDING | COUNTS | SLOPES).get(name, 0.0) + STIFF.get(name, SOLVED) * scale
+    slack = (ROUNDING | COUNTS | SLOPES).get(name, 0.0) + SOLVED * scale
     same = np.isclose(a, b, rtol=0, atol=slack, equal_nan=True)
     return "" if same.all() else f"{a[~same]} for {b[~same]}"
 
@@ -136,12 +132,6 @@ def solved_cells(group: xr.Dataset) -> xr.DataArray | None:
     return xr.DataArray(np.array(words(group["end"])) == "converged", dims=group["end"].dims)
 
 
-def statement(paper: Paper, place: str, begin: str = "") -> tuple[Agreement, str, str]:
-    """Return verdict, result and condition of the statement at a place whose claim contains these words."""
-    (match,) = [row for row in paper.statements if row.place == place and begin in row.claim]
-    return match.agreement, match.result, match.condition
-
-
 def test_what_is_stored_is_what_comes_out(tree: xr.DataTree, stored_tree: xr.DataTree) -> None:
     assert not (lines := compare(tree, stored_tree)), "\n".join(lines)
 
@@ -159,7 +149,6 @@ def test_what_is_stored_is_what_comes_out(tree: xr.DataTree, stored_tree: xr.Dat
         ("section_6_3/terms", "terms", (2, 1)),
         ("section_7_1", "departure", (0, 1)),
         ("appendix_a", "difference", (4,)),
-        ("defect_jump", "known", (3,)),
         ("statements", "agreement", (0,)),
     ],
 )
@@ -178,7 +167,6 @@ def test_every_step_is_reported(paper: Paper, reported_steps: list[str]) -> None
 
 
 def test_every_item_has_its_own_name_and_every_figure(paper: Paper) -> None:
-    assert [item.name for item in ITEMS] == list(ORDER)
     assert len({item.name for item in ITEMS}) == len(ITEMS)
     names = [figure.name for item in ITEMS for figure in item.figures]
     assert len(set(names)) == len(names)
@@ -204,16 +192,6 @@ def test_a_float_that_is_no_rational_is_refused() -> None:
         force_transmission.rationals([1 / 3 + 1e-9], 3.0)
 
 
-def test_defects_are_the_known_ones_and_the_balanced_version_has_none(paper: Paper) -> None:
-    tilt, jump, ends = (paper.data(name) for name in ("defect_tilt", "defect_jump", "free_ends"))
-    ppt, balanced = paper_formulations.VTS_PPT, paper_formulations.BALANCED
-    assert tilt.force.row(ppt) == pytest.approx(1 - np.cos(tilt.force.at), abs=1e-14)
-    assert jump.jump.row(ppt) == pytest.approx(jump.known, abs=1e-10)
-    for series in (tilt.force, jump.jump, ends.stress_error):
-        assert series.row(balanced).max() < 1e-10
-    assert ends.stress_error.row(ppt).max() > 0.1
-
-
 def test_verdicts_of_the_pass_table(paper: Paper) -> None:
     table = paper.data("pass_table")
     cells = {(formulation.name, scene): table.verdicts[row, column]
@@ -227,19 +205,10 @@ def test_verdicts_of_the_pass_table(paper: Paper) -> None:
 
 
 def test_what_differs_from_the_paper_is_known(paper: Paper) -> None:
-    differing = {row.place for row in paper.statements if row.agreement is Agreement.DIFFERS}
-    assert differing == {"Figs. 21, 22", "Section 6.3"}
-    claims = [row.claim for row in paper.statements if row.agreement is Agreement.DIFFERS]
-    assert [word for word in ("segment-to-segment", "inf-sup") if any(word in claim for claim in claims)] == [
-        "segment-to-segment",
-        "inf-sup",
-    ]
-
-
-def test_the_defects_are_the_two_that_the_text_decides(paper: Paper) -> None:
-    places = {row.place for row in paper.statements if row.agreement is Agreement.DEFECT}
-    assert places == {"Section 5.1.1, Boxes 1–3", "Eq. 6 and Box 3"}
-    assert statement(paper, "Boxes 2, 3")[0] is Agreement.SILENT
+    differing = [(row.place, row.claim) for row in paper.statements if row.agreement is Agreement.DIFFERS]
+    assert {place for place, _ in differing} == {"Figs. 21, 22", "Section 6.3"}
+    for words_ in ("segment-to-segment", "inf-sup"):
+        assert any(words_ in claim for _, claim in differing)
 
 
 def test_what_holds_under_a_condition_says_which(paper: Paper) -> None:

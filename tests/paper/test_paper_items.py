@@ -13,23 +13,29 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.newton import End
 from contactverif.problems import catalogue
 from contactverif.run.worker_pool import worker_pool
-from contactverif_paper import appendix_a, case_c, fig30_convergence, paper_formulations, section_6_2, section_6_3
+from contactverif_paper import (
+    appendix_a,
+    fig30_convergence,
+    lagrange_multipliers,
+    paper_formulations,
+    patch_cases,
+    tangents,
+)
 from contactverif_paper.example_2 import mesh_lines, thin_out
-from contactverif_paper.figure_style import new_panels
-from contactverif_paper.items import ITEMS
+from contactverif_paper.figure_style import new_panels, render_figure
+from contactverif_paper.items import ITEMS, compute, steps
 from contactverif_paper.paper_columns import Column
 from contactverif_paper.paper_formulations import subject_of
 from contactverif_paper.paper_item import Agreement, Item, PageTable, PaperFigure, Progress, Statement
 from contactverif_paper.paper_page import tree_of, write
-from contactverif_paper.paper_run import compute, steps
-from contactverif_paper.patch_solutions import YOUNG
+from contactverif_paper.patch_tests import YOUNG
 
 
 def silent(_: str) -> None:
     """Report no progress."""
 
 
-# --- A new item is one file's worth of code and one registration ------------------------------------------------
+# --- A new item is one registration ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -85,14 +91,11 @@ def test_an_item_is_found_on_the_page_in_the_numbers_and_among_the_figures(tmp_p
 
 
 def test_no_generic_file_names_an_item() -> None:
-    room = Path(compute.__code__.co_filename).parent
+    folder = Path(compute.__code__.co_filename).parent
     names = {item.name for item in ITEMS} | {figure.name for item in ITEMS for figure in item.figures}
-    for path in (
-        *(room / f"paper_{part}.py" for part in ("item", "run", "columns", "page")),
-        room / "templates/paper.html.j2",
-    ):
-        text = path.read_text(encoding="utf-8")
-        assert not {name for name in names if name in text}, path.name
+    for path in ("paper_item.py", "paper_columns.py", "paper_page.py", "templates/paper.html.j2"):
+        text = (folder / path).read_text(encoding="utf-8")
+        assert not {name for name in names if name in text}, path
 
 
 def test_two_items_of_one_name_are_refused(tmp_path: Path) -> None:
@@ -117,8 +120,8 @@ def test_case_a2_is_as_wide_as_the_printed_axis(name: str) -> None:
 
 def test_vts_me_cycles_on_case_c_and_converges_beside_it() -> None:
     ends = {}
-    for name in case_c.SCENES:
-        scene = catalogue.make_scene(name, penalty=case_c.PATCH.stiffness * YOUNG)
+    for name in patch_cases.SCENES:
+        scene = catalogue.make_scene(name, penalty=patch_cases.PATCH_C.stiffness * YOUNG)
         ends[name] = newton.solve(scene, subject_of(paper_formulations.VTS_ME).for_case(scene.case())).end
     assert ends == {"c": End.CYCLE, "c-prime": End.CONVERGED}
 
@@ -128,7 +131,7 @@ def test_vts_me_cycles_on_case_c_and_converges_beside_it() -> None:
 
 @pytest.fixture(scope="module")
 def convergence() -> fig30_convergence.Convergence:
-    return fig30_convergence.compute(silent)
+    return fig30_convergence.ITEM.compute(silent)
 
 
 def test_rates_of_the_basic_version_are_the_known_ones(convergence: fig30_convergence.Convergence) -> None:
@@ -143,7 +146,7 @@ def test_iterations_of_fig_30_by_stopping_rule(convergence: fig30_convergence.Co
     assert (np.diff(basic[:3], axis=0) >= 0).all()
     assert convergence.counts(paper_formulations.VTS_PPT)[0].max() <= 5
     assert convergence.counts(paper_formulations.VTS_ME)[0].max() <= 5
-    first, _, _ = fig30_convergence.statements(convergence)
+    first, _, _ = fig30_convergence.ITEM.statements(convergence)
     assert first.agreement is Agreement.CONDITIONAL
     assert "18 decades" in first.claim
 
@@ -157,8 +160,8 @@ def test_the_printed_axis_of_fig_30_has_18_decades() -> None:
 
 
 def test_tangents() -> None:
-    result = section_6_2.tangents()
-    rows = {formulation.name: row for row, formulation in enumerate(section_6_2.FORMULATIONS)}
+    result = tangents.SECTION_6_2.compute(silent)
+    rows = {formulation.name: row for row, formulation in enumerate(tangents.TANGENT_FORMULATIONS)}
     exact = [rows[name] for name in ("vts-me", "vts-ppt", "sts")]
     assert result.error[exact].max() <= 1e-14
     assert result.error[rows["vts-ppt-basic"]] > 1e-2
@@ -176,8 +179,34 @@ def test_terms_of_the_tangent(name: str, terms: list[int]) -> None:
     Rows are forces along n; Δn adds t ⊗ n. The columns of A and B have n ⊗ n and n ⊗ t, and so have those of 1 and 2,
     which alone turn the normal.
     """
-    formulation = next(row for row in section_6_3.FORMULATIONS if row.name == name)
-    assert [section_6_3.count_terms(formulation, master) for master in section_6_3.MASTERS.values()] == terms
+    formulation = next(row for row in tangents.TERM_FORMULATIONS if row.name == name)
+    assert [tangents.count_terms(formulation, master) for master in tangents.MASTERS.values()] == terms
+
+
+@pytest.fixture(scope="module")
+def constants() -> lagrange_multipliers.Constants:
+    return lagrange_multipliers.INF_SUP.compute(silent)
+
+
+def test_mortar_and_nts_are_stable_and_vts_ppt_is_not(constants: lagrange_multipliers.Constants) -> None:
+    stable = {row for row in lagrange_multipliers.INF_SUP_FORMULATIONS if constants.stable(row)}
+    assert stable == {lagrange_multipliers.NTS, lagrange_multipliers.MORTAR, lagrange_multipliers.DUAL}
+    (row,) = lagrange_multipliers.INF_SUP.statements(constants)
+    assert row.agreement is Agreement.DIFFERS
+    assert "falls like h to the power 1.00" in row.result
+    assert "33% of all pressures move nothing" in row.result
+
+
+def test_the_table_and_the_figure_of_constants(constants: lagrange_multipliers.Constants) -> None:
+    (table,) = lagrange_multipliers.INF_SUP.tables(constants)
+    coarser, finer = table.rows[0][1:3]
+    assert coarser.details == ("slope 1.00", "0% move nothing")
+    assert finer.details == ("slope 0.00", "33% move nothing")
+    mortar = table.rows[lagrange_multipliers.INF_SUP_FORMULATIONS.index(lagrange_multipliers.MORTAR)]
+    assert {cell.tone for cell in mortar[1:]} == {"n good"}
+    figure = render_figure(lagrange_multipliers.INF_SUP.figures[0], constants)
+    assert len(figure.axes) == 3
+    assert all(axes.lines for axes in figure.axes)
 
 
 # --- Appendix A -------------------------------------------------------------------------------------------------
@@ -186,7 +215,7 @@ def test_terms_of_the_tangent(name: str, terms: list[int]) -> None:
 def test_every_formula_of_the_appendix_is_checked() -> None:
     numbers_ = {name for row in appendix_a.FORMULAS for name in row[0].replace("A7a, A7b", "A7").split()}
     assert numbers_ == {f"A{number}" for number in range(1, 29)}
-    assert appendix_a.compute(silent).difference.max() <= appendix_a.TOLERANCE
+    assert appendix_a.ITEM.compute(silent).difference.max() <= appendix_a.TOLERANCE
 
 
 @pytest.mark.parametrize("name", ["xi_m", "g", "l_first", "l_last", "n", "xi_a", "l_ab", "first_f", "last_n", "f_v"])

@@ -12,7 +12,6 @@ from contactverif_paper.fig30_convergence import PRINTED_ITERATIONS, RULES
 from contactverif_paper.items import ITEMS
 
 FOLDER = Path(__file__).parents[2] / "reports" / "paper"
-LOCKING = Path(__file__).parents[2] / "docs" / "concepts" / "locking.md"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
 BASIC = "vts-ppt-basic"
 
@@ -67,10 +66,3 @@ def test_fig_39_fits_on_the_meshes_that_the_page_names() -> None:
     ]
     assert condition == "on meshes twice as fine only"
     assert "Fig. 39 fits the printed axis on meshes twice as fine as our base meshes only" in " ".join(README.split())
-
-
-def test_the_page_on_locking_has_the_stored_pressures() -> None:
-    sts, mortar = (read_paper()[f"locking/{name}"].to_dataset().pressure.values for name in ("sts", "mortar"))
-    text = " ".join(LOCKING.read_text(encoding="utf-8").split())
-    assert f"they go from {sts.min():.0f} to {sts.max():.1f}." in text
-    assert f"follow the load at every penalty, from {mortar.min():.1f} to {mortar.max():.1f}." in text

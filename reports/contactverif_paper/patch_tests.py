@@ -1,0 +1,466 @@
+"""The patch tests of the paper: solved at a soft penalty, drawn, and compared with printed axes and forces.
+
+The paper prints no penalty. Each figure here has one of ours (ε̂ = E in case A1, softer ones in the others, per unit of
+length); the table of who passes has the moderate penalty 10 E/h. How large an error is, and which of two wrong methods
+is the better one, depends on the penalty; who passes does not. Each solution is computed once in a process.
+
+Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from contactverif.contract import schema
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.columns import Group
+from contactverif.mechanics import newton
+from contactverif.problems import catalogue
+from contactverif.problems.uniform_stress import stress_error
+from contactverif.studies import solved_scenes
+from contactverif_paper.figure_style import (
+    LETTERS,
+    REFERENCE_LINE,
+    WIDTH,
+    add_legend,
+    line_style,
+    new_figure,
+    new_panels,
+    use_round_ticks,
+)
+from contactverif_paper.force_transmission import (
+    ForceTable,
+    force_dataset,
+    force_page_table,
+    force_statement,
+    force_table,
+)
+from contactverif_paper.paper_columns import WORDS, Column, name_columns, sparse_column, to_group, variables_of
+from contactverif_paper.paper_formulations import (
+    NTS,
+    NTS_AR,
+    TWO_PASS,
+    VIRTUAL,
+    VTS_ME,
+    VTS_PPT,
+    PaperFormulation,
+    subject_of,
+)
+from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_reports.plot.scene_figures import colour_scale, magnifications, plot_bodies
+from contactverif_reports.plot.solved_scene import Solution, SolvedScene
+
+YOUNG = 1e4  # The modulus of the catalogue's scenes.
+FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
+STRESS_ERROR = "largest error of a stress at a Gauss point over the pressure"
+_TALLEST = 2.6  # Inches: the height of a panel with a deformed mesh.
+_SHORT_AXIS = 4.0  # An x axis of this length has a tick at each unit.
+_BAR = 10  # The length of a colour bar beside a row of panels over its width.
+_ARROW = 0.12  # Length of an arrow of pressure over the height of a body.
+_STIFFNESS_RANGE = 1e-2, 1e2  # ε̂ over E, per unit of length: where `stiffness_limit` searches.
+
+TWO = (NTS, NTS_AR)
+FOUR = (*TWO, TWO_PASS, VTS_ME)
+FIVE = (*FOUR, VTS_PPT)
+
+
+PASSES, FAILURE, SILENT = 1, 0, -1  # What the paper says of a patch test.
+PRINTED_COLUMN = Column(
+    "", "1", "what the paper says", "missing: nothing", SILENT, {"fails": FAILURE, "passes": PASSES}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PatchSetup:
+    """A patch test of the paper as its figures show it."""
+
+    scene: Annotated[str, Column("", WORDS, "scene, as on the command line")]
+    title: str  # What the paper calls it, at the beginning of a sentence.
+    pressures: str  # Numbers of the paper's figures.
+    meshes: str
+    # Ends of the axes that the paper prints: the coordinate, and the pressure over the exact one.
+    x_axis: tuple[float, float]
+    axis: tuple[float, float]
+    stiffness: Annotated[float, Column("", "m-1", "penalty over E")]  # It is our choice.
+    formulations: tuple[PaperFormulation, ...]  # The formulations that the figures show.
+    close_up: tuple[float, float] | None = None  # Ends of the pressure axis of the close-up; None where there is none.
+    origin: float = 0.0  # The scene's coordinate of the origin of the paper's axis, a length.
+
+    @property
+    def figure(self) -> Annotated[str, Column("", WORDS, "meshes, pressures")]:
+        """The numbers of the paper's figures."""
+        return f"{self.meshes}, {self.pressures}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curve:
+    """The pressure that one formulation leaves on a scene."""
+
+    formulation: PaperFormulation
+    x: Annotated[FloatArray, sparse_column("point", schema.LENGTH, "reference coordinate on the paper's axis")]
+    pressure: Annotated[FloatArray, sparse_column("point", "1", "contact pressure over the exact one")]
+    # True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
+    at_points: Annotated[
+        bool, Column("", "1", "where pressures are taken", "missing: not shown", -1, {"at_nodes": 0, "at_points": 1})
+    ]
+    solution: Solution
+
+    @property
+    def departure(self) -> float:
+        """The largest |p/p_exact − 1|."""
+        return float(abs(self.pressure - 1).max())
+
+    @property
+    def stress_error(self) -> Annotated[float, Column("", "1", STRESS_ERROR, fill=np.nan)]:
+        return self.solution.stress_error
+
+    @property
+    def iterations(self) -> Annotated[float, Column("", "1", "linear systems solved", fill=np.nan)]:
+        return float(len(self.solution.residuals) - 1)
+
+    @property
+    def end(self) -> Annotated[str, Column("", WORDS, "how Newton's method ended")]:
+        return self.solution.end
+
+    @property
+    def displacement_x(self) -> Annotated[FloatArray, sparse_column("node", schema.LENGTH, "displacement along x")]:
+        """The displacements of all nodes along x."""
+        return np.vstack(self.solution.displacements)[:, 0]
+
+    @property
+    def displacement_y(self) -> Annotated[FloatArray, sparse_column("node", schema.LENGTH, "displacement along y")]:
+        """The displacements of all nodes along y."""
+        return np.vstack(self.solution.displacements)[:, 1]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PatchSolution:
+    """A patch test, solved by the formulations of its figures."""
+
+    setup: PatchSetup
+    exact_pressure: Annotated[float, Column("", schema.STRESS, "exact contact pressure")]
+    solved: SolvedScene  # The scene with all solutions, ready to be drawn.
+    curves: tuple[_Curve, ...]  # A curve for each formulation.
+
+    def curve(self, formulation: PaperFormulation) -> _Curve:
+        return next(curve for curve in self.curves if curve.formulation == formulation)
+
+    @property
+    def pressure_range(self) -> tuple[float, float]:
+        """The least and the largest pressure of all curves that are solutions, over the exact one."""
+        values = np.concatenate([curve.pressure for curve in self.curves if curve.solution.converged])
+        return float(values.min()), float(values.max())
+
+    @property
+    def penalty(self) -> Annotated[float, Column("", schema.PENALTY, "penalty")]:
+        return self.solved.case.penalty
+
+    @property
+    def body(self) -> Annotated[FloatArray, Column("node", "1", "body of the node; 0 is the slave", fill=np.nan)]:
+        return np.repeat(np.arange(2.0), [len(body.nodes) for body in self.solved.bodies])
+
+    @property
+    def node_x(self) -> Annotated[FloatArray, Column("node", schema.LENGTH, "reference x", fill=np.nan)]:
+        return np.vstack([body.nodes for body in self.solved.bodies])[:, 0]
+
+    @property
+    def node_y(self) -> Annotated[FloatArray, Column("node", schema.LENGTH, "reference y", fill=np.nan)]:
+        return np.vstack([body.nodes for body in self.solved.bodies])[:, 1]
+
+
+@cache
+def patch_solution(setup: PatchSetup) -> _PatchSolution:
+    """Solve a patch test at the penalty of its figures."""
+    return _solution(setup, setup.stiffness)
+
+
+def stiffness_limit(setup: PatchSetup, holds: Callable[[dict[PaperFormulation, float]], bool]) -> float:
+    """Return the ε̂/E below which a relation between departures holds, by bisection to 1 %; NaN if there is none."""
+
+    def holds_at(stiffness: float) -> bool:
+        return holds({curve.formulation: curve.departure for curve in _solution(setup, stiffness).curves})
+
+    low, high = _STIFFNESS_RANGE
+    if not holds_at(low) or holds_at(high):
+        return np.nan
+    while high / low > 1.01:
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if holds_at(middle) else (low, middle)
+    return low
+
+
+@cache
+def moderate_error(formulation: PaperFormulation, scene_name: str, ratio: float = 1.0) -> float:
+    """Return the largest error of a stress over the pressure at ε̂ = 10 E/h; NaN without a solution."""
+    scene = catalogue.make_scene(scene_name, ratio=ratio)
+    trace = newton.solve(scene, subject_of(formulation).for_case(scene.case()))
+    return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
+
+
+def _solution(setup: PatchSetup, stiffness: float) -> _PatchSolution:
+    case = catalogue.make_scene(setup.scene, penalty=stiffness * YOUNG).case()
+    solved = solved_scenes.solve_scene(case, [subject_of(formulation) for formulation in setup.formulations])
+    curves = tuple(
+        _curve(formulation, solved, solution, setup.origin)
+        for formulation, solution in zip(setup.formulations, solved.solutions, strict=True)
+    )
+    return _PatchSolution(setup, solved.solutions[0].pressure, solved, curves)
+
+
+def _curve(formulation: PaperFormulation, solved: SolvedScene, solution: Solution, origin: float) -> _Curve:
+    """Take pressures at the virtual slave nodes if there are any, else nodal forces over the nodes' shares (Eq. 3)."""
+    at_points = solution.points is not None and formulation in VIRTUAL
+    if solution.points is not None and at_points:
+        x, _ = solved.points_along(solution.points)
+        pressure = solution.points.pressure
+    else:
+        n_nodes = solved.case.interface.n_slave_nodes
+        x, pressure = solved.along[:n_nodes], solved.node_pressures(solution)[:n_nodes]
+        covered = np.isfinite(pressure)
+        x, pressure = x[covered], pressure[covered]
+    order = np.argsort(x, kind="stable")
+    return _Curve(formulation, x[order] - origin, pressure[order] / solution.pressure, at_points, solution)
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedForces:
+    """The forces on the master that a figure of the paper prints, from left to right: "3/2 3 7/2 3 1"."""
+
+    figure: str
+    claim: str
+    exact: str
+    transmitted: Mapping[PaperFormulation, str]  # By each formulation that the paper shows.
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """The numbers that an item computes beside its patch tests."""
+
+    name: str  # Its group.
+    compute: Callable[[], Any]
+    statement: Callable[[PatchTests], Statement]
+    attributes: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatchTests:
+    """The solved patch tests of an item, the forces of a uniform pressure, and the data of a study."""
+
+    patches: tuple[_PatchSolution, ...]
+    forces: ForceTable | None
+    study: Any
+
+    @property
+    def formulations(self) -> list[PaperFormulation]:
+        """The formulations that the figures show, each once."""
+        return list(dict.fromkeys(curve.formulation for patch in self.patches for curve in patch.curves))
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """The parts of an item of patch tests: it computes, declares and states what they say."""
+
+    setups: tuple[PatchSetup, ...]
+    printed: PrintedForces | None
+    study: Study | None
+
+    def compute(self, report_progress: Progress) -> PatchTests:
+        """Solve the patch tests, and compute forces and numbers beside them."""
+        patches = []
+        for setup in self.setups:
+            report_progress(setup.title)
+            patches.append(patch_solution(setup))
+        first, printed = self.setups[0], self.printed
+        forces = force_table(first.scene, first.title, printed.exact, printed.transmitted) if printed else None
+        return PatchTests(tuple(patches), forces, self.study.compute() if self.study else None)
+
+    def statements(self, tests: PatchTests) -> Iterator[Statement]:
+        """Compare the printed forces and axes, and what the study finds."""
+        if self.printed and tests.forces:
+            yield force_statement(tests.forces, self.printed.figure, self.printed.claim)
+        yield from map(_range_statement, tests.patches)
+        if self.study:
+            yield self.study.statement(tests)
+
+    def datasets(self, tests: PatchTests) -> dict[str, Group]:
+        """Return patch tests, forces and numbers beside them, a group each."""
+        datasets = {"patch": _patch_dataset(tests)}
+        if self.printed and tests.forces:
+            datasets["forces"] = force_dataset(tests.forces, self.printed.figure)
+        if self.study:
+            datasets[self.study.name] = to_group(tests.study, **self.study.attributes)
+        return datasets
+
+
+def patch_item(
+    name: str,
+    title: str,
+    *setups: PatchSetup,
+    captions: Mapping[int, str],
+    printed: PrintedForces | None = None,
+    study: Study | None = None,
+    text: str = "",
+    choices: Mapping[str, str] | None = None,
+) -> Item:
+    """Return the item of some patch tests; the last two figures show penetrations and pressures, one before meshes."""
+    plots, plan = (_plot_meshes, _plot_penetrations, _plot_pressures)[-len(captions) :], _Plan(setups, printed, study)
+    return Item(
+        name=name,
+        title=title,
+        compute=plan.compute,
+        statements=plan.statements,
+        datasets=plan.datasets,
+        figures=tuple(
+            PaperFigure(f"fig{number:02}", caption, plot)
+            for (number, caption), plot in zip(captions.items(), plots, strict=True)
+        ),
+        tables=lambda tests: [force_page_table(tests.forces)] if tests.forces else [],
+        text=text,
+        choices=choices or {},
+        n_steps=len(setups),
+    )
+
+
+def _patch_dataset(tests: PatchTests) -> Group:
+    """Return pressures, stress errors and displacements; nothing stands where a figure does not show a formulation."""
+    patches, rows = tests.patches, tuple(tests.formulations)
+    cells = [[{curve.formulation: curve for curve in patch.curves}.get(row) for row in rows] for patch in patches]
+    comment = "pressures at virtual slave nodes where at_points, else nodal forces over the nodes' shares"
+    return Group(
+        {column.name: column.variable([rows], "", ()) for column in name_columns("formulation")}
+        | variables_of([patch.setup for patch in patches], "scene")
+        | variables_of(patches, "scene")
+        | variables_of(cells, "scene formulation"),
+        attrs={"comment": comment},
+    )
+
+
+def _range_statement(patch: _PatchSolution) -> Statement:
+    """Say what the printed pressure axis and our curves have in common; the paper prints no penalty."""
+    setup = patch.setup
+    low, high = setup.axis
+    least, largest = patch.pressure_range
+    inside = low <= least and largest <= high
+    share = (largest - least) / (high - low)
+    result = f"at ε̂ = {setup.stiffness:g} × E, which we chose, curves run from {least:.3f} to {largest:.3f}: "
+    result += f"{share:.0%} of that axis" if inside else "they leave that axis"
+    return Statement(
+        f"Fig. {setup.pressures}",
+        f"{setup.title}: the axis runs from {low:.2f} to {high:.2f} of the exact pressure; no penalty is printed",
+        result,
+        Agreement.SILENT if inside else Agreement.DIFFERS,
+        f"fig{setup.pressures.partition('(')[0].zfill(2)}",
+    )
+
+
+def _plot_pressures(tests: PatchTests) -> Figure:
+    """Draw one panel for each scene, or for a scene and its close-up, with the paper's axes."""
+    views = [(patch, patch.setup.axis) for patch in tests.patches]
+    views += [(patch, patch.setup.close_up) for patch in tests.patches if patch.setup.close_up]
+    figure, panels = new_panels(3.6 if len(views) > 1 else 3.4, len(views))
+    for axes, (patch, limits) in zip(panels, views, strict=True):
+        _draw_pressures(axes, patch, limits)
+    remarks = {curve.formulation: _end_remark(curve) for patch in tests.patches for curve in patch.curves}
+    add_legend(figure, tests.formulations, reference="exact", remarks=remarks)
+    return figure
+
+
+def _draw_pressures(axes: Axes, patch: _PatchSolution, limits: tuple[float, float]) -> None:
+    low, high = limits
+    axes.axhline(1.0, **REFERENCE_LINE)
+    for curve in patch.curves:
+        inside = low <= curve.pressure.min() and curve.pressure.max() <= high
+        axes.plot(curve.x, curve.pressure, clip_on=not inside, **line_style(curve.formulation, len(curve.x)))
+    axes.set(xlabel="x coordinate (length)", ylabel="contact pressure / p (–)")
+    use_round_ticks(axes, 6)
+    left, right = patch.setup.x_axis
+    step = 1.0 if right - left <= _SHORT_AXIS else 2.0  # The paper's axes have a tick at every second unit.
+    axes.set_xticks(np.arange(left, right + 0.5, step))
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
+
+
+def _plot_penetrations(tests: PatchTests) -> Figure:
+    """Draw one panel for each formulation and scene, the penetration magnified alike in all of a scene."""
+    patches, across = tests.patches, 2
+    panels = [curve for patch in patches for curve in patch.curves]
+    down = -(-len(panels) // across)
+    wide, high = np.ptp(np.vstack([body.nodes for body in patches[0].solved.bodies]), axis=0)
+    panel = min((WIDTH - 1.6) / across, _TALLEST * wide / high)
+    figure = new_figure(down * (panel * high / wide + 0.35) + 0.7)
+    grid = figure.subplots(down, across, squeeze=False)
+    for axes in grid.ravel():
+        axes.set_axis_off()
+    letters, remaining = iter("abcdefghij"), iter(grid.ravel())
+    remarks: dict[str, None] = {}
+    for patch in patches:
+        scale, magnified = colour_scale(patch.solved), magnifications(patch.solved)
+        remarks |= dict.fromkeys(magnification.words for magnification in magnified.values())
+        panels_of_scene = [next(remaining) for _ in patch.curves]
+        for axes, curve in zip(panels_of_scene, patch.curves, strict=True):
+            plot_bodies(axes, patch.solved, curve.solution, magnified[curve.solution.formulation], scale)
+            axes.set_title(f"({next(letters)}) {curve.formulation.legend}{_end_remark(curve)}", loc="left")
+        rows = -(-len(panels_of_scene) // across)
+        bar = figure.colorbar(scale, ax=panels_of_scene, shrink=0.8, aspect=_BAR * rows, pad=0.01)
+        bar.locator = MaxNLocator(5, steps=[1, 2, 5, 10])
+        bar.outline.set_linewidth(0.5)
+    lines = list(remarks)
+    if len(lines) == 2:
+        lines = [f"above: {lines[0]}", f"below: {lines[1]}"]
+    title = "\n".join(["colour: −σₙ (force / length)", *lines])
+    figure.legend(handles=_surface_handles(), loc="outside lower center", ncols=3, title=title, title_fontsize=LETTERS)
+    return figure
+
+
+def _surface_handles() -> list[Line2D | Patch]:
+    """Return the legend of both surfaces and of the penetration, as `plot_bodies` draws them."""
+    pen: dict[str, Any] = {"color": "black", "linewidth": 1.3, "markersize": 3.6, "markeredgecolor": "black"}
+    return [
+        Line2D([], [], label="slave", marker="o", **pen),
+        Line2D([], [], label="master", marker="s", linestyle=(0, (4, 1.5)), markerfacecolor="white", **pen),
+        Patch(facecolor="white", edgecolor="0.35", linewidth=0, hatch="xxxxxx", label="penetration"),
+    ]
+
+
+def _plot_meshes(tests: PatchTests) -> Figure:
+    """Draw the undeformed meshes of both bodies of the first patch test, and the pressure on them."""
+    figure = new_figure(3.6)
+    axes = figure.subplots()
+    axes.set_axis_off()
+    for body in tests.patches[0].solved.bodies:
+        edges = list(body.nodes[edges_of(body.cells)])
+        axes.add_collection(LineCollection(edges, colors="0.35", linewidths=0.7, zorder=2))
+        is_slave, nodes = body.name == "slave", body.nodes[body.contact_nodes]
+        marker, face = ("o", "black") if is_slave else ("s", "white")
+        axes.plot(*nodes.T, ls="none", marker=marker, ms=5, mfc=face, mec="black", zorder=6 - is_slave)
+        height = float(np.ptp(body.nodes[:, 1])) * _ARROW
+        for x, y in body.nodes[np.flatnonzero(body.load[:, 1] < 0)]:
+            axes.annotate("", (x, y), (x, y + height), arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 0.8})
+            axes.plot(x, y + height, alpha=0.0)
+    axes.set_aspect("equal")
+    axes.margins(0.04)
+    axes.autoscale_view()
+    figure.supxlabel("filled: slave nodes; open: master nodes; arrows: p = 1", fontsize=LETTERS)
+    return figure
+
+
+def _end_remark(curve: _Curve) -> str:
+    """Return how Newton's method ended, in brackets; empty for a solution."""
+    return "" if curve.solution.converged else f" ({curve.end})"
+
+
+def edges_of(cells: IntArray) -> IntArray:
+    """Return the nodes (n_edges, 2) of the edges of some cells, each edge once."""
+    pairs = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
