@@ -145,27 +145,21 @@ class SurfaceMortar:
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual: of the cells at fixed pressures, and of the pressures."""
-        pairs = FacePairs.from_pairing(interface, pairing)
-        n, n_nodes, places = interface.n_unknowns, interface.n_slave_nodes, unknowns_of(pairs.nodes)
-        corners, pressure = pairs.corners_at(z), self._pressures(*_node_sums(pairs, z, n_nodes), pairing)
-        at_corners = pressure[pairs.slave_nodes]
-        fixed = differentiate(partial(_forces, pairs.n_slave_corners), corners, pairs.codes, at_corners)
-        units = _unit_forces(pairs.n_slave_corners, corners, pairs.codes)
-        by_pressure = add_blocks(units, places, pairs.slave_nodes, (n, n_nodes))
-        return sparse.csr_array(
-            add_blocks(fixed, places, places, (n, n)) + by_pressure @ self._pressure_gradients(interface, pairing, z)
-        )
-
-    def _pressure_gradients(self, interface: Interface, pairing: Pairing, z: FloatArray) -> sparse.csr_array:
-        """Return the derivatives (n_slave_nodes, n_unknowns) of the pressures: −ε̂ (∂G − G/W ∂W) / W."""
         pairs, active = FacePairs.from_pairing(interface, pairing), pairing["active"]
-        gaps, weights = _node_sums(pairs, z, interface.n_slave_nodes)
-        sums = differentiate(partial(_local_sums, pairs.n_slave_corners), pairs.corners_at(z), pairs.codes)
-        shape, places = (interface.n_slave_nodes, interface.n_unknowns), unknowns_of(pairs.nodes)
-        by_gap, by_weight = (add_blocks(sums[:, k], pairs.slave_nodes, places, shape) for k in range(2))
+        n, n_nodes, n_slave = interface.n_unknowns, interface.n_slave_nodes, pairs.n_slave_corners
+        corners, places, slave_nodes = pairs.corners_at(z), unknowns_of(pairs.nodes), pairs.slave_nodes
+        gaps, weights = _node_sums(pairs, z, n_nodes)
+        pressure = self._pressures(gaps, weights, pairing)
+        fixed = differentiate(partial(_forces, n_slave), corners, pairs.codes, pressure[slave_nodes])
+        by_pressure = add_blocks(_unit_forces(n_slave, corners, pairs.codes), places, slave_nodes, (n, n_nodes))
+        sums = differentiate(partial(_local_sums, n_slave), corners, pairs.codes)
+        by_gap, by_weight = (add_blocks(sums[:, k], slave_nodes, places, (n_nodes, n)) for k in range(2))
         whole = np.where(active, weights, 1.0)
         scale, mean = np.where(active, -self.penalty / whole, 0.0), np.where(active, gaps / whole, 0.0)
-        return sparse.csr_array(sparse.diags_array(scale) @ (by_gap - sparse.diags_array(mean) @ by_weight))
+        # The derivatives of the pressures: −ε̂ (∂G − G/W ∂W) / W.
+        of_pressure = sparse.diags_array(scale) @ (by_gap - sparse.diags_array(mean) @ by_weight)
+        of_cells = add_blocks(fixed, places, places, (n, n))
+        return sparse.csr_array(of_cells + by_pressure @ sparse.csr_array(of_pressure))
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes that the master covers: weighted nodes without a foot, on the first of their faces."""

@@ -57,14 +57,6 @@ def test_a_segment_seen_edge_on_is_no_free_end() -> None:
         assert -forces[2:, 1].sum() == pytest.approx(PENALTY * 0.1 * 1.8)
 
 
-def test_at_a_free_end_the_master_loses_what_lies_past_it() -> None:
-    interface, z = make_flat([4.0], [3.375, 0.125])  # the slave overhangs by 0.5, at g = −1/8
-    for free_end, carried in (("truncate", 3.5), ("extend", 4.0)):
-        forces = contact_forces(vts_ppt(penalty=PENALTY, free_end=free_end), interface, z)
-        assert forces[:2, 1].sum() == 4.0
-        assert -forces[2:, 1].sum() == pytest.approx(carried, rel=1e-15)
-
-
 def test_beside_a_step_of_the_master_a_node_is_pulled_so_vts_ppt_promises_no_push() -> None:
     """The walk stops before the step, 0.7 before a segment of 0.2, so that a < −1 on it."""
     slave, master = [[-0.4, -0.1], [1.4, -0.1]], [[3.0, 0.0], [0.5, 0.0], [0.3, 0.0], [0.3, -1.0]]

@@ -51,16 +51,6 @@ def test_the_forces_of_a_residual_are_those_beside_the_tangent_and_a_repetition_
         assert np.abs(alone - forces).max() <= 16 * UNIT_ROUNDOFF * np.abs(forces).max()  # Sums in the same order.
 
 
-def test_the_tangent_is_the_complex_step_of_the_residual() -> None:
-    formulation, random = vts_cell_3d(penalty=2.0), np.random.default_rng(0)
-    for case in smooth_states():
-        pairing = formulation.pair(case.interface, case.z)
-        direction = random.normal(size=case.z.size)
-        step = formulation.residual(case.interface, pairing, case.z + 2.0**-200 * 1j * direction).imag * 2.0**200
-        tangent = formulation.tangent(case.interface, pairing, case.z)
-        assert np.linalg.norm(tangent @ direction - step) <= 1e-12 * np.linalg.norm(step)
-
-
 def test_the_pattern_holds_the_nodes_of_cells_in_contact_and_no_other() -> None:
     formulation = vts_cell_3d(penalty=2.0)
     for case in smooth_states()[:20]:
