@@ -1,19 +1,19 @@
 """The control: springs between the bodies in the Gauss points of a common mesh of both surfaces, and nothing clever.
 
 It is an engine whose answers are right to the accuracy of its mesh. An accusation of another code stands only if the
-same scene accuses this one not.
+same scene accuses this one not. scikit-fem assembles the stiffness of the bodies.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, SceneArrays
-from contactverif_engines.body_stiffness import assemble
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _ITERATIONS = 60
@@ -106,3 +106,34 @@ def _contact(scene: SceneArrays, positions: FloatArray) -> tuple[FloatArray, spa
         return forces, sparse.csr_array((size, size))
     places = np.concatenate(rows), np.concatenate(columns)
     return forces, sparse.csr_array((np.concatenate(values), places), shape=(size, size))
+
+
+def assemble(scene: SceneArrays) -> sparse.csr_array:
+    """Return the stiffness (2 n_nodes, 2 n_nodes), row 2 × node + component, in the axes of each node's body."""
+    size = 2 * len(scene.nodes)
+    total = sparse.csr_array((size, size))
+    triangles = scene.cells[:, 3] < 0
+    for index in np.unique(scene.body_of_cell):
+        for kind in (triangles, ~triangles):
+            cells = scene.cells[kind & (scene.body_of_cell == index)]
+            if len(cells):
+                cells = cells[:, :3] if (cells[:, 3] < 0).all() else cells
+                total = total + _one_body(scene, cells, scene.young[index], scene.poisson[index])
+    frames = sparse.block_diag(list(scene.frames()), format="csr")
+    return sparse.csr_array(frames.T @ total @ frames)
+
+
+def _one_body(scene: SceneArrays, cells: Any, young: float, poisson: float) -> sparse.csr_array:
+    """Return the stiffness of some cells of one material, in global axes."""
+    from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri, asm
+    from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+    used, corners = np.unique(cells, return_inverse=True)
+    kind, element = (MeshTri, ElementTriP1()) if cells.shape[1] == 3 else (MeshQuad, ElementQuad1())
+    mesh = kind(*map(np.ascontiguousarray, (scene.nodes[used].T, corners.reshape(cells.shape).T)))
+    basis = Basis(mesh, ElementVector(element), intorder=4)
+    local = sparse.coo_array(asm(linear_elasticity(*lame_parameters(young, poisson)), basis))
+    order = np.empty(2 * len(used), np.int64)
+    order[basis.nodal_dofs.T.reshape(-1)] = (2 * used[:, None] + [0, 1]).reshape(-1)
+    size = 2 * len(scene.nodes)
+    return sparse.csr_array((local.data, (order[local.row], order[local.col])), shape=(size, size))

@@ -1,12 +1,18 @@
-"""A user element of a solver as a formulation: the harness pairs, calls the element for each pair, and assembles.
+"""User elements of a solver as formulations: the harness pairs, calls the element for each pair, and assembles.
 
 A user element decides by itself whether it is in contact (`IF (G.GE.0) RETURN`). So what the harness pairs is only half
 of the decisions, and it travels in a `Handle`: the harness pairs anew at each state.
+
+- UEL of Abaqus has 36 arguments, for one static increment. `RHS` is minus the residual.
+- FEAP calls `elmtNN(d, ul, xl, ix, tl, s, p, ndf, ndm, nst, isw)`. `p` is minus the residual.
+
+`AMATRX` and `s` are its derivative, column by column.
 """
 
 from __future__ import annotations
 
 import ctypes
+import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -23,24 +29,34 @@ from contactverif.contract.option_checks import check_count, check_penalty, chec
 from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Traits
 from contactverif_foreign.element_pairs import RULES, Elements
-from contactverif_foreign.guarded_slot import Argument, GuardedSlot, SlotRows
-from contactverif_foreign.shared_library import find_file, find_function, load_library, parse_numbers
-from contactverif_foreign.traits_file import traits_beside
+from contactverif_foreign.shared_library import (
+    Argument,
+    GuardedSlot,
+    SlotRows,
+    find_file,
+    find_function,
+    fortran_names,
+    load_library,
+    parse_numbers,
+    traits_beside,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Convention:
     """The arguments of the user elements of a solver.
 
-    `arguments` and `constants` get the numbers of nodes, properties and state variables. `fill` gets elements,
-    reference positions and displacements (n, n_nodes, 2), and properties (n, n_properties). `constants` and `fill`
-    return the values of arguments by name.
+    `shapes` and `constants` get the numbers of nodes, properties and state variables. `fill` gets elements, reference
+    positions and displacements (n, n_nodes, 2), and properties (n, n_properties). `constants` and `fill` return the
+    values of arguments by name: those that are the same for all elements, and the others. What is in neither is zero.
     """
 
     name: str
-    arguments: Callable[[int, int, int], list[Argument]]
-    constants: Callable[[int, int, int], dict[str, Any]]
     order: tuple[str, ...]  # The names of the arguments in the order of the call.
+    integers: tuple[str, ...]  # The arguments that are integers, and those that the element may write.
+    outputs: tuple[str, ...]
+    shapes: Callable[[int, int, int], dict[str, tuple[int, ...]]]  # Those of the arguments that are arrays.
+    constants: Callable[[int, int, int], dict[str, Any]]
     fill: Callable[[Elements, FloatArray, FloatArray, FloatArray], dict[str, Any]]
     forces: str  # The argument with minus the residual.
     matrix: str  # The argument with its derivative, column by column.
@@ -64,9 +80,16 @@ class Routine:
         key = n_nodes, n_properties
         if key not in self.slots:
             numbers = n_nodes, n_properties, self.state_variables
-            slot = GuardedSlot(self.convention.arguments(*numbers), 2 * n_nodes)
-            slot.preset(self.convention.constants(*numbers))
-            values = [ctypes.c_void_p(slot.addresses[name]) for name in self.convention.order]
+            its, shapes = self.convention, self.convention.shapes(*numbers)
+            arguments = [
+                Argument(
+                    name, shapes.get(name, ()), "integer" if name in its.integers else "real", name not in its.outputs
+                )
+                for name in its.order
+            ]
+            slot = GuardedSlot(arguments, 2 * n_nodes)
+            slot.preset(its.constants(*numbers))
+            values = [ctypes.c_void_p(slot.addresses[name]) for name in its.order]
             self.slots[key] = slot, values
         return self.slots[key]
 
@@ -88,8 +111,7 @@ class UserElement:
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the nodal forces (n_unknowns,), minus those of the element."""
-        forces, _ = self.residual_and_tangent(interface, pairing, z)
-        return forces
+        return self.residual_and_tangent(interface, pairing, z)[0]
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
         """Return the derivative of the residual as the element computes it, sparse."""
@@ -183,3 +205,229 @@ def _load_routine(convention: Convention, path: Path, names: tuple[str, ...], st
     function = find_function(library, path, *names)
     function.restype = None
     return Routine(convention, library, function, state_variables)
+
+
+_UEL_ORDER = (
+    *("RHS", "AMATRX", "SVARS", "ENERGY", "NDOFEL", "NRHS", "NSVARS", "PROPS", "NPROPS", "COORDS", "MCRD", "NNODE"),
+    *("U", "DU", "V", "A", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "JELEM", "PARAMS", "NDLOAD", "JDLTYP", "ADLMAG"),
+    *("PREDEF", "NPREDF", "LFLAGS", "MLVARX", "DDLMAG", "MDLOAD", "PNEWDT", "JPROPS", "NJPROP", "PERIOD"),
+)
+_UEL_INTEGERS = (
+    *("NDOFEL", "NRHS", "NSVARS", "NPROPS", "MCRD", "NNODE", "JTYPE", "KSTEP", "KINC", "JELEM", "NDLOAD", "NPREDF"),
+    *("MLVARX", "MDLOAD", "NJPROP", "JDLTYP", "LFLAGS", "JPROPS"),
+)
+_UEL_OUTPUTS = ("RHS", "AMATRX", "SVARS", "ENERGY", "PNEWDT")
+_UEL_FLAGS = (1, 1, 1, 0, 0)  # Static analysis, large displacements, forces and matrix, a general step.
+
+
+def _uel_shapes(n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
+    size = 2 * n_nodes
+    return {
+        "RHS": (size, 1),
+        "AMATRX": (size, size),
+        "SVARS": (n_state,),
+        "ENERGY": (8,),
+        "PROPS": (n_properties,),
+        "COORDS": (2, n_nodes),
+        "U": (size,),
+        "DU": (size, 1),
+        "V": (size,),
+        "A": (size,),
+        "TIME": (2,),
+        "PARAMS": (3,),
+        "JDLTYP": (1, 1),
+        "ADLMAG": (1, 1),
+        "PREDEF": (2, 1, n_nodes),
+        "LFLAGS": (len(_UEL_FLAGS),),
+        "DDLMAG": (1, 1),
+        "JPROPS": (4,),
+    }
+
+
+def _uel_constants(n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
+    sizes = {"NDOFEL": 2 * n_nodes, "NNODE": n_nodes, "MLVARX": 2 * n_nodes, "NPROPS": n_properties, "NSVARS": n_state}
+    ones = ("NRHS", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "NPREDF", "MDLOAD", "PNEWDT", "PERIOD")
+    return sizes | dict.fromkeys(ones, 1) | {"MCRD": 2, "LFLAGS": _UEL_FLAGS, "NJPROP": 4}
+
+
+def _uel_fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
+    n_elements = len(elements.nodes)
+    displacements = u.reshape(n_elements, -1)
+    return {
+        "PROPS": properties,
+        "COORDS": reference.reshape(n_elements, -1),
+        "U": displacements,
+        "DU": displacements,
+        "JELEM": np.arange(1, n_elements + 1)[:, None],
+        "JPROPS": elements.sides,
+    }
+
+
+def _uel_flaw(rows: SlotRows) -> tuple[int, str] | None:
+    """Return the first element that asks for a shorter increment; there is none to shorten."""
+    smaller = np.flatnonzero(rows["PNEWDT"][:, 0] < 1.0)
+    if not len(smaller):
+        return None
+    return int(smaller[0]), f"set PNEWDT to {rows['PNEWDT'][smaller[0], 0]:g}; needed 1, there are no increments"
+
+
+# `COORDS` is the reference configuration and `U` the displacement from it. Forces and matrix are zero before the call.
+# The state variables are zero, too: a formulation has no history.
+_UEL = Convention(
+    "uel",
+    order=_UEL_ORDER,
+    integers=_UEL_INTEGERS,
+    outputs=_UEL_OUTPUTS,
+    shapes=_uel_shapes,
+    constants=_uel_constants,
+    fill=_uel_fill,
+    forces="RHS",
+    matrix="AMATRX",
+    flaw=_uel_flaw,
+)
+
+
+def uel(
+    *,
+    penalty: float,
+    file: str,
+    nodes: int | str = 3,
+    svars: int = 0,
+    props: float | str = "",
+    traits: str = "",
+    tau: float = 1e-2,
+) -> UserElement:
+    """Load a user element of Abaqus (UEL) from a shared library.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness, in PROPS(1): nodal or distributed, as the trait `penalty` says.
+    file : str
+        The shared library, absolute or relative to the working folder.
+    nodes : int | str
+        3: a slave node and its nearest master segment. 4: a slave and a master segment that overlap. "n": a slave and a
+        master chain; JPROPS holds the numbers of their nodes, and 1 for each that is closed.
+    svars : int
+        The number of state variables, zero before each call.
+    props : float | str
+        The properties from PROPS(3) on, with ":" between them. PROPS(2) is the reference length of the slave part: half
+        of the segments at a slave node, the slave segment, or the slave chain.
+    traits : str
+        A TOML file with the traits. Without it the file counts that lies beside the library, see `traits_beside`.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+    """
+    return load_element(
+        _UEL,
+        fortran_names("uel"),
+        penalty=penalty,
+        file=file,
+        nodes=nodes,
+        svars=svars,
+        props=props,
+        traits=traits,
+        tau=tau,
+    )
+
+
+_FEAP_ORDER = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
+_TANGENT_AND_RESIDUAL = 3  # The value of isw.
+_SETS = 6  # Columns of displacements in `ul`: the total, the increment, and velocities and the like, which are zero.
+_MOST_ELEMENTS = 99
+
+
+def _feap_shapes(n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
+    size = 2 * n_nodes
+    nodal = {"ul": (2, n_nodes, _SETS), "xl": (2, n_nodes), "ix": (n_nodes,), "tl": (n_nodes,)}
+    return {"d": (n_properties,), **nodal, "s": (size, size), "p": (size,)}
+
+
+def _feap_constants(n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
+    return {"ndf": 2, "ndm": 2, "nst": 2 * n_nodes, "isw": _TANGENT_AND_RESIDUAL}
+
+
+def _feap_fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
+    n_elements, n_nodes = elements.nodes.shape
+    displacements = np.zeros((n_elements, _SETS, 2 * n_nodes))
+    displacements[:, :2] = u.reshape(n_elements, 1, -1)  # The total and the increment.
+    return {
+        "d": properties,
+        "ul": displacements.reshape(n_elements, -1),
+        "xl": reference.reshape(n_elements, -1),
+        "ix": elements.nodes + 1,
+    }
+
+
+def _set_common_blocks(library: ctypes.CDLL, n_nodes: int) -> None:
+    """Say that one element of so many nodes is asked, in a static step, to the common blocks that a library has."""
+    # Their first variables are the same in FEAP and FEAPpv; `ctan` has the factors of stiffness, damping and mass.
+    blocks = {
+        "eldata": ("=d5i", 1.0, 1, 1, 0, 0, n_nodes),  # dm, n, ma, mct, iel, nel
+        "cdata": ("=6i", n_nodes, 1, 1, n_nodes, 2 * n_nodes, 1),  # numnp, numel, nummat, nen, neq, ipr
+        "eltran": ("=6d", 0.0, 0.0, 0.0, 1.0, 0.0, 0.0),  # bpr(3), ctan(3)
+    }
+    for block, (kinds, *values) in blocks.items():
+        for name in fortran_names(block):
+            if hasattr(library, name):
+                memory = (ctypes.c_char * struct.calcsize(kinds)).in_dll(library, name)
+                struct.pack_into(kinds, memory, 0, *values)
+
+
+# `xl` is the reference configuration and `ul(:,:,1)` the displacement from it; forces and matrix are zero before the
+# call. Common blocks of FEAP are those of the library itself: what `eldata`, `cdata` and `eltran` say of an element is
+# set before it is called, and all others are zero.
+_FEAP = Convention(
+    "feap",
+    order=_FEAP_ORDER,
+    integers=("ix", "ndf", "ndm", "nst", "isw"),
+    outputs=("s", "p"),
+    shapes=_feap_shapes,
+    constants=_feap_constants,
+    fill=_feap_fill,
+    forces="p",
+    matrix="s",
+    announce=_set_common_blocks,
+)
+
+
+def feap(
+    *,
+    penalty: float,
+    file: str,
+    number: int = 1,
+    nodes: int | str = 3,
+    props: float | str = "",
+    traits: str = "",
+    tau: float = 1e-2,
+) -> UserElement:
+    """Load a user element of FEAP (elmtNN) from a shared library.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness, in d(1): nodal or distributed, as the trait `penalty` says.
+    file : str
+        The shared library, as for `uel`.
+    number : int
+        The number NN of the subroutine `elmtNN`.
+    nodes : int | str
+        3, 4 or "n", as for `uel`.
+    props : float | str
+        The properties from d(3) on, with ":" between them. d(2) is the reference length, as for `uel`.
+    traits, tau : str | float
+        As for `uel`.
+    """
+    if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MOST_ELEMENTS:
+        raise MisuseError("option number", repr(number), f"a whole number from 1 to {_MOST_ELEMENTS}")
+    return load_element(
+        _FEAP,
+        fortran_names(f"elmt{number:02d}"),
+        penalty=penalty,
+        file=file,
+        nodes=nodes,
+        svars=0,
+        props=props,
+        traits=traits,
+        tau=tau,
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contactverif import Interface, Surface
-from contactverif_foreign.c_view import find_windows, segment_views
+from contactverif_foreign.c_library import find_windows, segment_views
 from contactverif_foreign.element_pairs import pair_chains, pair_nodes, pair_segments
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from contactverif import MisuseError, Traits
-from contactverif_foreign.traits_file import parse_traits_text, traits_beside
+from contactverif_foreign.shared_library import parse_traits_text, traits_beside
 
 
 def test_groups_and_a_flat_list_say_the_same() -> None:

@@ -20,7 +20,7 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).parents[2] / "reports" / "findings"
+FOLDER = Path(__file__).parents[1] / "reports" / "findings"
 COUNTS, NUMBERS = ("judged", "failed", "planned"), ("number", "value", "tolerance")
 HEADS = ("engine", "question", "verdict", *COUNTS, *NUMBERS, "seconds a case", "reason")
 PARTS = ("StructuralMechanics", "ContactStructuralMechanics", "LinearSolvers")
