@@ -30,7 +30,6 @@ from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Qua
 from contactverif_mortar.node_factors import Factors, NodeRows, RowGroups, check_product, group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 from contactverif_mortar.shape_rows import (
-    ShapedPoints,
     Weighted,
     add_shaped_rows,
     divide_covered,
@@ -39,7 +38,7 @@ from contactverif_mortar.shape_rows import (
 )
 
 # ∫φ_j and ∫φ_j g (n_slave_nodes,) at one state, and the shapes: their numbers, or at points.
-StateWeights = tuple[FloatArray, FloatArray, FloatArray | ShapedPoints]
+StateWeights = tuple[FloatArray, FloatArray, FloatArray | Weighted]
 NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
 _SOURCES = {
@@ -73,7 +72,7 @@ class Weighting:
         if not self.averaged:
             return weigh(interface, cells, self.quadrature, x, self.dual)
         weighted = weigh_points(interface, cells, self.quadrature, x[None], self.dual)
-        return weighted.areas[0], weighted.with_gap[0], weighted.linearize(self.quadrature, x)
+        return weighted.areas[0], weighted.with_gap[0], weighted
 
     def gaps(self, interface: Interface, cells: Cells, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫N_j and G_j (n_slave_nodes,) at x (n_nodes, 2); where nothing is covered they are zero and NaN."""
@@ -94,7 +93,7 @@ class Weighting:
         cells: Cells,
         active: BoolArray,
         x: FloatArray,
-        shapes: FloatArray | ShapedPoints,
+        shapes: FloatArray | Weighted,
         state: NodeState,
         choose_pattern: Callable[[RowGroups], Couplings],
     ) -> NodeRows:
@@ -105,10 +104,10 @@ class Weighting:
         slave, local = interface.slave.segments, cells.local_nodes(interface)
         groups = group_nodes(interface.n_nodes, slave, cells.slave, local, active, self.dual)
         pattern = choose_pattern(groups)
-        if not isinstance(shapes, ShapedPoints):
+        if not isinstance(shapes, Weighted):
             return node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         total, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
-        return add_shaped_rows(shapes, groups, state, 4, total, rest)
+        return add_shaped_rows(shapes, self.quadrature, x, groups, state, 4, total, rest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,6 @@ Source: Puso & Laursen (2004); dual shapes: Wohlmuth (2000), on the covered part
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -125,24 +124,6 @@ class Weighted(NamedTuple):
         at_points, nodes = self.shapes.interpolate(pressure, self.ends), self.parts.local_nodes(self.sides)
         return forces(self.points, at_points, nodes, len(self.sides.nodes))
 
-    def linearize(self, rule: Quadrature, x: FloatArray) -> ShapedPoints:
-        """Return the points of the first state, which is x (n_nodes, 2), with their variations."""
-
-        def variations(begin: int, end: int) -> FloatArray:
-            return rule.variations(self.sides, self.parts.select(slice(begin, end)), x)
-
-        return ShapedPoints(self.points[0], self.shapes, self.segment, self.sides.slave.segments, variations)
-
-
-class ShapedPoints(NamedTuple):
-    """The points of some cells at one state, and the slave nodes' shapes there."""
-
-    points: FloatArray  # (n_points, 6) The numbers of each point, as `Quadrature.points` gives them.
-    shapes: Shapes  # The shapes, of one state.
-    segment: IntArray  # (n_points,) The slave segment of each point.
-    slave: IntArray  # (n_slave_segments, 2) The slave nodes of each segment.
-    linearize: Callable[[int, int], FloatArray]  # From the first and the last of some parts: Δ of their points.
-
 
 def weigh_points(sides: Interface | Sides, parts: Parts, rule: Quadrature, x: Array, dual: bool) -> Weighted:
     """Compute points, shapes and weighted gaps on some parts of slave segments, at x (n_states, n_nodes, 2)."""
@@ -172,28 +153,34 @@ def divide_covered(areas: FloatArray, with_gap: FloatArray, lengths: FloatArray)
 
 
 def add_shaped_rows(
-    shaped: ShapedPoints, groups: RowGroups, state: NodeState, n_pushed: int, total: FloatArray, rest: sparse.csr_array
+    weighted: Weighted,
+    rule: Quadrature,
+    x: FloatArray,
+    groups: RowGroups,
+    state: NodeState,
+    n_pushed: int,
+    total: FloatArray,
+    rest: sparse.csr_array,
 ) -> NodeRows:
     """Add forces and their derivative at fixed pressures to `total` and `rest`, and return them with the factors.
 
-    Forces act on the first `n_pushed` local nodes: 4, or 2 where they act on the slave alone. `rest` has the places
-    of all pushed nodes and local nodes of each cell.
+    The first state of `weighted` is x (n_nodes, 2). Forces act on the first `n_pushed` local nodes: 4, or 2 where they
+    act on the slave alone. `rest` has the places of all pushed nodes and local nodes of each cell.
     """
-    shapes, n_cells = shaped.shapes, len(groups.local)
+    points, slave, n_cells = weighted.points[0], weighted.sides.slave.segments, len(groups.local)
     left, right = np.zeros((2, 2 * len(groups.nodes)))
     dual = len(groups.starts) - 1 > len(state.pressure)
-    chain = np.zeros((len(shaped.slave) if dual else 0, 2, 2))
-    n_q = len(shaped.points) // max(n_cells, 1)
-    places, at_points = (shaped.points, shaped.segment, shaped.slave, groups.local), tuple(each[0] for each in shapes)
+    chain = np.zeros((len(slave) if dual else 0, 2, 2))
+    n_q = len(points) // max(n_cells, 1)
+    places, at_points = (points, weighted.segment, slave, groups.local), tuple(each[0] for each in weighted.shapes)
     at_nodes, factors = (state.pressure, state.gaps, state.divisor), (groups.nodes, groups.starts, left, right)
     written = total, (rest.indptr, rest.indices, rest.data), factors, chain
     size = max(PIECE // max(n_q, 1), 1)
     for begin in range(0, n_cells, size):
-        end = min(begin + size, n_cells)
-        variations = shaped.linearize(begin, end)
+        variations = rule.variations(weighted.sides, weighted.parts.select(slice(begin, begin + size)), x)
         _add_points(written, begin * n_q, n_q, n_pushed, places, at_points, variations, at_nodes)
     if dual:
-        add_chains(shaped.slave, chain, state.divisor, groups.nodes, groups.starts, right)
+        add_chains(slave, chain, state.divisor, groups.nodes, groups.starts, right)
     return NodeRows(total, rest, groups, left, right, state.weights)
 
 

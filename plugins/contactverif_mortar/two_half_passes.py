@@ -160,7 +160,7 @@ class TwoHalfPasses:
             gaps = each.with_gap[0] / areas
             weights = np.where(active, -self.penalty, 0.0)
             state = NodeState(weights * gaps, weights, gaps, areas)
-            rows = add_shaped_rows(each.linearize(self.rule, x), of_rows, state, 2, forces, matrix)
+            rows = add_shaped_rows(each, self.rule, x, of_rows, state, 2, forces, matrix)
             rows.multiply(0, interface.n_nodes)
         return forces, matrix
 

@@ -60,6 +60,7 @@ FRAME, MASTER, CORNERS, SLOPES = 0, 4, 7, 7 + MOST_CORNERS  # The rows of `room`
 AXES, PLACES = SLOPES + 3, SLOPES + 6  # The axes of `face_search`, and along them the corners of slave and master.
 ROOM = PLACES + 6, 4
 N_NODES = 6  # The nodes of a cell: those of the slave face, then of the master face.
+Arm = tuple[float, float, float]  # A vector in space.
 SCANNED = 64  # A row with at most so many entries is scanned for a column; in a longer one the column is bisected for.
 # The rows of `slopes`: δα and α δc by the six s_j, t_j; then a row for the force of each node by s_j, t_j, h_j.
 SHARE, PLACE_S, PLACE_T, FORCE = 0, 1, 2, 3
@@ -113,23 +114,25 @@ def _set_frame(room: Array, x: Array, slave: IntArray) -> float:
     On a needle 1 − s − t, or the sum of e^1 and e^2, would lose all digits near the edge where it is 0: so a product of
     its own has them.
     """
+    a, b, c = _edge(x, slave[0], slave[1]), _edge(x, slave[0], slave[2]), _edge(x, slave[1], slave[2])
+    n = _cross(a, b)
+    size: float = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+    n = n[0] / size, n[1] / size, n[2] / size
+    by_1, by_2, by_0 = _cross(b, n), _cross(n, a), _cross(n, c)
     for axis in range(3):
-        room[FRAME, axis] = x[slave[1], axis] - x[slave[0], axis]
-        room[FRAME + 1, axis] = x[slave[2], axis] - x[slave[0], axis]
-    a_x, a_y, a_z = room[FRAME, 0], room[FRAME, 1], room[FRAME, 2]
-    b_x, b_y, b_z = room[FRAME + 1, 0], room[FRAME + 1, 1], room[FRAME + 1, 2]
-    n_x, n_y, n_z = a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x
-    size: float = np.sqrt(n_x * n_x + n_y * n_y + n_z * n_z)
-    n_x, n_y, n_z = n_x / size, n_y / size, n_z / size
-    room[FRAME, 0], room[FRAME + 1, 0] = (b_y * n_z - b_z * n_y) / size, (n_y * a_z - n_z * a_y) / size
-    room[FRAME, 1], room[FRAME + 1, 1] = (b_z * n_x - b_x * n_z) / size, (n_z * a_x - n_x * a_z) / size
-    room[FRAME, 2], room[FRAME + 1, 2] = (b_x * n_y - b_y * n_x) / size, (n_x * a_y - n_y * a_x) / size
-    room[FRAME + 2, 0], room[FRAME + 2, 1], room[FRAME + 2, 2] = n_x, n_y, n_z
-    c_x, c_y, c_z = x[slave[2], 0] - x[slave[1], 0], x[slave[2], 1] - x[slave[1], 1], x[slave[2], 2] - x[slave[1], 2]
-    room[FRAME + 3, 0] = (n_y * c_z - n_z * c_y) / size
-    room[FRAME + 3, 1] = (n_z * c_x - n_x * c_z) / size
-    room[FRAME + 3, 2] = (n_x * c_y - n_y * c_x) / size
+        room[FRAME, axis], room[FRAME + 1, axis] = by_1[axis] / size, by_2[axis] / size
+        room[FRAME + 2, axis], room[FRAME + 3, axis] = n[axis], by_0[axis] / size
     return size
+
+
+@compile_inline
+def _edge(x: Array, start: int, end: int) -> Arm:
+    return x[end, 0] - x[start, 0], x[end, 1] - x[start, 1], x[end, 2] - x[start, 2]
+
+
+@compile_inline
+def _cross(a: Arm, b: Arm) -> Arm:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @compile_inline
