@@ -148,12 +148,6 @@ def is_uniform(case: Case) -> bool:
     return "compliance" in case.parameters
 
 
-def overhangs(case: Case) -> bool:
-    """Return whether the slave of a uniform scene extends beyond its master at either end."""
-    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
-    return bool(slave.min() < master.min() or slave.max() > master.max())
-
-
 def pressure_of(case: Case, penalty: float) -> float:
     """Return the exact contact pressure of a uniform scene, force per length."""
     if "pressure" in case.parameters:

@@ -79,6 +79,12 @@ def flat_state(
     return Case(interface, nodes.reshape(-1), penalty, parameters, name=name)
 
 
+def overhangs(case: Case) -> bool:
+    """Return whether the slave of a flat case extends beyond its master at either end."""
+    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+    return bool(slave.min() < master.min() or slave.max() > master.max())
+
+
 def read_frame(nodes: FloatArray, turn: Turn, origin: FloatArray) -> tuple[list[Fraction], list[Fraction]]:
     """Return the exact places of nodes along the interface and across it, as lengths from a point of it."""
     p, q, r = turn

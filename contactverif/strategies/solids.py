@@ -21,8 +21,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.cases import random_source
 from contactverif.mechanics.bodies import Placing, Rectangle
 from contactverif.mechanics.scene import Scene, has_bodies
-from contactverif.problems.blocks import is_uniform, overhangs, two_blocks
+from contactverif.problems.blocks import is_uniform, two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY
+from contactverif.problems.flat_states import overhangs
 from contactverif.strategies.samples import Motion, ends_of, lengths, motions, repeat_cyclically, seeds
 
 UNIFORM = "a known uniform pressure"

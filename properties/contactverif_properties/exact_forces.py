@@ -6,26 +6,22 @@ A formulation measures the gap along the master's normal or along the slave's, a
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
 from math import sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import Finding, Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.linear import RANK_ROUNDOFF
-from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights
-from contactverif.problems.blocks import exact_unknowns, overhangs, pressure_of
+from contactverif.problems.flat_states import overhangs
 from contactverif_properties.roundoff import COORDINATE_ROUNDING, gap_tolerance
 from contactverif_properties.states import FrozenState
 
@@ -231,39 +227,6 @@ def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulat
         if errors[0] <= max(2 * errors[1], 1e-12 * float(np.abs(exact).max())):
             return uniform
     return nearest
-
-
-def exact_solution(scene: Scene, case: Case, subject: Subject, formulation: CheckedFormulation) -> FloatArray:
-    """Return the unknowns of the exact solution of a uniform scene, and the multipliers behind them if there are any.
-
-    Where multipliers enforce contact, nothing penetrates, whatever the penalty of the case.
-    """
-    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
-    pressure = pressure_of(case, penalty)
-    exact = exact_unknowns(scene, pressure, penalty)
-    if not formulation.n_multipliers(case.interface):
-        return exact
-    state = replace(case, z=scene.positions(exact))
-    return np.append(exact, exact_multipliers(state, subject, formulation, pressure))
-
-
-def nearest_multipliers(
-    case: Case, scene: Scene, formulation: CheckedFormulation, exact: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return, of all multipliers that load the bodies as those of a solved case do, the nearest to the exact ones.
-
-    A combination of multipliers that loads no body may be added to a solution. Such combinations exist where
-    multipliers are not unique, and on a rigid master, where only the sum of the nodal forces counts. The second number
-    is the smallest singular value of the loads of unit multipliers on the bodies over the largest one: forces that are
-    wrong by roundoff leave the multipliers uncertain by roundoff over that number.
-    """
-    solution = case.multipliers
-    loads = scene.transformation.T @ unit_forces(FrozenState.at(formulation, case))
-    _, sizes, directions = linalg.svd(loads)
-    rank = int((sizes > RANK_ROUNDOFF * max(loads.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
-    free = directions[rank:]
-    nearest: FloatArray = solution + free.T @ (free @ (exact - solution))
-    return nearest, float(sizes[rank - 1] / sizes[0]) if rank else 1.0
 
 
 ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that measure along the master's normal.

@@ -653,7 +653,7 @@ def _rank(case: Case, subject: Subject) -> dict[str, float]:
     scene, formulation = scene_of(case), subject.for_case(case)
     system, u = (
         System(scene, formulation, use_tangent=False),
-        exact_forces.exact_solution(scene, case, subject, formulation),
+        patch_solved.exact_solution(scene, case, subject, formulation),
     )
     matrix = system.matrix(u, system.pair(u))[0]
     rows, columns = scale_factors(matrix, scene.n_free)

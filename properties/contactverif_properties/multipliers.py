@@ -21,8 +21,8 @@ from contactverif.mechanics.system import System
 from contactverif.problems.refined_blocks import refinement_cases, refinements
 from contactverif.strategies.solids import block_cases, dead_zone_cases, solid_cases
 from contactverif_properties.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
-from contactverif_properties.exact_forces import exact_solution
 from contactverif_properties.newton_method import find_solution, is_untouched, solution_details, solution_floor
+from contactverif_properties.patch_solved import exact_solution
 
 COVERED, OVERHANG = "covered", "overhang"
 SCALE_RATIO = 8.0  # The first scale c over the second one.

@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
@@ -24,6 +25,7 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine
+from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.oracle import is_of_class
@@ -241,14 +243,14 @@ def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
     """
     scene, pressure, penalty = scene_of(case), pressure_of(case, np.inf), case.penalty
     formulation = subject.for_case(case)
-    exact = exact_forces.exact_solution(scene, case, subject, formulation)
+    exact = exact_solution(scene, case, subject, formulation)
     multipliers = exact[scene.n_free :]
 
     def measure_errors(u: FloatArray) -> Measurement:
         """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
         q = u[: scene.n_free]
         state = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
-        nearest, sharpness = exact_forces.nearest_multipliers(state, scene, formulation, multipliers)
+        nearest, sharpness = _nearest_multipliers(state, scene, formulation, multipliers)
         state = state.with_multipliers(nearest)
         values = _errors(FrozenState.at(formulation, state), scene, q, pressure)
         values[GAP] = exact_forces.gap_error(state, 0.0, pressure / penalty)
@@ -266,6 +268,39 @@ def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
     if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
         measurement = measure_errors(exact)
     return replace(measurement, details=end_details(trace))
+
+
+def exact_solution(scene: Scene, case: Case, subject: Subject, formulation: CheckedFormulation) -> FloatArray:
+    """Return the unknowns of the exact solution of a uniform scene, and the multipliers behind them if there are any.
+
+    Where multipliers enforce contact, nothing penetrates, whatever the penalty of the case.
+    """
+    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
+    pressure = pressure_of(case, penalty)
+    exact = exact_unknowns(scene, pressure, penalty)
+    if not formulation.n_multipliers(case.interface):
+        return exact
+    state = replace(case, z=scene.positions(exact))
+    return np.append(exact, exact_forces.exact_multipliers(state, subject, formulation, pressure))
+
+
+def _nearest_multipliers(
+    case: Case, scene: Scene, formulation: CheckedFormulation, exact: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return, of all multipliers that load the bodies as those of a solved case do, the nearest to the exact ones.
+
+    A combination of multipliers that loads no body may be added to a solution. Such combinations exist where
+    multipliers are not unique, and on a rigid master, where only the sum of the nodal forces counts. The second number
+    is the smallest singular value of the loads of unit multipliers on the bodies over the largest one: forces that are
+    wrong by roundoff leave the multipliers uncertain by roundoff over that number.
+    """
+    solution = case.multipliers
+    loads = scene.transformation.T @ exact_forces.unit_forces(FrozenState.at(formulation, case))
+    _, sizes, directions = linalg.svd(loads)
+    rank = int((sizes > RANK_ROUNDOFF * max(loads.shape) * UNIT_ROUNDOFF * sizes.max(initial=0.0)).sum())
+    free = directions[rank:]
+    nearest: FloatArray = solution + free.T @ (free @ (exact - solution))
+    return nearest, float(sizes[rank - 1] / sizes[0]) if rank else 1.0
 
 
 def solve_patch(

@@ -13,9 +13,10 @@ from contactverif.contract.names import parse_name, unknown_name_error
 from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
 from contactverif.problems import catalogue
-from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, pressure_of
+from contactverif.problems.blocks import exact_unknowns, is_uniform, pressure_of
 from contactverif.problems.catalogue import BLOCKS, OPTIONS, SCENES, load_scene, make_scene, options_of
 from contactverif.problems.disk import disk_on_foundation
+from contactverif.problems.flat_states import overhangs
 
 every_name = pytest.mark.parametrize("name", BLOCKS)
 every_name_of_the_paper = pytest.mark.parametrize("name", [name for name, drawing in BLOCKS.items() if drawing.source])

@@ -12,8 +12,9 @@ import contactverif_nts
 from contactverif import Case, ContactPoints, Rectangle, Subject, solve
 from contactverif.contract.property import Property, Verdict, judge
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.problems.blocks import exact_unknowns, is_uniform, overhangs, pressure_of, two_blocks
+from contactverif.problems.blocks import exact_unknowns, is_uniform, pressure_of, two_blocks
 from contactverif.problems.catalogue import BLOCKS, load_scene_case, make_scene
+from contactverif.problems.flat_states import overhangs
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases

@@ -18,8 +18,9 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.mechanics.scene import scene_of
 from contactverif.oracle import default_points, is_of_class, kink_margin
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
-from contactverif.problems.blocks import is_uniform, overhangs
+from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import load_scene_case
+from contactverif.problems.flat_states import overhangs
 from contactverif.problems.named_states import NAMED, named_case
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import (
