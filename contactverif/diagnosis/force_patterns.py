@@ -123,14 +123,12 @@ def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> 
 
 
 def _whole_springs(pushes: FloatArray) -> str:
-    """Return whether each slave node has a spring without a length."""
     if not same(pushes, np.full(len(pushes), PENALTY * DEPTH)):
         return ""
     return "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
 
 
 def _exchange(state: FlatState, pushes: FloatArray, *, master: bool) -> str:
-    """Return whether the forces are right but for the shape functions of a side, which are exchanged."""
     nodes = slice(state.n_slave_nodes, None) if master else slice(state.n_slave_nodes)
     if not same(pushes[nodes], state.swap(master=master)[nodes]):
         return ""
@@ -215,13 +213,11 @@ def _factor(pushes: FloatArray, exact: FloatArray) -> str:
 
 
 def _total(pushes: FloatArray, exact: FloatArray) -> str:
-    """Return whether the sum of the forces of a side is right."""
     factor = float(pushes.sum() / exact.sum())
     return "; their sum is right" if abs(factor - 1) <= SAME else f"; their sum is {_times(factor)} the exact one"
 
 
 def _ends(numbers: Sequence[int], total: int) -> str:
-    """Return whether the segments are the first or the last of all."""
     names = {0: "the first", total - 1: "the last"}
     if total == 1 or not set(numbers) <= set(names):
         return ""
@@ -261,7 +257,6 @@ def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
 
 
 def _single_piece(state: FlatState, pushes: FloatArray) -> str:
-    """Return whether each wrong node has the force of one piece, or one segment, where several are to be added."""
     parts = [*state.pieces]
     for of_pieces in (state.slave_segment, state.master_segment):
         parts += [state.pieces[of_pieces == segment].sum(axis=0) for segment in np.unique(of_pieces)]
@@ -273,7 +268,6 @@ def _single_piece(state: FlatState, pushes: FloatArray) -> str:
 
 
 def _halves(state: FlatState, pushes: FloatArray) -> str:
-    """Return whether both nodes of a master segment take the same force, wherever it acts."""
     n, halves = state.n_slave_nodes, np.zeros(len(pushes))
     for piece, segment in zip(state.pieces, state.master_segment, strict=True):
         halves[state.case.interface.master.segments[segment]] += piece[n:].sum() / 2
@@ -283,7 +277,6 @@ def _halves(state: FlatState, pushes: FloatArray) -> str:
 
 
 def _nearest_nodes(state: FlatState, pushes: FloatArray) -> str:
-    """Return whether the whole force of a point of integration is that of the nearer node of a side."""
     interface, along, n = state.case.interface, state.along, state.n_slave_nodes
     sides = {
         "slave": (interface.slave.segments[state.slave_segment], slice(None, n)),
@@ -302,7 +295,6 @@ def _nearest_nodes(state: FlatState, pushes: FloatArray) -> str:
 
 
 def _whole_segments(state: FlatState, pushes: FloatArray) -> str:
-    """Return whether the forces are those of points of whole slave segments, which nodes of the master do not cut."""
     for n_points in range(1, _MOST_POINTS + 1):
         places, weights = np.polynomial.legendre.leggauss(n_points)
         if same(pushes, _sum_at_points(state, (places + 1) / 2, weights / 2)):

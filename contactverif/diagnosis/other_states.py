@@ -39,7 +39,6 @@ def diagnose_lost_places(subject: Subject) -> str:
 
 
 def _name_places(places: FloatArray, no_force: BoolArray) -> str:
-    """Return the segments of the master, and the parts of them, whose places are lost."""
     parts = {}
     for segment, (first, last) in enumerate(pairwise(MASTER)):
         xi = (places - first) / (last - first)
@@ -137,7 +136,6 @@ def diagnose_balance(subject: Subject) -> str:
 
 
 def _name_direction(force: FloatArray, normals: Mapping[str, FloatArray]) -> str:
-    """Return the name of the normal along which a force is."""
     size = np.linalg.norm(force)
     names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
     return next(names, "another")

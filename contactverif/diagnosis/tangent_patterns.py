@@ -63,7 +63,6 @@ def diagnose_tangent(subject: Subject) -> str:
 
 
 def _past_an_end(subject: Subject) -> str:
-    """Return whether the tangent is wrong where the slave reaches past an end of the master, and in which columns."""
     pair = _measure(subject, [flat_state(depth=DEPTHS[0], places=(SLAVE, _SHORT_MASTER))])
     columns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=0) > SAME * pair.scale)
     if not columns.size:
@@ -75,7 +74,6 @@ def _past_an_end(subject: Subject) -> str:
 
 
 def _where_apart(subject: Subject) -> str:
-    """Return whether the tangent is wrong where a part of the slave is apart from the master, and in which rows."""
     pair = _measure(subject, [flat_state(slope=_PARTLY_APART, depth=DEPTHS[0])])
     if _is_small(pair.errors, pair.scale):
         return ""
@@ -102,7 +100,6 @@ def _measure(subject: Subject, states: Sequence[FlatState]) -> Tangents:
 
 
 def _as_a_whole(pair: Tangents) -> str:
-    """Return what is wrong with all entries at once."""
     tangents, derivatives = pair.tangents, pair.derivatives
     if not tangents.any():
         return "the tangent is zero"
@@ -124,7 +121,6 @@ def _as_a_whole(pair: Tangents) -> str:
 
 
 def _one_line(pair: Tangents) -> str:
-    """Return the entry, the row or the column that alone is wrong."""
     large: BoolArray = np.max(np.abs(pair.errors), axis=0) > SAME * pair.scale
     if large.sum() == 1:
         row, column = (int(place) for place in np.argwhere(large)[0])
@@ -141,7 +137,6 @@ def _one_line(pair: Tangents) -> str:
 
 
 def _one_side(pair: Tangents) -> str:
-    """Return the side whose nodes the tangent takes for rigid: all its columns are zero, and all others are right."""
     number = np.arange(pair.tangents.shape[1])
     for side, columns in (("slave", number < pair.n_slave), ("master", number >= pair.n_slave)):
         if not pair.tangents[:, :, columns].any() and _is_small(pair.errors[:, :, ~columns], pair.scale):
@@ -165,7 +160,6 @@ def _unknown(number: int, pair: Tangents) -> str:
 
 
 def _nodes(unknowns: IntArray, pair: Tangents) -> str:
-    """Return the nodes of some unknowns in words."""
     nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
     sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
     words = (
@@ -178,7 +172,8 @@ def _one_part(pair: Tangents) -> str:
     """Return the part of the tangent that is wrong, if its size, its place and its growth are those of one part."""
     blocks, powers = _blocks(pair), _powers_of_wrong_blocks(pair)
     if len(powers) != 1:
-        return _several([*powers]) if powers else ""
+        listed = " and ".join(f"{name[0]}–{name[1]}" for name in powers)
+        return f"entries in {listed} are wrong (n along the normal, t along the surface)" if powers else ""
     ((name, power),) = powers.items()
     errors = pair.errors[blocks[name]]
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
@@ -234,12 +229,6 @@ def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
     return ""
 
 
-def _several(names: list[str]) -> str:
-    """Return the blocks that are wrong, where they are several."""
-    listed = " and ".join(f"{name[0]}–{name[1]}" for name in names)
-    return f"entries in {listed} are wrong (n along the normal, t along the surface)"
-
-
 def _power_of_depth(errors: FloatArray) -> float:
     """Return the power of the penetration with which the largest error grows."""
     sizes = np.abs(errors).max(axis=(1, 2))
@@ -247,7 +236,6 @@ def _power_of_depth(errors: FloatArray) -> float:
 
 
 def _change(tangents: FloatArray, derivatives: FloatArray, scale: float) -> str:
-    """Return what became of a part, in words."""
     if not derivatives.any():
         return "is there, and should not be"
     wrong = np.abs(tangents - derivatives) > SAME * scale

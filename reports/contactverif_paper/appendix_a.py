@@ -159,8 +159,7 @@ FORMULAS: tuple[tuple[str, str, str, str], ...] = (  # number, formula, check, a
 )
 
 
-def _column(number: int) -> tuple[str, ...]:
-    return tuple(row[number] for row in FORMULAS)
+_NUMBERS, _TEXTS, _CHECKS, _ = zip(*FORMULAS, strict=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,9 +167,9 @@ class _Checks:
     """The largest relative difference of each formula from its check."""
 
     difference: Annotated[FloatArray, Column("formula", "1", "largest relative difference")]
-    formula: Annotated[tuple[str, ...], Column("formula", WORDS, "number in the appendix")] = _column(0)
-    text: Annotated[tuple[str, ...], Column("formula", WORDS, "the formula")] = _column(1)
-    check: Annotated[tuple[str, ...], Column("formula", WORDS, "what it is compared with")] = _column(2)
+    formula: Annotated[tuple[str, ...], Column("formula", WORDS, "number in the appendix")] = _NUMBERS
+    text: Annotated[tuple[str, ...], Column("formula", WORDS, "the formula")] = _TEXTS
+    check: Annotated[tuple[str, ...], Column("formula", WORDS, "what it is compared with")] = _CHECKS
 
 
 def _compute(report_progress: Progress) -> _Checks:
@@ -191,15 +190,10 @@ def errors(increment: Callable[[Geometry, np.ndarray], Increment]) -> FloatArray
         elif check == INTEGRAL:
             rows.append(_relative(getattr(geometry, name), integrals[name]))
         else:
-            rows.append(max(_step_error(geometry, d, name, increment) for d in directions))
+            exact = [np.imag(getattr(Geometry(geometry.x + 1j * _TINY * d), name)) / _TINY for d in directions]
+            ours = [getattr(increment(geometry, d), name) for d in directions]
+            rows.append(max(map(_relative, ours, exact)))
     return np.array(rows)
-
-
-def _step_error(
-    geometry: Geometry, d: np.ndarray, name: str, increment: Callable[[Geometry, np.ndarray], Increment]
-) -> float:
-    exact = np.imag(getattr(Geometry(geometry.x + 1j * _TINY * d), name)) / _TINY
-    return _relative(getattr(increment(geometry, d), name), exact)
 
 
 def _integrals(geometry: Geometry) -> dict[str, Vector]:

@@ -157,13 +157,15 @@ def _compute_peaks(report_progress: Progress) -> _PeakStudy:
         for row in EXPLAINED:
             slopes[FORMULATIONS.index(row), column] = solve_disk(row, flatter(slope)).excess
     report_progress("Example 2, other sizes")
+    resized = [replace(PAPER, width=PAPER.width * factor, depth=PAPER.depth * factor) for factor in SIZES]
+    interfaces = [disk_scene(refine=refine).interface for refine in _REFINEMENTS]
     return _PeakStudy(
         solutions=tuple(zip(*by_mesh, strict=True)),
-        size=np.array([_element_size(refine) for refine in _REFINEMENTS]),
+        size=np.array([each.slave.lengths(each.nodes).min() for each in interfaces]),
         slope=SLOPES,
         excess_over_slopes=slopes,
         foundation=SIZES,
-        excess_over_sizes=np.array([_solve_size(factor).excess for factor in SIZES]),
+        excess_over_sizes=np.array([solve_disk(VTS_ME, problem).excess for problem in resized]),
         winkler=PAPER.winkler_contact().peak,
     )
 
@@ -209,17 +211,6 @@ def _peak_datasets(study: _PeakStudy) -> dict[str, Group]:
     solutions = variables_of(study.solutions, "formulation mesh")
     columns = {name: solutions[name] for name in ("largest", "half_width")}
     return {"": Group(variables_of(study) | columns)}
-
-
-def _solve_size(factor: float) -> DiskSolution:
-    """Solve with a smaller or larger foundation."""
-    return solve_disk(VTS_ME, replace(PAPER, width=PAPER.width * factor, depth=PAPER.depth * factor))
-
-
-def _element_size(refine: int) -> float:
-    """Return the length of the shortest segment of the slave."""
-    interface = disk_scene(refine=refine).interface
-    return float(interface.slave.lengths(interface.nodes).min())
 
 
 PEAK = Item(

@@ -209,41 +209,38 @@ def _chains(nodes: FloatArray, edges: IntArray) -> list[list[int]]:
         edges_at[a].append(edge)
         edges_at[b].append(edge)
     remaining = set(range(len(edges)))
+
+    def extend(chain: list[int]) -> None:
+        """Lengthen the chain at its end, taking edges from those that remain."""
+        while True:
+            before, end = chain[-2], chain[-1]
+            direction = nodes[end] - nodes[before]
+            best, best_cosine, target = -1, _STRAIGHT, -1
+            for edge in edges_at[end]:
+                if edge not in remaining:
+                    continue
+                a, b = edges[edge].tolist()
+                other = b if a == end else a
+                step = nodes[other] - nodes[end]
+                cosine = float(direction @ step / (np.hypot(*direction) * np.hypot(*step)))
+                if cosine > best_cosine:
+                    best, best_cosine, target = edge, cosine, other
+            if best < 0:
+                return
+            remaining.discard(best)
+            chain.append(target)
+
     chains = []
     for edge in range(len(edges)):
         if edge not in remaining:
             continue
         remaining.discard(edge)
-        a, b = edges[edge].tolist()
-        chain = [a, b]
-        _extend(chain, nodes, edges, edges_at, remaining)
+        chain = edges[edge].tolist()
+        extend(chain)
         chain.reverse()
-        _extend(chain, nodes, edges, edges_at, remaining)
+        extend(chain)
         chains.append(chain)
     return chains
-
-
-def _extend(
-    chain: list[int], nodes: FloatArray, edges: IntArray, edges_at: dict[int, list[int]], remaining: set[int]
-) -> None:
-    """Lengthen the chain at its end, taking edges from those that remain."""
-    while True:
-        before, end = chain[-2], chain[-1]
-        direction = nodes[end] - nodes[before]
-        best, best_cosine, target = -1, _STRAIGHT, -1
-        for edge in edges_at[end]:
-            if edge not in remaining:
-                continue
-            a, b = edges[edge].tolist()
-            other = b if a == end else a
-            step = nodes[other] - nodes[end]
-            cosine = float(direction @ step / (np.hypot(*direction) * np.hypot(*step)))
-            if cosine > best_cosine:
-                best, best_cosine, target = edge, cosine, other
-        if best < 0:
-            return
-        remaining.discard(best)
-        chain.append(target)
 
 
 ITEM = Item(

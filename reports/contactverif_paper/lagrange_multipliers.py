@@ -226,19 +226,15 @@ def _compute_tests(report_progress: Progress) -> tuple[_MultiplierTest, ...]:
     tests = []
     for formulation in TEST_FORMULATIONS:
         report_progress(f"patch tests of {formulation.name}")
-        tests += [_test(formulation, name, scene_of(name)) for name in SCENES]
+        tests += [_test(formulation, name, _scene_of(name)) for name in SCENES]
     return tuple(tests)
 
 
-def scene_of(name: str) -> Scene:
+def _scene_of(name: str) -> Scene:
     """Return a scene of this item: a scene of the catalogue, case C on a finer mesh, or eight segments on two."""
-    if name == EIGHT_ON_TWO:
-        return eight_on_two()
-    return catalogue.make_scene("c", refine=2) if name == REFINED else catalogue.make_scene(name)
-
-
-def eight_on_two() -> Scene:
-    """Return eight slave segments on two master segments: VTS-PPT's constraints depend on one another there."""
+    if name != EIGHT_ON_TWO:
+        return catalogue.make_scene("c", refine=2) if name == REFINED else catalogue.make_scene(name)
+    # VTS-PPT's constraints depend on one another there.
     layers = np.linspace(0.0, 4.0, 3)
     return two_blocks(
         Rectangle(np.linspace(0.0, 8.0, 9), layers, young=1e4, poisson=0.3),

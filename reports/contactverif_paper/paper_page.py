@@ -19,7 +19,7 @@ from contactverif.contract import schema
 from contactverif.contract.columns import Group
 from contactverif_paper.figure_style import render_figure
 from contactverif_paper.paper_columns import variables_of
-from contactverif_paper.paper_item import OURS, Agreement, ItemResult, Paper, PaperFigure, Progress, Statement, sentence
+from contactverif_paper.paper_item import OURS, Agreement, Paper, PaperFigure, Progress, Statement, sentence
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
 from contactverif_reports.netcdf.file_groups import write_tree
@@ -92,34 +92,30 @@ def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
         agreements=Agreement,
         look_of=LOOKS,
         counts=Counter(statement.agreement for statement in paper.statements),
-        statements_of={figure.name: statements_of(paper, figure.name) for figure in paper.figures},
-        lone_statements_of={result.item.name: lone_statements(result) for result in paper.results},
+        statements_of={figure.name: _numbers(paper.statements, {figure.name}) for figure in paper.figures},
+        lone_statements_of={
+            result.item.name: _numbers(result.statements, {figure.name for figure in result.item.figures}, shown=False)
+            for result in paper.results
+        },
         reference=REFERENCE,
         sentence=sentence,
     )
 
 
-def statements_of(paper: Paper, figure: str) -> list[int]:
-    """Return the numbers of the statements that a figure shows."""
-    return [number for number, statement in enumerate(paper.statements) if statement.figure == figure]
-
-
-def lone_statements(result: ItemResult) -> list[int]:
-    """Return the numbers, within the item, of the statements that none of its own figures shows."""
-    own_figures = {figure.name for figure in result.item.figures}
-    return [number for number, statement in enumerate(result.statements) if statement.figure not in own_figures]
+def _numbers(statements: tuple[Statement, ...], figures: set[str], *, shown: bool = True) -> list[int]:
+    """Return the numbers of the statements that one of the figures shows, or that none of them does."""
+    return [number for number, statement in enumerate(statements) if (statement.figure in figures) is shown]
 
 
 def summary(paper: Paper) -> str:
     """Return every statement that does not merely note a silence, a line each."""
-    return "\n".join(_line(statement) for statement in paper.statements if statement.agreement is not Agreement.SILENT)
-
-
-def _line(statement: Statement) -> str:
-    mark, _ = LOOKS[statement.agreement]
-    verdict = f"{mark:3} {statement.agreement.words:17}"
-    condition = f". It holds if: {statement.condition}" if statement.condition else ""
-    return f"  {verdict} {statement.place}: {statement.result}{condition}"
+    lines = []
+    for statement in paper.statements:
+        if statement.agreement is not Agreement.SILENT:
+            verdict = f"{LOOKS[statement.agreement][0]:3} {statement.agreement.words:17}"
+            condition = f". It holds if: {statement.condition}" if statement.condition else ""
+            lines.append(f"  {verdict} {statement.place}: {statement.result}{condition}")
+    return "\n".join(lines)
 
 
 def svg(figure: Figure) -> str:

@@ -149,9 +149,6 @@ def test_iterations_of_fig_30_by_stopping_rule(convergence: fig30_convergence.Co
     first, _, _ = fig30_convergence.ITEM.statements(convergence)
     assert first.agreement is Agreement.CONDITIONAL
     assert "18 decades" in first.claim
-
-
-def test_the_printed_axis_of_fig_30_has_18_decades() -> None:
     low, high = fig30_convergence.AXIS
     assert round(float(np.log10(high / low))) == 18
 
