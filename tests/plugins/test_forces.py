@@ -163,6 +163,8 @@ def test_several_and_closed_chains() -> None:
     [
         (contactverif_nts.vts_me, {"n": 0}, "n: found 0; needed a whole number from 1 to 1000"),
         (contactverif_nts.vts_me, {"n": 1.5}, "n: found 1.5"),
+        (contactverif_nts.vts_me_lm, {"n": 0}, "n: found 0"),
+        (contactverif_nts.nts_lm, {"penalty": 0}, "penalty: found 0"),
         (contactverif_mortar.mortar_two_half_pass, {"n": 1}, "n: found 1; needed a whole number from 2 to 1000"),
         (contactverif_nts.nts_ar, {"area": "old"}, "area: found 'old'"),
         (contactverif_nts.vts_ppt, {"free_end": "open"}, "free_end: found 'open'"),
