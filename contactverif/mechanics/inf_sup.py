@@ -53,8 +53,13 @@ def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bo
     n = interface.dim * interface.n_slave_nodes
     now, then = (np.linalg.norm(rows[:, :n], axis=1) for rows in (gaps, forces))
     gaps = gaps * (then / np.where(now > 0, now, np.inf))[:, None]
-    lengths = mean_node_lengths(interface, forces) if nodal else np.ones(len(forces))  # Unit pressures, not forces.
     on_slave = forces.reshape(len(forces), -1, 2)[:, : interface.n_slave_nodes]
+    lengths = np.ones(len(forces))
+    if nodal:  # Unit pressures, not forces: each stands for half of the segments beside the nodes that it pushes.
+        sizes = np.linalg.norm(on_slave, axis=2)
+        totals = sizes.sum(axis=1)
+        integrals = shape_integrals(interface.slave, interface.nodes)[: interface.n_slave_nodes]
+        lengths = sizes @ integrals / np.where(totals > 0, totals, 1.0)
     areas = lengths * np.linalg.norm(on_slave.sum(axis=1), axis=1)
     young = min(body.young for body in scene.bodies if not body.rigid)
     segment = float(interface.slave.lengths(interface.nodes).mean())
@@ -101,18 +106,6 @@ def gap_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
     derivatives = (values[: interface.n_nodes] - values[interface.n_nodes :]).T / (2 * step)
     rows: FloatArray = (derivatives[:, :, None] * across).reshape(len(derivatives), n)
     return rows
-
-
-def mean_node_lengths(interface: Interface, forces: FloatArray) -> FloatArray:
-    """Return the length (n_multipliers,) that each nodal multiplier stands for.
-
-    It is half of the segments beside the slave nodes that it pushes, weighted by its forces.
-    """
-    lengths = shape_integrals(interface.slave, interface.nodes)[: interface.n_slave_nodes]
-    sizes = np.linalg.norm(forces.reshape(len(forces), -1, 2)[:, : interface.n_slave_nodes], axis=2)
-    totals = sizes.sum(axis=1)
-    means: FloatArray = sizes @ lengths / np.where(totals > 0, totals, 1.0)
-    return means
 
 
 def _pressed_state(interface: Interface, formulation: CheckedFormulation) -> FloatArray:

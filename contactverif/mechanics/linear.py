@@ -53,11 +53,6 @@ def solve_step(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArr
         step, condition = _factorise(matrix, right)
         singular = step is None or condition <= UNIT_ROUNDOFF * len(right) or not np.isfinite(step).all()
         return Step(None if singular else step, condition)
-    return _solve_saddle_point(matrix, right, n_positions, floor)
-
-
-def _solve_saddle_point(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArray | None) -> Step:
-    """Solve a system with multipliers, whose constraints may depend on one another."""
     rows, columns = scale_factors(matrix, n_positions)
     scaled = _scale(matrix, rows, columns)
     step, condition = _factorise(scaled, rows * right)

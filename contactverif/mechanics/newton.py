@@ -18,6 +18,7 @@ from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation
+from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.scene import Scene
 from contactverif.mechanics.system import System
 
@@ -337,7 +338,7 @@ def _load_step(
         if not keeps:
             contact = system.contact_stiffness(u, pairing, tangent)
         matrix, floor = system.stiffness + contact, system.floor(u, contact, forces)
-        comparable = system.row_factors(matrix)
+        comparable = scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
         record.add(u, system.factor, residual, floor, comparable, changes)
         end = _end(record, first, n_free, keeps=keeps)
         if end is not None:

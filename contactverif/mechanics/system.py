@@ -279,10 +279,6 @@ class System:
         floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
         return floor
 
-    def row_factors(self, matrix: Any) -> FloatArray | float:
-        """Return the factors (n,) that make constraint rows comparable with forces; 1 without multipliers."""
-        return linear.scale_factors(matrix, self.scene.n_free)[0] if self.n_multipliers else 1.0
-
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
         return linear.solve_step(matrix, right, self.scene.n_free, floor)

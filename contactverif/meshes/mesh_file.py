@@ -8,7 +8,6 @@ command line.
 from __future__ import annotations
 
 import sys
-from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -209,31 +208,52 @@ def _orient_lines(argument: str, lines: IntArray, inside: IntArray, points: Floa
 
     The cells inside show the side, by their directed edges. The second array (n_lines,) says for which lines they do.
     """
-    touching = _lines_at_nodes(argument, lines, points)
+    neighbours = _neighbours_of_lines(argument, lines, points)
     left, right = (np.isin(ends[:, 0] * len(points) + ends[:, 1], inside) for ends in (lines, lines[:, ::-1]))
     if (left & right).any():
         actual = f"a line with cells on both sides, at {describe_place(points, lines[left & right][0, 0])}"
         raise MisuseError(argument, actual, "lines on the boundary of a body")
-    reverse, by_cells = np.zeros(len(lines), dtype=bool), np.zeros(len(lines), dtype=bool)
-    visited: set[int] = set()
-    for first in range(len(lines)):
-        if first in visited:
+    signs = left.astype(np.int64) - right
+    return _run_one_way(argument, points, lines, neighbours, signs, ("a chain", "a body on one side of a chain"))
+
+
+def _run_one_way(
+    argument: str,
+    points: FloatArray,
+    elements: IntArray,
+    neighbours: list[list[tuple[int, bool]]],
+    signs: IntArray,
+    words: tuple[str, str],
+) -> tuple[IntArray, BoolArray]:
+    """Turn lines or faces (n, n_corners) as those that they hang together with, and so that the body is behind them.
+
+    `neighbours` says of which of them one of a pair is to be turned. `signs` (n,) are 1 where a cell shows that the
+    body is behind, −1 where it is in front, 0 without a cell. The second array (n,) says for which a cell does.
+    """
+    turned, by_cells, visited = np.zeros((3, len(elements)), dtype=bool)
+    for first in range(len(elements)):
+        if visited[first]:
             continue
-        chain = _follow_chain(lines, touching, first, reverse, visited)
-        body_left, body_right = (np.where(reverse, a, b)[chain] for a, b in ((right, left), (left, right)))
-        if body_left.any() and body_right.any():
-            place = describe_place(points, lines[chain][body_right][0, 0])
-            raise MisuseError(
-                argument, f"a chain that changes the side of its body, at {place}", "a body on one side of a chain"
-            )
-        by_cells[chain] = body_left.any() or body_right.any()
-        if body_right.any():
-            reverse[chain] = ~reverse[chain]
-    return np.where(reverse[:, None], lines[:, ::-1], lines), by_cells
+        visited[first], patch = True, [first]
+        for element in patch:  # The list grows while it is read.
+            for other, is_opposite in neighbours[element]:
+                if not visited[other]:
+                    visited[other], turned[other] = True, turned[element] ^ is_opposite
+                    patch.append(other)
+                elif turned[other] != turned[element] ^ is_opposite:
+                    place = describe_place(points, elements[other, 0])
+                    raise MisuseError(argument, f"a surface with one side, at {place}", "the surface of a body")
+        sides = signs[patch] * np.where(turned[patch], -1, 1)
+        if sides.min() < 0 < sides.max():
+            place = describe_place(points, elements[np.array(patch)[sides < 0][0], 0])
+            raise MisuseError(argument, f"{words[0]} that changes the side of its body, at {place}", words[1])
+        turned[patch] ^= bool(sides.min() < 0)
+        by_cells[patch] = bool(sides.any())
+    return np.where(turned[:, None], elements[:, ::-1], elements), by_cells
 
 
-def _lines_at_nodes(argument: str, lines: IntArray, points: FloatArray) -> dict[int, list[int]]:
-    """Return the numbers of the lines that meet at each node, checked: the lines form chains, each line once."""
+def _neighbours_of_lines(argument: str, lines: IntArray, points: FloatArray) -> list[list[tuple[int, bool]]]:
+    """Return for each line its neighbours, and whether both begin or both end in their node; lines form chains."""
     touching: dict[int, list[int]] = {}
     for index, line in enumerate(lines.tolist()):
         for node in line:
@@ -244,24 +264,15 @@ def _lines_at_nodes(argument: str, lines: IntArray, points: FloatArray) -> dict[
             raise MisuseError(argument, actual, "chains: at most two lines at a node")
     if len(np.unique(np.sort(lines, axis=1), axis=0)) < len(lines):
         raise MisuseError(argument, "the same line twice", "each line once")
-    return touching
-
-
-def _follow_chain(
-    lines: IntArray, touching: dict[int, list[int]], first: int, reverse: BoolArray, visited: set[int]
-) -> list[int]:
-    """Return the lines of a chain, and mark in `reverse` those that run against its first line."""
-    chain = [first]
-    for index in chain:  # The list grows while it is read.
-        if index in visited:
-            continue
-        visited.add(index)
-        begin, end = lines[index, ::-1] if reverse[index] else lines[index]
-        for node, met_by in ((begin, 1), (end, 0)):
-            for following in set(touching[int(node)]) - visited:
-                reverse[following] = lines[following, met_by] != node
-                chain.append(following)
-    return chain
+    return [
+        [
+            (other, bool(lines[other, end] == node))
+            for end, node in enumerate(line)
+            for other in touching[node]
+            if other != index
+        ]
+        for index, line in enumerate(lines.tolist())
+    ]
 
 
 def _renumber(points: FloatArray, slave: IntArray, master: IntArray) -> Interface:
@@ -309,7 +320,11 @@ def _surfaces_of(mesh: PlainMesh, groups: dict[str, Group], names: tuple[str, st
         raise MisuseError("--master", actual, "surfaces without a common node: two nodes where the bodies touch")
     if not np.isfinite(mesh.points[np.unique(np.concatenate([side.reshape(-1) for side in sides]))]).all():
         raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
-    oriented = [_orient_faces(argument, mesh, faces) for argument, faces in zip(arguments, sides, strict=True)]
+    oriented = []
+    for argument, faces in zip(arguments, sides, strict=True):
+        neighbours, signs = _neighbours_of_faces(argument, mesh.points, faces), _outward(argument, mesh, faces)
+        words = "a surface", "one body on one side"
+        oriented.append(_run_one_way(argument, mesh.points, faces, neighbours, signs, words))
     interface = _renumber(mesh.points, *_flip(oriented, flip=flip))
     _check_facing_in_space(interface)
     return interface
@@ -335,41 +350,7 @@ def _faces(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) 
     return faces
 
 
-def _orient_faces(argument: str, mesh: PlainMesh, faces: IntArray) -> tuple[IntArray, BoolArray]:
-    """Turn faces (n_faces, n_corners) so that all are seen from outside the body.
-
-    The second array (n_faces,) says of which a volume cell shows the body.
-    """
-    neighbours = _neighbours(argument, mesh.points, faces)
-    outward = _outward(argument, mesh, faces)
-    turned, by_cells = np.zeros(len(faces), dtype=bool), np.zeros(len(faces), dtype=bool)
-    visited = np.zeros(len(faces), dtype=bool)
-    for first in range(len(faces)):
-        if visited[first]:
-            continue
-        visited[first], queue, patch = True, deque([first]), [first]
-        while queue:
-            face = queue.popleft()
-            for other, same_way in neighbours[face]:
-                if not visited[other]:
-                    visited[other], turned[other] = True, turned[face] ^ same_way
-                    queue.append(other)
-                    patch.append(other)
-                elif turned[other] != turned[face] ^ same_way:
-                    place = describe_place(mesh.points, faces[other, 0])
-                    raise MisuseError(argument, f"a surface with one side, at {place}", "the surface of a body")
-        signs = outward[patch] * np.where(turned[patch], -1, 1)
-        if signs.min() < 0 < signs.max():
-            place = describe_place(mesh.points, faces[np.array(patch)[signs < 0][0], 0])
-            raise MisuseError(
-                argument, f"a surface that changes the side of its body, at {place}", "one body on one side"
-            )
-        turned[patch] ^= bool(signs.min() < 0)
-        by_cells[patch] = bool(signs.any())
-    return np.where(turned[:, None], faces[:, ::-1], faces), by_cells
-
-
-def _neighbours(argument: str, points: FloatArray, faces: IntArray) -> list[list[tuple[int, bool]]]:
+def _neighbours_of_faces(argument: str, points: FloatArray, faces: IntArray) -> list[list[tuple[int, bool]]]:
     """Return for each face its neighbours, and whether both run the same way along their edge: one is turned then."""
     owners: dict[tuple[int, int], list[tuple[int, bool]]] = {}
     for face, corners in enumerate(faces.tolist()):

@@ -149,7 +149,11 @@ class _Part:
 def _parts(sides: MeshSides) -> list[_Part]:
     """Return the bodies that slave or master lines belong to, slaves first, without material and supports."""
     blocks = [turn_counter_clockwise(sides.points, corners) for corners in corners_of_cells(sides.mesh)]
-    labels = _label_bodies(len(sides.points), [*blocks, sides.slave, sides.master])
+    # Points that cells or lines join have the same label.
+    joining = [*blocks, sides.slave, sides.master]
+    first, second = np.vstack([np.column_stack([b[:, 0], corner]) for b in joining for corner in b.T[1:]]).T
+    graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(len(sides.points),) * 2)
+    labels = csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
     of_slave, of_master = np.unique(labels[sides.slave]), np.unique(labels[sides.master])
     if both := set(of_slave.tolist()) & set(of_master.tolist()):
         node = sides.slave[np.isin(labels[sides.slave[:, 0]], list(both))][0, 0]
@@ -158,25 +162,14 @@ def _parts(sides: MeshSides) -> list[_Part]:
     parts = []
     for side, lines, its_labels in (("slave", sides.slave, of_slave), ("master", sides.master, of_master)):
         for label in its_labels:
-            cells = [block[labels[block[:, 0]] == label] for block in blocks]
-            parts.append(_part(side, sides.points, cells, lines[labels[lines[:, 0]] == label]))
+            cells = _one_shape([block[labels[block[:, 0]] == label] for block in blocks])
+            edges = lines[labels[lines[:, 0]] == label]
+            numbers = np.unique(np.concatenate([cells.reshape(-1), edges.reshape(-1)]))
+            its_cells, contact = np.searchsorted(numbers, cells), np.searchsorted(numbers, edges)
+            shape, rigid = (len(numbers), 2), not len(cells)
+            fixed, imposed = np.full(shape, rigid), np.zeros(shape)
+            parts.append(_Part(side, numbers, sides.points[numbers], its_cells, contact, fixed, imposed))
     return parts
-
-
-def _part(side: str, points: FloatArray, blocks: list[IntArray], lines: IntArray) -> _Part:
-    """Return a body of some cells; a rigid one where there are none."""
-    cells = _one_shape(blocks)
-    numbers = np.unique(np.concatenate([cells.reshape(-1), lines.reshape(-1)]))
-    shape, rigid = (len(numbers), 2), not len(cells)
-    return _Part(
-        side,
-        numbers,
-        points[numbers],
-        np.searchsorted(numbers, cells),
-        np.searchsorted(numbers, lines),
-        np.full(shape, rigid),
-        np.zeros(shape),
-    )
 
 
 def _one_shape(blocks: list[IntArray]) -> IntArray:
@@ -189,15 +182,6 @@ def _one_shape(blocks: list[IntArray]) -> IntArray:
     if len({block.shape[1] for block in blocks}) > 1:
         blocks = [np.vstack([block[:, :3], block[:, [0, 2, 3]]]) if block.shape[1] == 4 else block for block in blocks]
     return np.vstack(blocks)
-
-
-def _label_bodies(n_points: int, cells: list[IntArray]) -> IntArray:
-    """Return a number for each point: points that cells or lines join have the same."""
-    pairs = [np.column_stack([block[:, 0], corner]) for block in cells for corner in block.T[1:]]
-    first, second = np.vstack(pairs).T
-    graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(n_points, n_points))
-    labels: IntArray = csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
-    return labels
 
 
 def _points_of_group(sides: MeshSides, option: str, name: str) -> IntArray:

@@ -116,7 +116,8 @@ def make_layer(scene: SceneArrays) -> Layer:
 def write_deck(layer: Layer, kind: Kind) -> list[str]:
     """Return the lines of the deck."""
     scene = layer.plane.scene
-    stiffness = _number(scene.penalty) + (f", {_number(_tension(scene))}" if kind == "nodes" else "")
+    tension = 1e-12 * float(scene.penalty) * scene.unit  # Springs at nodes keep it far from contact: none to speak of.
+    stiffness = _number(scene.penalty) + (f", {_number(tension)}" if kind == "nodes" else "")
     return [
         "*NODE, NSET=ALL",
         *_rows(layer.nodes),
@@ -193,11 +194,6 @@ def _turned_nodes(layer: Layer) -> list[str]:
         lines.append(f"*TRANSFORM, NSET=T{group}, TYPE=R")
         lines.append(", ".join(map(_number, [axis[0], axis[2], 0.0, axis[1], axis[3], 0.0])))
     return lines
-
-
-def _tension(scene: SceneArrays) -> float:
-    """Return the tension, force per length squared, that springs at nodes keep far from contact: none to speak of."""
-    return 1e-12 * float(scene.penalty) * scene.unit
 
 
 def _rows(nodes: FloatArray) -> list[str]:

@@ -61,17 +61,11 @@ class Control:
         converged = step <= small
         displacements = (frames @ u).reshape(-1, 2)
         forces = -_contact(scene, scene.nodes + displacements)[0].reshape(-1, 2)
-        message = "" if converged else "no end"
-        return EngineAnswer(displacements, converged, iteration, message, forces, _mean_pressures(scene, forces))
-
-
-def _mean_pressures(scene: SceneArrays, forces: FloatArray) -> FloatArray:
-    """Return the force (n_nodes, 2) on each node of the slave over the length of its segments."""
-    ends = scene.nodes[scene.slave]
-    halves = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2, 2)
-    lengths = np.bincount(scene.slave.reshape(-1), halves)
-    nodes = np.unique(scene.slave)
-    return np.asarray(np.hypot(*forces[nodes].T) / lengths[nodes])
+        # The pressure is the force on each node of the slave over the length of its segments.
+        ends, nodes = scene.nodes[scene.slave], np.unique(scene.slave)
+        halves = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2, 2)
+        pressures = np.asarray(np.hypot(*forces[nodes].T) / np.bincount(scene.slave.reshape(-1), halves)[nodes])
+        return EngineAnswer(displacements, converged, iteration, "" if converged else "no end", forces, pressures)
 
 
 def _contact(scene: SceneArrays, positions: FloatArray) -> tuple[FloatArray, sparse.csr_array]:

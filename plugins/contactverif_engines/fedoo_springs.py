@@ -63,7 +63,8 @@ class Fedoo:
         """
         scene, contacts = plane.scene, []
         kind = "search_nearest" if self.search == "nearest" else self.search
-        for edges in _edges_of_bodies(scene):
+        bodies = scene.body_of_node[scene.slave[:, 0]]
+        for edges in (scene.slave[bodies == body] for body in np.unique(bodies)):
             slave = np.unique(edges)
             surface = fedoo.Mesh(plane.nodes.copy(), scene.master[:, ::-1].copy(), "lin2", name="")
             contact = fedoo.constraint.Contact(slave, surface, search_algorithm=kind, name="", space=space)
@@ -103,12 +104,6 @@ def _add_supports_and_loads(problem: Any, plane: PlaneScene) -> None:
             problem.bc.add("Dirichlet", supported, name, plane.imposed[supported, axis])
         if (loaded := np.flatnonzero(plane.load[:, axis])).size:
             problem.bc.add("Neumann", loaded, name, plane.load[loaded, axis])
-
-
-def _edges_of_bodies(scene: SceneArrays) -> list[IntArray]:
-    """Return the slave edges of each body."""
-    bodies = scene.body_of_node[scene.slave[:, 0]]
-    return [scene.slave[bodies == body] for body in np.unique(bodies)]
 
 
 def _lengths(scene: SceneArrays, edges: IntArray) -> FloatArray:

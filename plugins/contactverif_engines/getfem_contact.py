@@ -64,7 +64,7 @@ class GetFEM:
         except RuntimeError as error:  # The words of GetFEM, as those of a projection that did not converge
             return EngineAnswer(moves[: len(scene.nodes)].copy(), False, message=" ".join(str(error).split()))
         for side, name in zip(sides, ("u1", "u2"), strict=True):
-            side.read_moves(model.variable(name), moves)
+            moves[side.node_numbers] = np.asarray(model.variable(name))[side.unknowns[side.node_numbers]]
         converged = n_steps <= _STEPS
         message = "" if converged else "Newton's method finds no zero"
         return EngineAnswer(moves[: len(scene.nodes)].copy(), converged, n_steps, message)
@@ -164,10 +164,6 @@ class _Side:
         vector = np.zeros(self.field.nbdof())
         vector[self.unknowns[self.node_numbers]] = values[self.node_numbers]
         return vector
-
-    def read_moves(self, vector: Any, moves: FloatArray) -> None:
-        """Write the unknowns of this side into the displacements of nodes (n, 2)."""
-        moves[self.node_numbers] = np.asarray(vector)[self.unknowns[self.node_numbers]]
 
 
 def _augmentation(scene: SceneArrays) -> float:

@@ -150,16 +150,12 @@ class Kratos:
         }  # fmt: skip
 
 
-def _largest_force(scene: SceneArrays) -> float:
-    """Return the size of loads or reactions, whichever is larger."""
-    moved = float(np.abs(scene.imposed).max(initial=0.0)) * float(scene.young.max())
-    return max(float(np.abs(scene.load).sum()), moved)
-
-
 def _roundoff(scene: SceneArrays, kind: str) -> float:
     """Return the force that may be left as roundoff; the penalty of springs is 10⁴ E/h."""
     place = float(scene.young[~scene.rigid].max()) * float(np.abs(scene.nodes).max())
-    return _ROUNDOFF * _largest_force(scene) + _GAP_ROUNDOFF * place * (1e4 if kind == "penalty" else 1.0)
+    moved = float(np.abs(scene.imposed).max(initial=0.0)) * float(scene.young.max())
+    force = max(float(np.abs(scene.load).sum()), moved)  # The size of loads or reactions, whichever is larger.
+    return _ROUNDOFF * force + _GAP_ROUNDOFF * place * (1e4 if kind == "penalty" else 1.0)
 
 
 @contextmanager

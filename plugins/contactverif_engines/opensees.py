@@ -42,7 +42,10 @@ class OpenSees:
         _add_bodies(ops, plane)
         _add_supports_and_loads(ops, plane)
         self._add_contact(ops, plane)
-        tolerance = _CONVERGED * _size_of_displacements(scene) + _ROUNDED * float(np.abs(scene.nodes).max())
+        # The size of displacements is that of those imposed, of those that loads cause, or of the first guess.
+        loaded = float(np.abs(scene.load).sum()) / float(scene.young[~scene.rigid].max())
+        size = max(float(np.abs(scene.imposed).max()), float(np.abs(scene.start).max()), loaded)
+        tolerance = _CONVERGED * size + _ROUNDED * float(np.abs(scene.nodes).max())
         converged, n_steps = _run(ops, tolerance, _choose_handler(plane))
         count = range(1, len(scene.nodes) + 1)
         moves = np.array([[ops.nodeDisp(node, part) for part in (1, 2)] for node in count], np.float64)
@@ -52,19 +55,18 @@ class OpenSees:
     def _add_contact(self, ops: Any, plane: PlaneScene) -> None:
         """Add an element for each pair of a slave's and a master's chain of edges."""
         scene, number = plane.scene, len(plane.triangles) + len(plane.quads)
+
+        def mean_length(chain: list[int]) -> float:
+            return float(np.linalg.norm(np.diff(scene.nodes[chain], axis=0), axis=1).mean())
+
         for slave in find_chains(scene.slave):
             for master in find_chains(scene.master):
                 number += 1
-                first, second = (_mean_length(scene, chain) for chain in (slave, master))
+                first, second = mean_length(slave), mean_length(master)
                 stiffness = self.stiffness * float(scene.penalty) * first * second / (first + second)
                 counts = ("-sNdNum", len(slave), "-mNdNum", len(master))
                 nodes = (node + 1 for node in (*slave, *master))
                 ops.element("zeroLengthContactNTS2D", number, *counts, "-Nodes", *nodes, stiffness, 0.0, 0.0)
-
-
-def _mean_length(scene: SceneArrays, chain: list[int]) -> float:
-    """Return the mean length of the edges of a chain."""
-    return float(np.linalg.norm(np.diff(scene.nodes[chain], axis=0), axis=1).mean())
 
 
 def find_chains(edges: IntArray) -> list[list[int]]:
@@ -104,12 +106,6 @@ def _add_supports_and_loads(ops: Any, plane: PlaneScene) -> None:
         ops.sp(node + 1, part + 1, float(plane.imposed[node, part]))
     for node in np.flatnonzero(plane.load.any(axis=1)).tolist():
         ops.load(node + 1, *plane.load[node].tolist())
-
-
-def _size_of_displacements(scene: SceneArrays) -> float:
-    """Return the size of displacements: those imposed, those that loads cause, or the first guess."""
-    loaded = float(np.abs(scene.load).sum()) / float(scene.young[~scene.rigid].max())
-    return max(float(np.abs(scene.imposed).max()), float(np.abs(scene.start).max()), loaded)
 
 
 def _choose_handler(plane: PlaneScene) -> str:

@@ -94,19 +94,6 @@ def _arguments_of(shape: tuple[int, ...], n_props: int, n_decisions: int, *, pai
     return arguments
 
 
-def _view_words(addresses: dict[str, int], shape: tuple[int, ...], n_props: int) -> Array:
-    """Return a structure `cv_view` with these addresses as an array of integers; number and penalty are zero."""
-    view = _View(*shape, n_props, 0, 0.0, *(addresses[name] for name in _ARRAYS))
-    return np.frombuffer(bytes(view), np.int32)
-
-
-def _view_numbers(words: Array, labels: IntArray, penalty: float) -> None:
-    """Write labels (n,) and penalty into structures (n, n_words)."""
-    words[:, _View.number.offset // 4] = labels
-    start = _View.penalty.offset // 4
-    words[:, start : start + 2] = np.array([penalty]).view(np.int32)
-
-
 def _whole_interface(interface: Interface) -> list[Views]:
     arrays = {
         "slave": interface.slave.segments,
@@ -234,7 +221,8 @@ class _Functions:
         key = shape, n_props, n_decisions, pairs
         if key not in self.slots:
             slot = GuardedSlot(_arguments_of(shape, n_props, n_decisions, pairs=pairs), 2 * (shape[0] + shape[1]))
-            slot.preset({"view": _view_words(slot.addresses, shape, n_props)})
+            view = _View(*shape, n_props, 0, 0.0, *(slot.addresses[name] for name in _ARRAYS))
+            slot.preset({"view": np.frombuffer(bytes(view), np.int32)})  # `_rows` writes number and penalty.
             self.slots[key] = slot
         return self.slots[key]
 
@@ -296,7 +284,9 @@ class LibraryForces:
         for name, array in content.items():
             rows[name][...] = array.reshape(1 if array.ndim == 2 else n_elements, -1)
         rows.fill({"props": self.props})
-        _view_numbers(rows["view"], views.labels, self.penalty)
+        start = _View.penalty.offset // 4
+        rows["view"][:, _View.number.offset // 4] = views.labels
+        rows["view"][:, start : start + 2] = np.array([self.penalty]).view(np.int32)
         return rows
 
     def _decide(self, interface: Interface, views: Views, x: FloatArray) -> dict[int, IntArray]:
