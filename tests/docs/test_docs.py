@@ -127,6 +127,7 @@ PYTHON = {
     "how-to/verify-in-python.md": r"first failure: vts-me(?s:.*)force 0\.\d+, exact(?s:.*)fails as stated +pass",
     "how-to/write-a-property.md": r"",
     "how-to/write-a-problem.md": r"converged",
+    "how-to/stability.md": r"",
     "concepts/promises.md": r"",
     "tutorial/faces.md": "balance.force pass\nbalance.moment pass\npatch.flat.nodal pass\n"
     "patch.flat.normal fail\npatch.flat.transmission fail",
