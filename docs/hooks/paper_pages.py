@@ -29,9 +29,11 @@ def paper_page(root: Path) -> str:
         statements = tree["statements"].to_dataset().load()
         figures = tree["figures"].to_dataset()
         captions = dict(zip(map(str, figures["name"].values), map(str, figures["caption"].values), strict=True))
-    meanings = str(statements.agreement.attrs["flag_meanings"]).split()
-    verdicts = [meanings[int(code)].replace("_", " ") for code in statements.agreement.values]
-    counts = [(word.replace("_", " "), verdicts.count(word.replace("_", " "))) for word in meanings]
+    attributes = statements.agreement.attrs
+    words = [word.replace("_", " ") for word in str(attributes["flag_meanings"]).split()]
+    meanings = dict(zip(attributes["flag_values"].tolist(), words, strict=True))
+    verdicts = [meanings[int(code)] for code in statements.agreement.values]
+    counts = [(word, verdicts.count(word)) for word in words]
     conditions = statements.condition.values
     rows = []
     for number, verdict in enumerate(verdicts):
