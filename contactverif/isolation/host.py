@@ -83,9 +83,11 @@ class Host:
         self.n_started = 0
         self.code_files_there: list[Path] = []
         self.last_question = 0.0  # By the clock of `time.monotonic`.
+        self._loading: Question | None = None  # It is sent, and its answer was not waited for.
+        self._load_began = 0.0  # By the same clock.
 
-    def load(self) -> Reply:
-        """Start the process anew, load the formulation, and return what that gave."""
+    def begin_load(self) -> None:
+        """Start the process anew and let it load the formulation, until `load` waits for that."""
         self.end()
         if reason := self._reason_to_stop():
             raise PluginError(reason, "not asked")
@@ -94,7 +96,16 @@ class Host:
         self.n_started += 1
         for store in (self._shelf, self._queue, self._forgotten, self._known_verbs):
             store.clear()
-        question = self._put("import", Load(self._next_number(), self._name))
+        request = Load(self._next_number(), self._name)
+        self._loading, self._load_began = self._put("import", request), monotonic()
+        self._process.send_ahead(join([encode_one(request)]))
+
+    def load(self) -> Reply:
+        """Let the process load the formulation, after a new start unless it does so already; return what that gave."""
+        if self._loading is None:
+            self.begin_load()
+        question, self._loading = self._loading, None
+        assert question is not None
         self._flush_queue()
         return raise_failure(question.result, loading=True)
 
@@ -287,7 +298,7 @@ class Host:
         if verb not in self._known_verbs:
             limit = min(limit + self._first_seconds.get(verb, inf), self._limits.start_seconds)
         process.ask(join(frames), questions, limit)
-        seconds = monotonic() - start
+        seconds = monotonic() - (self._load_began if verb == "import" else start)
         if questions:
             self._is_quick = seconds <= max(_QUICK, _QUICK_EACH * len(questions)) * self._limits.seconds
             self._known_verbs.add(verb)
@@ -305,6 +316,7 @@ class Host:
             self._process.end()
             self.read_last_words()
             self._process = None
+        self._loading = None
 
 
 def _answer_all(questions: Sequence[Question], error: PluginError) -> None:

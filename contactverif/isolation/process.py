@@ -110,6 +110,13 @@ class PluginProcess:
         finally:
             self.output.start()
         self._core = -1
+        self._sent_ahead = b""
+
+    def send_ahead(self, frame: bytes) -> None:
+        """Send encoded requests that `ask` will wait for as soon as it is called with them."""
+        with suppress(ClosedError, TooLateError):  # `ask` finds out why.
+            self._child.channel.send(frame, self._limits.start_seconds)
+            self._sent_ahead = frame
 
     def ask(self, frame: bytes, questions: Sequence[Question], seconds: float | None = None) -> None:
         """Send encoded requests, and give each question its reply, of a known kind with nothing else checked.
@@ -140,10 +147,12 @@ class PluginProcess:
 
     def _exchange(self, frame: bytes, questions: Sequence[Question], seconds: float) -> Sequence[Reply]:
         """Send requests, and return the replies."""
-        try:
-            self._child.channel.send(frame, self._limits.start_seconds)
-        except TooLateError:
-            raise TooLateError("its process does not listen") from None
+        if frame != self._sent_ahead:
+            try:
+                self._child.channel.send(frame, self._limits.start_seconds)
+            except TooLateError:
+                raise TooLateError("its process does not listen") from None
+        self._sent_ahead = b""
         if not questions:
             return []
         data = self._receive(seconds, sum(question.largest for question in questions))

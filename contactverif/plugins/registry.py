@@ -37,6 +37,7 @@ from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import Subject
 from contactverif.isolation.box import kernel_folder
+from contactverif.isolation.host import host_of
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote import (
     Wrapper,
@@ -215,13 +216,28 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
     if limits is None:
         make = _load_factory(text)
         return make if isinstance(make, NotLoaded) else subject_of(text, make)
+    return load_remote(_worker(), text, _with_store(limits, text))
+
+
+def start_loading(text: str, limits: Limits) -> None:
+    """Let the process of a formulation load it, while this one does other things; what fails, fails when it is loaded.
+
+    Engines are not begun.
+    """
+    if not text.startswith(ENGINE):
+        with suppress(ContractError):
+            host_of(_worker(), text, _with_store(limits, text)).begin_load()
+
+
+def _with_store(limits: Limits, text: str) -> Limits:
+    """Return the limits of a formulation's process, with a store of its kernels in the box, if there is one."""
     installed = entries_by_name(FORMULATIONS)
     modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
     _compile_once(frozenset(module.partition(".")[0] for module in modules))
     if limits.box is not None:  # It keeps compiled kernels, those of all formulations of the same modules.
         store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share a package's name.
-        limits = replace(limits, box=replace(limits.box, store=store))
-    return load_remote(_worker(), text, limits)
+        return replace(limits, box=replace(limits.box, store=store))
+    return limits
 
 
 @cache

@@ -33,7 +33,7 @@ from contactverif.contract.subject import Subject
 from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote import code_files, note_code_files
-from contactverif.plugins.registry import installed_properties, load_property, load_subject
+from contactverif.plugins.registry import installed_properties, load_property, load_subject, start_loading
 
 Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
 _SILENCE = 5.0  # Seconds after which the last step is reported once more, to show that the run goes on.
@@ -169,10 +169,12 @@ def begin_loading(names: Sequence[str], limits: Limits | None, executor: Executo
     """Begin to load formulations and engines, named as on the command line, in the workers of an executor.
 
     Return a function for each name that waits for what is loaded and returns it, or raises a MisuseError as
-    `load_subject` does. Without an executor or limits this process loads all.
+    `load_subject` does. Without an executor this process loads all: within limits, the first begins to load at once.
     """
     here: list[Loader] = [partial(load_subject, name, limits) for name in names]
     if executor is None or limits is None:
+        if limits is not None:
+            start_loading(names[0], limits)
         return here
     futures = [_submit(executor, _load, name, limits) for name in names]
     n_workers = int(getattr(executor, "_max_workers", 0))
