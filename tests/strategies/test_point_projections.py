@@ -153,7 +153,7 @@ def test_only_what_exceeds_roundoff_is_a_mistake() -> None:
     assert not high.find_mistake(0, xi=0.5, side=1, distance=sqrt(high.squared_distance))
 
 
-@pytest.mark.parametrize("kinds", [[], ["insid"]])
+@pytest.mark.parametrize("kinds", [[], ["outer"]])
 def test_kinds_that_do_not_exist_are_refused(kinds: list[str]) -> None:
     with pytest.raises(MisuseError, match=r"kinds: found .*; needed some of inside, free-end"):
         projections(kinds=kinds)
