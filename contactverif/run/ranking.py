@@ -28,8 +28,8 @@ def first_failure(rows: Iterable[Row]) -> Row | None:
     Who promises nothing breaks no promise; then it is a patch test that fails.
     """
     rows = list(rows)
-    news = by_rank(row for row in rows if row.result is Result.FAIL and row.info.family == PATCH)
-    return next(iter([*wrong_rows(rows), *news]), None)
+    first = wrong_rows(rows) or by_rank(row for row in rows if row.result is Result.FAIL and row.info.family == PATCH)
+    return first[0] if first else None
 
 
 def by_rank(rows: Iterable[Row]) -> list[Row]:
@@ -39,6 +39,8 @@ def by_rank(rows: Iterable[Row]) -> list[Row]:
     rest. Where a flat patch has wrong forces, two answers that differ are shown behind it.
     """
     rows = list(rows)
+    if len(rows) < 2:  # To read the ranks imports the families of properties.
+        return rows
     properties = _load_installed({row.property_id for row in rows})
     exact = [
         question.rank
