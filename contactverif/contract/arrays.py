@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from copy import copy
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from contactverif.contract.errors import MisuseError
 
@@ -58,9 +57,18 @@ def _is_frozen(array: NDArray[Any]) -> bool:
     return type(base) is bytes and type(array) is np.ndarray and array.flags.c_contiguous
 
 
+@cache
+def sparse_of_scipy() -> Any:
+    """Return the module `scipy.sparse`, imported when a tangent is first asked for, since that takes long."""
+    from scipy import sparse
+
+    return sparse
+
+
 def dense(matrix: Any) -> FloatArray:
     """Return a matrix, given as an array or as a sparse matrix or array of scipy, as an array of the same shape."""
-    return matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
+    is_sparse = not isinstance(matrix, np.ndarray) and sparse_of_scipy().issparse(matrix)
+    return matrix.toarray() if is_sparse else np.asarray(matrix)
 
 
 def compressed_matrix(kind: str, size: int, data: FloatArray, indices: Array, indptr: Array) -> Any:
@@ -75,7 +83,7 @@ def compressed_matrix(kind: str, size: int, data: FloatArray, indices: Array, in
 
 @lru_cache(maxsize=64)  # Each holds a number for each row, which counts where there are millions.
 def _empty_matrix(kind: str, size: int) -> Any:
-    return sparse.csr_array((size, size)) if kind == "csr" else sparse.csc_array((size, size))
+    return getattr(sparse_of_scipy(), f"{kind}_array")((size, size))
 
 
 def as_array(argument: str, values: ArrayLike) -> NDArray[Any]:

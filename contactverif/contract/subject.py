@@ -16,9 +16,8 @@ from difflib import get_close_matches
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, dense, freeze
+from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, dense, freeze, sparse_of_scipy
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
 from contactverif.contract.foreign_text import describe_error, name_line, one_line, place_of_error
@@ -32,7 +31,7 @@ FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time,
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
-_COMPRESSED = {"csr": sparse.csr_array, "csc": sparse.csc_array}
+_COMPRESSED = ("csr", "csc")
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 
 
@@ -406,7 +405,7 @@ def _check_forces(verb: str, forces: Any, z: Array) -> Array:
 
 def _check_matrix(verb: str, tangent: Any, size: int) -> None:
     """Check that a tangent is a matrix (size, size) of floats, dense or sparse."""
-    if not (isinstance(tangent, np.ndarray) or sparse.issparse(tangent)):
+    if not (isinstance(tangent, np.ndarray) or sparse_of_scipy().issparse(tangent)):
         raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
     if tangent.shape != (size, size):
         raise ContractError(f"{verb}: returned shape {tangent.shape}; needed {(size, size)}")
@@ -425,7 +424,7 @@ def copy_entries(verb: str, tangent: Any) -> Any:
             return _copy_compressed(tangent)
         if tangent.format == "bsr":
             tangent.check_format(full_check=True)
-        return sparse.coo_array(tangent, copy=True)  # It checks the numbers of entries in the other formats.
+        return sparse_of_scipy().coo_array(tangent, copy=True)  # It checks the numbers of entries in the other formats.
     except (IndexError, TypeError, ValueError) as error:
         raise ContractError(f"{verb}: returned a broken {tangent.format} matrix: {error}") from error
 
@@ -438,7 +437,7 @@ def _copy_compressed(tangent: Any) -> Any:
     if is_usual and len(indptr) == size + 1 and indptr[0] == 0 and indptr[-1] == len(indices) == len(data):
         matrix = compressed_matrix(kind, size, data, indices, indptr)
     else:  # scipy makes what is usual of these arrays, or says what does not fit.
-        matrix = _COMPRESSED[kind]((data, indices, indptr), shape=tangent.shape)
+        matrix = getattr(sparse_of_scipy(), f"{kind}_array")((data, indices, indptr), shape=tangent.shape)
     if (matrix.indptr[1:] < matrix.indptr[:-1]).any():  # A difference might overflow.
         raise ValueError("indptr must be a non-decreasing sequence")
     if not 0 <= matrix.indices.min(initial=0) <= matrix.indices.max(initial=0) < size:

@@ -22,9 +22,8 @@ from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
-from scipy import sparse
 
-from contactverif.contract.arrays import Array, FloatArray, compressed_matrix
+from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, sparse_of_scipy
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
 from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError, MisuseError, PluginError
@@ -386,7 +385,7 @@ def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
         return compressed_matrix(kind, size, *parts)
     data, row, col = (_pick(arrays, verb, name) for name in ("data", "row", "col"))
     try:
-        return sparse.coo_array((data, (row, col)), shape=(size, size))
+        return sparse_of_scipy().coo_array((data, (row, col)), shape=(size, size))
     except (ValueError, TypeError, IndexError) as error:
         raise ContractError(f"{verb}: returned a broken coo matrix: {error}") from None
 

@@ -301,7 +301,8 @@ def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
     next one would find, the process ends, too. Nothing ends the wait but the judge, if the reply is late.
     """
     hide_memory(hidden=True)
-    import_module("contactverif.geometry.projection")  # What most plugins import is imported once.
+    for name in ("contactverif.geometry.projection", "scipy.sparse"):
+        import_module(name)  # What most plugins import is imported once.
     _end_what_is_left()
     before = _state()
     copy = Child.fork(partial(_send_description, describe, question), _LARGEST_SURVEY)

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
-from scipy import sparse
+import scipy
 
 from contactverif.compiler import match_precision
 from contactverif.contract.arrays import Array, FloatArray
@@ -105,7 +105,7 @@ class PatchTestPassing:
         forces, rows = vts_ppt_force.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> scipy.sparse.csr_array:
         """Compute the derivative of the residual; that of Eq. 6 alone where the preset is not consistent."""
         if not self.consistent:
             pairing = Pairing({**pairing, "first": pairing["master"], "last": pairing["master"]})
@@ -113,13 +113,15 @@ class PatchTestPassing:
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
-    ) -> tuple[FloatArray, sparse.csr_array]:
+    ) -> tuple[FloatArray, scipy.sparse.csr_array]:
         """Compute residual and tangent in one sweep, or one after the other where the preset is not consistent."""
         if not self.consistent:
             return self.residual(interface, pairing, z), self.tangent(interface, pairing, z)
         return self._sweep(interface, pairing, z)
 
-    def _sweep(self, interface: Interface, pairing: Pairing, z: FloatArray) -> tuple[FloatArray, sparse.csr_array]:
+    def _sweep(
+        self, interface: Interface, pairing: Pairing, z: FloatArray
+    ) -> tuple[FloatArray, scipy.sparse.csr_array]:
         state, arguments = split_state(interface, z), self._arguments(interface, pairing, z)
         n_nodes, n_multipliers = interface.n_nodes, len(state[1])
         group, first_multiplier = (1, n_nodes) if n_multipliers else (self.n, NO_NODE)

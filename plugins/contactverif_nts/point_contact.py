@@ -34,8 +34,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from contactverif.compiler import TAKES_LONGDOUBLE, match_precision
 from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
@@ -149,7 +149,7 @@ class PointContact:
         forces, rows = nts_force.residual(x, multipliers, *self._arguments(interface, pairing, z))
         return join_rows(forces, rows, z)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> scipy.sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
         x, multipliers = split_state(interface, z)
         surfaces, points, options = self._arguments(interface, pairing, z)

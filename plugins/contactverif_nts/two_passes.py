@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from scipy import sparse
+import scipy
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints
@@ -78,13 +78,13 @@ class TwoPass:
             arrays.update({each.name + name: array for name, array in pairing.items()})
         return Pairing(arrays)
 
-    def _tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> sparse.coo_array:
+    def _tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> scipy.sparse.coo_array:
         parts = []
         for each in self._passes(interface):
-            part = sparse.coo_array(self._inner.tangent(each.interface, each.part(pairing), z[each.places]))
+            part = scipy.sparse.coo_array(self._inner.tangent(each.interface, each.part(pairing), z[each.places]))
             parts.append((part.data, each.places[part.row], each.places[part.col]))
         values, rows, columns = (np.concatenate(both) for both in zip(*parts, strict=True))
-        return sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
+        return scipy.sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def _contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> ContactPoints:
         """Return the points of both passes, each with the gap, area and pressure of its own pass.
