@@ -52,6 +52,7 @@ class FailureMemory:
                 path = self._path(row.formulation, row.property_id)
                 if row.result is Result.FAILS_AS_STATED or row.verdict in _SETTLED:
                     path.unlink(missing_ok=True)
+                    continue
                 remembered = row.promise is not False and row.witness is not None  # Its case fails again.
                 example = counterexample_of(row) if row.verdict in _FAILED and not remembered else None
                 if example is not None:

@@ -150,8 +150,8 @@ def test_the_last_guard_escapes_what_came_another_way(
     table.add_row(text)
     console.show(table)
     console.show(text)
-    console.show_as_it_is(console.Text(text))
-    console.say(text)
+    console.show_verbatim(console.Text(text))
+    console.echo(text)
     assert not hidden_characters(capsys.readouterr().out)
 
 

@@ -53,7 +53,7 @@ def test_a_wrong_stiffness_breaks_a_promise_that_everybody_makes(ask: Ask) -> No
     answer = ask("verify", "three_times", *OPTIONS)
     assert answer.status == 1
     assert "your springs are 3.00 ε̂ L: one pass has 1 ε̂ L, two passes have 2 ε̂ L" in answer.out
-    assert answer.out.endswith("1 broken promise: three_times scale.\n")
+    assert answer.out.endswith("1 broken promise: three_times total-stiffness.\n")
     assert "Properties promised" not in answer.out
 
 
