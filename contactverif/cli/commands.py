@@ -286,7 +286,7 @@ def report(
       contactverif report vts-ppt.nc
       contactverif report vts-ppt.nc --out vts-ppt.html --out vts-ppt.xml
     """
-    from contactverif.cli.reports import report
+    from contactverif.cli.report import report
 
     report(path, out or (), screen)
 
@@ -325,7 +325,7 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --out case.svg
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
-    from contactverif.cli.reports import replay
+    from contactverif.cli.replay import replay
 
     return replay(report, case, formulation, engine, out or (), options)
 
@@ -355,7 +355,7 @@ def audit(
       contactverif audit vts-ppt.nc
       contactverif audit vts-ppt.nc --share 0.1
     """
-    from contactverif.cli.reports import audit
+    from contactverif.cli.replay import audit
 
     return audit(report, share, options)
 

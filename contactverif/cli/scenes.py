@@ -14,7 +14,7 @@ from rich.text import Text
 from contactverif.api.drawing import draw_outcome
 from contactverif.cli.console import echo, print_plugin_output, show
 from contactverif.cli.options import PICTURES, SOLVED_SCENE, OutputFiles
-from contactverif.cli.reports import announce_stored, check_surfaces
+from contactverif.cli.replay import announce_stored, check_surfaces
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError

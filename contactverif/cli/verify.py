@@ -104,7 +104,7 @@ def merge(folder: Path, out: tuple[Path, ...], shrink: Shrink | None, audited: f
 
     What fails is shrunk here.
     """
-    from contactverif.cli.reports import audit, check_share
+    from contactverif.cli.replay import audit, check_share
 
     check_share(1.0 if audited is None else audited)
     plan, journals = read_shards(folder, "FOLDER")

@@ -58,6 +58,9 @@ class Verdict(IntEnum):
 Measure = Callable[[Case, Subject], Measurement]
 
 
+Role = Literal["", "foundation", "exact", "comparison"]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PropertyInfo:
     """The description of a property for a reader of results: plain data, which a report stores.
@@ -86,6 +89,12 @@ class PropertyInfo:
     usual_undecided : float
         The share of undecided cases of right formulations, 0 to 1, as it was measured. A formulation with more than
         twice that, and more than chance allows, is reported: what is undecided may hide what is wrong.
+    rank : float
+        The place of a failure among others, the lowest first: few other properties catch what such a property catches.
+        One of another author has −1 and is shown before ours, since it was installed for a purpose.
+    role : str
+        "foundation" if a failure says that no other answer can be relied on; "exact" for an exact answer, behind which
+        failures of "comparison" are shown: two answers that differ do not say which is right.
 
     Raises
     ------
@@ -102,6 +111,8 @@ class PropertyInfo:
     kinds: tuple[str, ...] = field(default=(), kw_only=True)
     least_contact: float = field(default=LEAST_CONTACT, kw_only=True)
     usual_undecided: float = field(default=NONE_UNDECIDED, kw_only=True)
+    rank: float = field(default=-1.0, kw_only=True)
+    role: Role = field(default="", kw_only=True)
 
     def __post_init__(self) -> None:
         refuse("property", self.id, self.family, *self.kinds, *self.series, *self.series.values())
@@ -127,7 +138,7 @@ class OtherAttributes(TypedDict, total=False):
     exact: Callable[[Case], FloatArray] | None
     cases_in_space: Cases | None
     rank: float
-    role: Literal["", "foundation", "exact", "comparison"]
+    role: Role
     turn: int
 
 
@@ -163,12 +174,6 @@ class Property(PropertyInfo):
     exact : Callable[[Case], FloatArray] | None
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
-    rank : float
-        The place of a failure among others, the lowest first: few other properties catch what such a property catches.
-        One of another author has −1 and is shown before ours, since it was installed for a purpose.
-    role : str
-        "foundation" if a failure says that no other answer can be relied on; "exact" for an exact answer, behind which
-        failures of "comparison" are shown: two answers that differ do not say which is right.
     turn : int
         The turn among the properties that are asked first, from 0 on: cheap ones, of which one fails for most mistakes.
     question : str
@@ -186,8 +191,6 @@ class Property(PropertyInfo):
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""
     cases_in_space: Cases | None = None
-    rank: float = -1
-    role: Literal["", "foundation", "exact", "comparison"] = ""
     turn: int = LAST_TURN
 
     @classmethod

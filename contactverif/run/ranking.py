@@ -6,12 +6,11 @@ integrate along arcs, stand behind the others, because a reader can follow a few
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable
 from functools import partial
 
-from contactverif.contract.property import Property, Verdict
+from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, Row
-from contactverif.plugins.registry import installed_properties, load_property
 
 PATCH = "patch"  # The family of the patch tests.
 _LEAST_STEP = 1e-4  # A rank times this is less than the least difference of two ranks, which is 1.
@@ -39,27 +38,13 @@ def by_rank(rows: Iterable[Row]) -> list[Row]:
     rest. Where a flat patch has wrong forces, two answers that differ are shown behind it.
     """
     rows = list(rows)
-    if len(rows) < 2:  # To read the ranks imports the families of properties.
-        return rows
-    properties = _load_installed({row.property_id for row in rows})
-    exact = [
-        question.rank
-        for row in rows
-        if (question := properties.get(row.property_id)) and question.role == "exact" and row.verdict is Verdict.FAIL
-    ]
-    return sorted(rows, key=partial(_key, properties, behind=min(exact, default=-1)))
+    exact = [row.info.rank for row in rows if row.info.role == "exact" and row.verdict is Verdict.FAIL]
+    return sorted(rows, key=partial(_key, behind=min(exact, default=-1)))
 
 
-def _key(properties: Mapping[str, Property], row: Row, behind: float) -> tuple[bool, bool, bool, bool, float]:
-    question, failed = properties.get(row.property_id), row.verdict in (Verdict.FAIL, Verdict.CRASHED)
-    rank, role = (question.rank, question.role) if question is not None else (-1, "")
-    if role == "comparison" and rank < behind:
+def _key(row: Row, behind: float) -> tuple[bool, bool, bool, bool, float]:
+    rank, failed = row.info.rank, row.verdict in (Verdict.FAIL, Verdict.CRASHED)
+    if row.info.role == "comparison" and rank < behind:
         rank = behind + _LEAST_STEP * rank
-    return row.verdict is not Verdict.CRASHED, not row.breach, not (failed and role == "foundation"), not failed, rank
-
-
-def _load_installed(ids: Collection[str]) -> dict[str, Property]:
-    """Return the properties of some ids that load: rows that were read from a report hold the plain data alone."""
-    installed = installed_properties(engines=True)
-    loaded = (load_property(property_id, installed) for property_id in ids if property_id in installed)
-    return {question.id: question for question in loaded if isinstance(question, Property)}
+    foundation = failed and row.info.role == "foundation"
+    return row.verdict is not Verdict.CRASHED, not row.breach, not foundation, not failed, rank

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from asking import Ask
 
-from contactverif.cli.reports import announce_stored
+from contactverif.cli.replay import announce_stored
 from contactverif.contract.errors import MisuseError
 from contactverif.plugins.registry import the_property
 

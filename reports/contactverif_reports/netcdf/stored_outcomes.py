@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.columns import Axes, Group, StoredColumns, Variable, to_variables, words
 from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.contract.property import Outcome, Outcomes, PropertyInfo, Verdict
+from contactverif.contract.property import Outcome, Outcomes, PropertyInfo, Role, Verdict
 
 Table = dict[str, Variable]
 
@@ -193,6 +193,9 @@ def read_info(group: Group) -> PropertyInfo:
     strangers = set(group.words("sense")) - {"at most", "at least"}
     if strangers:
         raise ValueError(f"the sense of a quantity is {strangers.pop()!r}")
+    roles = [role for role in get_args(Role) if (role or schema.NONE) == str(group.attrs["role"])]
+    if not roles:
+        raise ValueError(f"the role of a property is {group.attrs['role']!r}")
     return PropertyInfo(
         str(group.attrs["property_id"]),
         str(group.attrs["family"]),
@@ -203,4 +206,6 @@ def read_info(group: Group) -> PropertyInfo:
         kinds=tuple(group.labels("kind")[: int(group["kind"].attrs["n_declared"])]) if "kind" in group else (),
         least_contact=float(group.attrs["least_contact"]),
         usual_undecided=float(group.attrs["usual_undecided"]),
+        rank=float(group.attrs["rank"]),
+        role=roles[0],
     )

@@ -239,6 +239,8 @@ def _property_group(info: PropertyInfo, rows: Mapping[str, Row | None]) -> Group
         "needs": ", ".join(sorted(info.needs)) or schema.NONE,
         "least_contact": np.float64(info.least_contact),
         "usual_undecided": np.float64(info.usual_undecided),
+        "rank": np.float64(info.rank),
+        "role": info.role or schema.NONE,
         "comment": "one property: every random case of every formulation; names that begin with witness_ are of the "
         "named case with which a formulation proves that it fails, or of a case that failed in an earlier run",
     }

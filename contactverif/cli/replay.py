@@ -1,4 +1,4 @@
-"""The work of `report`, `replay` and `audit`: a stored report is shown, one case of it or all of it is judged again."""
+"""The work of `replay` and `audit`: one case of a stored report, or all of it, is judged again."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from contactverif.api.drawing import draw_outcome
-from contactverif.api.run_files import REPORT, RUN_FILES, write_run
 from contactverif.cli.console import echo, print_plugin_output, show
-from contactverif.cli.options import PICTURES, SOLVED_SCENE, OutputFiles, Screen, read_place, with_engines
-from contactverif.cli.run_screen import ending_lines, show_run
-from contactverif.cli.run_tables import summary
+from contactverif.cli.options import PICTURES, SOLVED_SCENE, OutputFiles, read_place, with_engines
+from contactverif.cli.run_screen import ending_lines
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE
@@ -31,20 +29,6 @@ from contactverif_reports.plot.text import as_text
 from contactverif_reports.tables import Column, Table
 
 _MOST_LINES = 20  # The most differences that are listed.
-
-
-def report(path: Path, out: Sequence[Path], screen: Screen) -> None:
-    """Show a report, or write it as other files."""
-    files = OutputFiles.check(out, [suffix for suffix in RUN_FILES if suffix != REPORT])
-    run = read_run(path)
-    if not files.paths:
-        if not screen.quiet:
-            show_run(run, screen, path)
-        show(summary(run, quiet=screen.quiet))
-        return
-    for target in files.paths.values():
-        write_run(run, target, path)
-    files.announce()
 
 
 def replay(
