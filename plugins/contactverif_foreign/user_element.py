@@ -80,16 +80,19 @@ class Routine:
         key = n_nodes, n_properties
         if key not in self.slots:
             numbers = n_nodes, n_properties, self.state_variables
-            its, shapes = self.convention, self.convention.shapes(*numbers)
+            convention, shapes = self.convention, self.convention.shapes(*numbers)
             arguments = [
                 Argument(
-                    name, shapes.get(name, ()), "integer" if name in its.integers else "real", name not in its.outputs
+                    name,
+                    shapes.get(name, ()),
+                    "integer" if name in convention.integers else "real",
+                    name not in convention.outputs,
                 )
-                for name in its.order
+                for name in convention.order
             ]
             slot = GuardedSlot(arguments, 2 * n_nodes)
-            slot.preset(its.constants(*numbers))
-            values = [ctypes.c_void_p(slot.addresses[name]) for name in its.order]
+            slot.preset(convention.constants(*numbers))
+            values = [ctypes.c_void_p(slot.addresses[name]) for name in convention.order]
             self.slots[key] = slot, values
         return self.slots[key]
 
