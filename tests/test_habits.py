@@ -66,6 +66,14 @@ def test_workflows_run_environments_that_tox_has() -> None:
     assert {"lint", "type", "py311", "external"} <= {entry["environment"] for entry in entries}
 
 
+def test_the_files_that_tox_names_are_there() -> None:
+    names = re.findall(
+        r"\b(?:tests|evidence)/[\w/.-]+\.(?:py|txt|toml)", (ROOT / "tox.ini").read_text(encoding="utf-8")
+    )
+    assert len(names) > 10
+    assert not [name for name in names if not (ROOT / name).is_file()]
+
+
 def test_pre_commit_runs_the_tools_of_the_lint_environment() -> None:
     hooks = {hook["id"] for repo in read_yaml(ROOT / ".pre-commit-config.yaml")["repos"] for hook in repo["hooks"]}
     assert {"ruff", "ruff-format", "end-of-file-fixer", "codespell", "numpydoc-validation"} <= hooks
