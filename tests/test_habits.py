@@ -66,6 +66,11 @@ def test_workflows_run_environments_that_tox_has() -> None:
     assert {"lint", "type", "py311", "external"} <= {entry["environment"] for entry in entries}
 
 
+def test_no_two_files_of_tests_have_one_name() -> None:
+    names = sorted(path.name for path in (ROOT / "tests").rglob("test_*.py") if "external" not in path.parts)
+    assert names == sorted({*names}), "pytest imports a file of tests by its name alone"
+
+
 def test_the_files_that_tox_names_are_there() -> None:
     names = re.findall(
         r"\b(?:tests|evidence)/[\w/.-]+\.(?:py|txt|toml)", (ROOT / "tox.ini").read_text(encoding="utf-8")

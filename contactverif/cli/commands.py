@@ -286,7 +286,7 @@ def report(
       contactverif report vts-ppt.nc
       contactverif report vts-ppt.nc --out vts-ppt.html --out vts-ppt.xml
     """
-    from contactverif.cli.report import report
+    from contactverif.cli.stored_report import report
 
     report(path, out or (), screen)
 
