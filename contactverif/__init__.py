@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # A name that is imported as itself is one that the package e
     from contactverif.autodiff import from_residual as from_residual
     from contactverif.contract.body import Body as Body
     from contactverif.contract.case import Case as Case
-    from contactverif.contract.cases import Cases as Cases
+    from contactverif.contract.case import Cases as Cases
     from contactverif.contract.engine import Engine as Engine
     from contactverif.contract.engine import EngineAnswer as EngineAnswer
     from contactverif.contract.engine import EngineTraits as EngineTraits
@@ -30,6 +30,8 @@ if TYPE_CHECKING:  # A name that is imported as itself is one that the package e
     from contactverif.contract.errors import MisuseError as MisuseError
     from contactverif.contract.formulation import ContactPoints as ContactPoints
     from contactverif.contract.formulation import Formulation as Formulation
+    from contactverif.contract.formulation import Handle as Handle
+    from contactverif.contract.formulation import Pairing as Pairing
     from contactverif.contract.formulation import ResidualOnly as ResidualOnly
     from contactverif.contract.formulation import evaluate_both as evaluate_both
     from contactverif.contract.interface import Interface as Interface
@@ -37,8 +39,6 @@ if TYPE_CHECKING:  # A name that is imported as itself is one that the package e
     from contactverif.contract.measurement import Finding as Finding
     from contactverif.contract.measurement import Measurement as Measurement
     from contactverif.contract.measurement import Quantity as Quantity
-    from contactverif.contract.pairing import Handle as Handle
-    from contactverif.contract.pairing import Pairing as Pairing
     from contactverif.contract.property import Outcome as Outcome
     from contactverif.contract.property import Property as Property
     from contactverif.contract.property import Verdict as Verdict
@@ -79,14 +79,12 @@ _HOMES = {
     "api.verification": ("verify",),
     "autodiff": ("from_energy", "from_residual"),
     "contract.body": ("Body",),
-    "contract.case": ("Case",),
-    "contract.cases": ("Cases",),
+    "contract.case": ("Case", "Cases"),
     "contract.engine": ("Engine", "EngineAnswer", "EngineTraits", "SceneArrays"),
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
-    "contract.formulation": ("ContactPoints", "Formulation", "ResidualOnly", "evaluate_both"),
+    "contract.formulation": ("ContactPoints", "Formulation", "Handle", "Pairing", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
     "contract.measurement": ("Finding", "Measurement", "Quantity"),
-    "contract.pairing": ("Handle", "Pairing"),
     "contract.property": ("Outcome", "Property", "Verdict"),
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),

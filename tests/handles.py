@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import contactverif_nts
-from contactverif.contract.pairing import Handle
+from contactverif.contract.formulation import Handle
 
 
 class Handled:

@@ -19,8 +19,8 @@ from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Abilities, Traits
 
 Element = Callable[..., Any]  # A function (x, reference, decisions, penalty) of one element.

@@ -19,9 +19,7 @@ from pathlib import Path
 
 import typer
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import one_line
-from contactverif.contract.names import parse_name
+from contactverif.contract.errors import MisuseError, one_line, parse_name
 from contactverif.contract.result import OPPOSITE_SIGN, Run
 from contactverif.plugins.registry import FORMULATIONS
 

@@ -14,8 +14,7 @@ import typer
 
 from contactverif.cli import commands
 from contactverif.cli.options import spell_out
-from contactverif.contract.errors import ContactverifError, MisuseError
-from contactverif.contract.foreign_text import name_line, one_line
+from contactverif.contract.errors import ContactverifError, MisuseError, name_line, one_line
 from contactverif.isolation.confine import ONE_THREAD
 
 app = typer.Typer(

@@ -20,7 +20,7 @@ from rich.segment import Segment, Segments
 from rich.table import Table
 from rich.text import Text
 
-from contactverif.contract.foreign_text import printable
+from contactverif.contract.errors import printable
 from contactverif.contract.result import Result
 from contactverif.isolation.host import end_all
 from contactverif_reports.tables import PLAIN_STYLE, STYLES

@@ -13,8 +13,7 @@ from rich.text import Text
 
 from contactverif.cli.console import echo, show, show_verbatim
 from contactverif.contract.counterexample import Counterexample, counterexamples, find_counterexample
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import unknown_name_error
+from contactverif.contract.errors import MisuseError, unknown_name_error
 from contactverif.contract.result import Run
 from contactverif.explanations.case_numbers import case_text
 from contactverif.explanations.property_text import property_text, stated_failures

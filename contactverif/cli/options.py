@@ -171,7 +171,7 @@ def _known_failures(texts: Sequence[str]) -> dict[str, str]:
 
 def with_engines(names: Sequence[str], engines: Sequence[str]) -> tuple[str, ...]:
     """Return the names of formulations, and those of engines as they stand beside them."""
-    from contactverif.contract.engine_subject import ENGINE
+    from contactverif.contract.subject import ENGINE
 
     return (*names, *(f"{ENGINE}{name.removeprefix(ENGINE)}" for name in engines))
 

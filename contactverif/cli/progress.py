@@ -21,7 +21,7 @@ from rich.table import Column
 from rich.text import Text
 
 from contactverif.cli.console import QuietConsole
-from contactverif.contract.foreign_text import one_line
+from contactverif.contract.errors import one_line
 from contactverif.contract.result import Row
 from contactverif.run import scheduler
 from contactverif.run.judge import SLOW_CALL

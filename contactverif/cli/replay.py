@@ -11,9 +11,8 @@ from contactverif.cli.console import echo, print_plugin_output, show
 from contactverif.cli.options import PICTURES, SOLVED_SCENE, OutputFiles, read_place, with_engines
 from contactverif.cli.run_screen import ending_lines
 from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
+from contactverif.contract.errors import MisuseError, parse_name
 from contactverif.contract.interface import PLANE
-from contactverif.contract.names import parse_name
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif.plugins.registry import formulation_names, the_property, the_subject

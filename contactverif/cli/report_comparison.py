@@ -14,8 +14,7 @@ from contactverif.cli.comparison_tables import MOST_MESHES
 from contactverif.cli.console import indent_below, show, show_verbatim
 from contactverif.cli.options import OutputFiles
 from contactverif.contract.counterexample import Counterexample, counterexamples
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import unknown_name_error
+from contactverif.contract.errors import MisuseError, unknown_name_error
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif_reports.comparisons import RowNumbers

@@ -26,8 +26,7 @@ from contactverif.cli.run_screen import RunScreen, how_to_keep, show_run
 from contactverif.cli.run_tables import summary
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import case_id, failing_examples
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import name_line, one_line
+from contactverif.contract.errors import MisuseError, name_line, one_line
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Run

@@ -12,7 +12,7 @@ from math import isfinite
 from typing import Literal
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.foreign_text import clean, refuse
+from contactverif.contract.errors import clean, refuse
 
 
 @dataclass(frozen=True, slots=True)

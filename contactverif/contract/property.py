@@ -17,15 +17,12 @@ from sys import modules
 from typing import Annotated, Any, Literal, TypedDict, Unpack, overload
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case, CaseSummary
-from contactverif.contract.cases import Cases
-from contactverif.contract.engine_subject import SOLVE, EngineSubject
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.faces import TRIANGLE
-from contactverif.contract.foreign_text import clean, refuse
+from contactverif.contract.case import Case, Cases, CaseSummary
+from contactverif.contract.errors import MisuseError, clean, refuse
+from contactverif.contract.interface import TRIANGLE
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
 from contactverif.contract.records import StoredAs
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 
 LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says little.

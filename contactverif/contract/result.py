@@ -17,7 +17,7 @@ from math import exp, lgamma, log, log1p
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, freeze
-from contactverif.contract.foreign_text import LONGEST_FACT, clean, name_line, one_line
+from contactverif.contract.errors import LONGEST_FACT, clean, name_line, one_line
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import CLOSED_CHAIN, Outcome, PropertyInfo, Verdict, checked_numbers
 

@@ -13,18 +13,47 @@ from contextlib import AbstractContextManager, suppress
 from contextvars import copy_context
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, dense, freeze, sparse_of_scipy
 from contactverif.contract.case import Case
-from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.foreign_text import describe_error, name_line, one_line, place_of_error
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.engine import Engine, EngineAnswer, EngineTraits, SceneArrays
+from contactverif.contract.errors import (
+    ContractError,
+    MisuseError,
+    NonFiniteError,
+    PluginError,
+    describe_error,
+    name_line,
+    one_line,
+    place_of_error,
+)
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import PLANE, Interface
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
+
+_Value = TypeVar("_Value")
+
+
+class lazy(Generic[_Value]):
+    """A `functools.cached_property` without a lock.
+
+    Python 3.11 holds one lock for all objects of the class while a value is computed. A case that needs an answer of a
+    plugin for it would keep all others from going on, see `contactverif.isolation.lockstep`.
+    """
+
+    def __init__(self, compute: Callable[[Any], _Value]) -> None:
+        self._compute, self.__doc__ = compute, compute.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, owner: type | None = None) -> _Value:
+        value = instance.__dict__[self._name] = self._compute(instance)
+        return value
+
 
 OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
 FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time, so none is missing without them.
@@ -470,3 +499,96 @@ def ask_first(subject: Subject, case: Case, parts: Collection[str]) -> FirstAnsw
         with suppress(ContractError):
             tangent = dense(formulation.tangent(interface, pairing, state.z))
     return FirstAnswers(state, residual, tangent)
+
+
+ENGINE = "engine/"  # The names of engines begin so wherever those of formulations stand beside them.
+SOLVE = "solve"  # The one part that an engine provides; a formulation provides others.
+
+
+class EngineSubject(Subject):
+    """An engine as it was loaded. It has no penalty of its own: each scene says its own.
+
+    Parameters
+    ----------
+    name : str
+        The name as on the command line, with options.
+    engine : Engine
+        The engine.
+
+    Attributes
+    ----------
+    engine : Engine
+        The engine itself.
+    engine_traits : EngineTraits
+        The statements of the engine.
+    traits : Traits
+        The same statements, as far as formulations can state them.
+
+    Raises
+    ------
+    ContractError
+        If it has no ``solve``, or its ``traits`` are no `EngineTraits`.
+    """
+
+    def __init__(self, name: str, engine: Engine) -> None:
+        self.name = name_line(name)
+        self.engine = engine
+        self.first_answers = None
+        if not callable(getattr(engine, SOLVE, None)):
+            raise ContractError(f"make: returned a {type(engine).__name__} without a `solve`")
+        traits = getattr(engine, "traits", None)
+        if not isinstance(traits, EngineTraits):
+            needed = "contactverif.contract.engine.EngineTraits"
+            raise ContractError(f"traits: found a {type(traits).__name__}; needed {needed}")
+        self.engine_traits = traits
+        self.traits = _as_traits(traits)
+        self.provides = frozenset({SOLVE})
+        self.counts_multipliers = False
+
+    def with_penalty(self, penalty: float) -> CheckedFormulation:
+        """Raise a ContractError: nobody can ask an engine for forces."""
+        raise ContractError("an engine gives displacements alone")
+
+    def solve(self, scene: SceneArrays) -> EngineAnswer:
+        """Return the checked answer of the engine to a scene.
+
+        Raises
+        ------
+        PluginError
+            If the engine raises an exception, or its process ends.
+        ContractError
+            If the answer has the wrong kind, shape or dtype.
+        NonFiniteError
+            If it says that it has converged, and a displacement is NaN or infinite.
+        """
+        answer = self._call(scene)
+        if not isinstance(answer, EngineAnswer):
+            raise ContractError(f"solve: returned a {type(answer).__name__}; needed an EngineAnswer")
+        if flaw := answer.flaw(scene):
+            raise ContractError(f"solve: {flaw}")
+        if answer.converged and not np.isfinite(answer.displacements).all():
+            raise NonFiniteError("solve: converged, with displacements that are not finite")
+        return answer
+
+    def _call(self, scene: SceneArrays) -> Any:
+        """Return what the engine answers; whatever it raises becomes a PluginError."""
+        try:
+            return self.engine.solve(scene)
+        except (KeyboardInterrupt, ContractError):
+            raise
+        except BaseException as error:  # A code may raise anything, and its mistake is a row of the report.
+            kinds = ((MemoryError, "memory"), (SystemExit, "exit"))
+            cause = next((word for kind, word in kinds if isinstance(error, kind)), "exception")
+            raise PluginError(f"solve: {describe_error(error)}{place_of_error(error)}", cause) from error
+
+
+def _as_traits(traits: EngineTraits) -> Traits:
+    """Return the statements of an engine as those of a formulation that is distributed over the current length."""
+    promises = Promises(
+        patch=PatchPromises(flat=traits.passes_flat_patch),
+        converges=traits.converges,
+        independent_multipliers=True if traits.enforcement == "multiplier" else None,
+    )
+    # A stiffness of its own is near to none that gives way.
+    enforcement = "multiplier" if traits.enforcement == "own" else traits.enforcement
+    return Traits(promises, Rules(enforcement, "distributed", "current"))

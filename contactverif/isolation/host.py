@@ -19,10 +19,9 @@ import numpy as np
 import psutil
 
 from contactverif.contract.arrays import Array
-from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.foreign_text import one_line
+from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError, one_line
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.lockstep import wait_in_lockstep
 from contactverif.isolation.process import PINNING, PluginProcess, Question, end_marked

@@ -25,14 +25,11 @@ import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, sparse_of_scipy
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
-from contactverif.contract.engine_subject import EngineSubject
-from contactverif.contract.errors import ContractError, MisuseError, PluginError
-from contactverif.contract.foreign_text import one_line
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.errors import ContractError, MisuseError, PluginError, one_line
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, Prefetching, Subject
+from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, EngineSubject, Prefetching, Subject
 from contactverif.contract.traits import Traits
 from contactverif.isolation.child import FORKS
 from contactverif.isolation.host import Host, answer_of, host_of, raise_failure

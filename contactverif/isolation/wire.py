@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.foreign_text import one_line
+from contactverif.contract.errors import one_line
 
 MOST_QUESTIONS = 128  # The number of questions in a message.
 _MOST_NAMES = 256  # The number of arrays in an answer, and of methods.

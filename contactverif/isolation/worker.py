@@ -25,11 +25,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError
-from contactverif.contract.foreign_text import describe_error
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError, describe_error
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject, _call_plugin, _check_forces, copy_entries
 from contactverif.isolation.child import (

@@ -24,12 +24,10 @@ from scipy.sparse import linalg
 from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.engine import EngineAnswer
-from contactverif.contract.engine_subject import EngineSubject
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import one_line
+from contactverif.contract.errors import MisuseError, one_line
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import CheckedFormulation, EngineSubject, Subject
 from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene
 

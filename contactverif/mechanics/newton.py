@@ -16,7 +16,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray, freeze
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.pairing import Pairing
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.scene import Scene

@@ -21,9 +21,8 @@ from scipy import linalg, sparse
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray, dense
 from contactverif.contract.errors import ContractError
-from contactverif.contract.lazy import lazy
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import CheckedFormulation
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.subject import CheckedFormulation, lazy
 from contactverif.mechanics import linear
 from contactverif.mechanics.scene import Scene
 

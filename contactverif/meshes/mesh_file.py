@@ -15,8 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.faces import TRIANGLE, turns_of
-from contactverif.contract.interface import ONE_SIDED, Interface, Surface
+from contactverif.contract.interface import ONE_SIDED, TRIANGLE, Interface, Surface, turns_of
 from contactverif.meshes.plain_mesh import Group, PlainMesh, groups_of, kinds_in, read_mesh, unknown_group_error
 
 FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.

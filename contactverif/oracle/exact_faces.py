@@ -15,8 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.contract.faces import measure_heights
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import Interface, measure_heights
 from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Ratios, as_integers, dot, roots
 from contactverif.oracle.flat_answers import area_of, cut_polygon
 from contactverif.oracle.nearest import integers

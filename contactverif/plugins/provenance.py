@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from contactverif.contract.engine_subject import ENGINE
+from contactverif.contract.subject import ENGINE
 from contactverif.plugins.registry import (
     ENGINE_PROPERTIES,
     ENGINES,

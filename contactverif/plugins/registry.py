@@ -29,13 +29,18 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from contactverif.contract.engine_subject import ENGINE, EngineSubject
-from contactverif.contract.errors import ContractError, MisuseError
-from contactverif.contract.foreign_text import LONGEST_NAME, describe_error, name_line
-from contactverif.contract.names import parse_name, unknown_name_error
+from contactverif.contract.errors import (
+    LONGEST_NAME,
+    ContractError,
+    MisuseError,
+    describe_error,
+    name_line,
+    parse_name,
+    unknown_name_error,
+)
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import ENGINE, EngineSubject, Subject
 from contactverif.isolation.box import kernel_folder
 from contactverif.isolation.host import host_of
 from contactverif.isolation.limits import Limits

@@ -25,8 +25,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import parse_name, unknown_name_error
+from contactverif.contract.errors import MisuseError, parse_name, unknown_name_error
 from contactverif.mechanics.bodies import Placing, Rectangle
 from contactverif.mechanics.newton import DIVERGENCE_FACTOR
 from contactverif.mechanics.scene import Scene

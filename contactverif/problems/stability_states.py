@@ -16,8 +16,7 @@ from math import log2
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
+from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.bodies import Rectangle
 from contactverif.problems.blocks import two_blocks

@@ -15,9 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.engine_subject import EngineSubject
-from contactverif.contract.errors import ContractError, NonFiniteError, PluginError
-from contactverif.contract.foreign_text import describe_error, place_of_error
+from contactverif.contract.errors import ContractError, NonFiniteError, PluginError, describe_error, place_of_error
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import (
     CLOSED_CHAIN,
@@ -29,7 +27,7 @@ from contactverif.contract.property import (
     judge,
 )
 from contactverif.contract.result import JUDGED_SHARE, NodalForces, Row, exceeds
-from contactverif.contract.subject import FirstAnswers, Subject, ask_first
+from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
 from contactverif.problems.named_states import IN_SPACE, first_state, named_case
 from contactverif.problems.open_states import fit_to_traits
 from contactverif.sampling.hypothesis_draws import one_thread

@@ -9,8 +9,7 @@ import secrets
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.names import unknown_name_error
+from contactverif.contract.errors import MisuseError, unknown_name_error
 
 MOST_EXAMPLES = 10**9
 # The failures that are shrunk: those that nobody stated, all, or none. The others show a witness or the first case.

@@ -16,8 +16,7 @@ from itertools import chain, product
 from math import sqrt
 
 from contactverif.contract import records
-from contactverif.contract.case import Case
-from contactverif.contract.cases import needs_of_place
+from contactverif.contract.case import Case, needs_of_place
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Outcomes, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run

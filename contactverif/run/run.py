@@ -21,12 +21,11 @@ from typing import NamedTuple, TypeVar, get_args
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
-from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, SEGMENT, Interface
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
-from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.isolation.remote import places
 from contactverif.plugins.provenance import collect_provenance

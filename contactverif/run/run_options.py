@@ -358,7 +358,7 @@ def _convert(table: dict[str, Any]) -> dict[str, Any]:
     """Return the fields that a table of settings gives, each of the right kind."""
     import msgspec
 
-    from contactverif.contract.names import unknown_name_error
+    from contactverif.contract.errors import unknown_name_error
 
     options, values = declared_options(RunOptions), {}
     for name in table:

@@ -15,8 +15,7 @@ from typing import cast
 
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.case import Case
-from contactverif.contract.cases import name_of_source
+from contactverif.contract.case import Case, name_of_source
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.property import Outcome, Property

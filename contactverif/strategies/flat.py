@@ -20,8 +20,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
+from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
 from contactverif.oracle.flat_answers import is_of_class
 from contactverif.problems.flat_states import Turn, flat_master, flat_state

@@ -19,8 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
+from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
 from contactverif.strategies import given_interface
 from contactverif.strategies.panel_chains import Panel, assemble_panels, on_lattice, shortest

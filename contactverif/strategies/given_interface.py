@@ -8,8 +8,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.faces import turns_of
-from contactverif.contract.interface import ONE_SIDED, STEEPEST_FACING, Interface, Surface, ways_to_master
+from contactverif.contract.interface import ONE_SIDED, STEEPEST_FACING, Interface, Surface, turns_of, ways_to_master
 from contactverif.strategies.samples import OFFSETS, depth_units, depths, penalties, repeat_cyclically, seeds, shifts
 
 LEAST_LENGTH = 0.25  # A slave segment that is bent onto the master keeps this share of its length, seen along itself.

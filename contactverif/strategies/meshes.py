@@ -8,8 +8,7 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.faces import QUADRILATERAL, TRIANGLE
-from contactverif.contract.interface import PLANE, SPACE, Interface
+from contactverif.contract.interface import PLANE, QUADRILATERAL, SPACE, TRIANGLE, Interface
 from contactverif.strategies.general import closed_cases, general_cases, smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 

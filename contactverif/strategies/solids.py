@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
+from contactverif.contract.case import Case, random_source
 from contactverif.mechanics.bodies import Placing, Rectangle
 from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.problems.blocks import is_uniform, two_blocks

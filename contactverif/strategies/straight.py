@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
+from contactverif.contract.case import Case, random_source
 from contactverif.problems.flat_states import rotation
 from contactverif.strategies.panel_chains import Chain, assemble_chains, on_lattice
 from contactverif.strategies.projection_situations import exact_turns

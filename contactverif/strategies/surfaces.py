@@ -17,10 +17,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
-from contactverif.contract.faces import QUADRILATERAL, TRIANGLE
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.case import Case, random_source
+from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.problems.flat_states import rotation
 from contactverif.strategies.given_interface import given_surface_states
 from contactverif.strategies.panel_chains import on_lattice

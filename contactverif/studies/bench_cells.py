@@ -25,8 +25,8 @@ from scipy.sparse.linalg import splu
 from contactverif.contract.arrays import Array
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, PluginError
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.isolation.remote import RemoteFormulation
 from contactverif.isolation.worker import MethodCalls

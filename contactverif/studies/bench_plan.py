@@ -15,8 +15,7 @@ from zlib import crc32
 
 import numpy as np
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import describe_error, place_of_error
+from contactverif.contract.errors import MisuseError, describe_error, place_of_error
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution

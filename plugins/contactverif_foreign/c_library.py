@@ -18,9 +18,8 @@ import numpy as np
 from contactverif.compiler import compile_kernel
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.formulation import Handle, Pairing, check_penalty
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_penalty
-from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.projection import PointOnSegment, nearest_segment, node, search_tree
 from contactverif_foreign.element_pairs import walk_chains

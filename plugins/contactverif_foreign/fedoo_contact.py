@@ -16,9 +16,8 @@ from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Pairing, choose
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import choose
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Evidence, Rules, Traits
 
 # {word of the option `kind`: the packages that the search needs}

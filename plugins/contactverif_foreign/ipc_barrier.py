@@ -14,9 +14,8 @@ from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Handle, Pairing, choose
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import choose
-from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Promises, Rules, Traits
 
 _SETS = {"ipc": "IPC", "improved": "IMPROVED_MAX_APPROX", "ogc": "OGC"}

@@ -16,9 +16,8 @@ from scipy import sparse
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Handle, Pairing, check_count, choose
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_count, choose
-from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Evidence, Promises, Traits
 
 

@@ -14,9 +14,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.formulation import Pairing, choose
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.option_checks import choose
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Abilities, Evidence, Promises, Rules, Traits
 from contactverif_foreign.element_pairs import walk_chains
 

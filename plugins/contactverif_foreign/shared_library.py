@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactverif.contract.arrays import Array
-from contactverif.contract.errors import ContractError, MisuseError
-from contactverif.contract.names import unknown_name_error
+from contactverif.contract.errors import ContractError, MisuseError, unknown_name_error
 from contactverif.contract.traits import Traits
 
 _GROUPS = ("promises", "patch", "rules", "abilities", "evidence")

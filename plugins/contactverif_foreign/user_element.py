@@ -24,9 +24,8 @@ from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.formulation import Handle, Pairing, check_count, check_penalty, check_tau
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_count, check_penalty, check_tau
-from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.traits import Traits
 from contactverif_foreign.element_pairs import RULES, Elements
 from contactverif_foreign.shared_library import (

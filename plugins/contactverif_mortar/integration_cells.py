@@ -22,9 +22,8 @@ import numpy as np
 
 from contactverif.compiler import TAKES_LONGDOUBLE, compile_inline, compile_maker, compile_part, match_precision
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Fields, NumberArray
 from contactverif.geometry.projection import frame, node, search_tree

@@ -19,10 +19,8 @@ from scipy import sparse
 
 from contactverif.compiler import match_precision
 from contactverif.contract.arrays import Array, BoolArray, FloatArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, choose
 from contactverif.contract.interface import Interface, join_rows, split_state, split_states
-from contactverif.contract.option_checks import check_penalty, choose
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif_mortar.cell_frame import ForcesAndTangent

@@ -14,10 +14,8 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, choose
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_penalty, choose
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_mortar.cell_frame import ForcesAndTangent, cell_arguments, springs_at_points, touching_points
 from contactverif_mortar.integration_cells import (

@@ -31,10 +31,8 @@ from scipy import sparse
 
 from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, choose
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_count, check_penalty, choose
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, Fields, NumberArray, zero_matrix
 from contactverif.geometry.projection import node

@@ -39,10 +39,8 @@ from numpy.typing import ArrayLike
 
 from contactverif.compiler import TAKES_LONGDOUBLE, match_precision
 from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, check_tau, choose
 from contactverif.contract.interface import Interface, join_rows, split_state, split_states
-from contactverif.contract.option_checks import check_count, check_penalty, check_tau, choose
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree

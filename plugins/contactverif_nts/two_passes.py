@@ -19,9 +19,8 @@ import numpy as np
 import scipy
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Handle, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Handle, Pairing
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Fractions, Traits, format_forces, parse_forces
 

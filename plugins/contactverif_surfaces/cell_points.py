@@ -18,9 +18,8 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif_surfaces.face_search import find_cells, longest_edges
 

@@ -45,11 +45,8 @@ from scipy import sparse
 from contactverif.compiler import compile_inline, compile_kernel, compile_part
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.faces import TRIANGLE
-from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_penalty
-from contactverif.contract.pairing import Pairing
+from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty
+from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, Csr, NumberArray, find_entry, zero_matrix
 from contactverif_surfaces.cell_points import SURFACE_TRAITS, CellPoints, FacePairs, report_points

@@ -15,10 +15,8 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty
 from contactverif.contract.interface import Interface
-from contactverif.contract.option_checks import check_penalty
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.traits import Traits
 from contactverif_surfaces.cell_points import (
     PAST_BORDER,

@@ -9,8 +9,7 @@ from functools import partial
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property

@@ -17,12 +17,10 @@ import numpy as np
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
-from contactverif.contract.case import ACTIVATION, Case
-from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.case import ACTIVATION, Case, Cases, random_source
 from contactverif.contract.errors import ContractError
-from contactverif.contract.faces import TRIANGLE, turns_of
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import PLANE, Interface, Surface
+from contactverif.contract.interface import PLANE, TRIANGLE, Interface, Surface, turns_of
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.result import OPPOSITE_SIGN

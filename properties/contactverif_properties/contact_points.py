@@ -16,11 +16,9 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases, random_source
-from contactverif.contract.faces import TRIANGLE, turns_of
+from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.interface import PLANE, TRIANGLE, Interface, turns_of
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject

@@ -12,13 +12,11 @@ from functools import cache, partial
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
-from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Measure, Property
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces
 from contactverif.problems.arcs import Arcs

@@ -22,13 +22,11 @@ import numpy as np
 from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
-from contactverif.contract.engine_subject import SOLVE, EngineSubject
+from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import solve_by_engine
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors

@@ -17,13 +17,11 @@ from hypothesis.strategies import SearchStrategy
 from scipy import linalg
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases, random_source
-from contactverif.contract.engine_subject import SOLVE, EngineSubject
+from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Property
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics import changed_scenes
 from contactverif.mechanics.accuracy import Solution, solve_by_engine

@@ -8,8 +8,7 @@ import numpy as np
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Subject

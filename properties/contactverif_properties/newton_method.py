@@ -16,12 +16,11 @@ import numpy as np
 from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.case import Case, Cases
 from contactverif.contract.errors import ContractError
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import change_units, move, snap

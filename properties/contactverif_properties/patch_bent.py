@@ -11,14 +11,12 @@ from typing import Literal
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
-from contactverif.contract.engine_subject import SOLVE, EngineSubject
+from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import SOLVE, CheckedFormulation, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine, solve_for_accuracy
 from contactverif.mechanics.newton import End, Trace, solve

@@ -14,8 +14,7 @@ import numpy as np
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases, random_source
+from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.errors import ContractError
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all

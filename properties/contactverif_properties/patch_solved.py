@@ -17,13 +17,11 @@ import numpy as np
 from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.case import Case, Cases
 from contactverif.contract.engine import EngineAnswer
-from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import CheckedFormulation, EngineSubject, Subject
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.case import Case, Cases
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import WITH_BARRIER, Property
 from contactverif.contract.subject import CheckedFormulation, FirstAnswers, Restartable, Subject, ask_first
 from contactverif.problems.named_states import first_state, named_case

@@ -11,14 +11,12 @@ import numpy as np
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases, random_source
-from contactverif.contract.engine_subject import SOLVE, EngineSubject
+from contactverif.contract.case import Case, Cases, random_source
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import Property
-from contactverif.contract.subject import Subject
+from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import shape_integrals, solve_by_engine
 from contactverif.mechanics.scene import Scene, scene_of

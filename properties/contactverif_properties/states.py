@@ -15,13 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray, dense
-from contactverif.contract.case import Case
-from contactverif.contract.cases import random_source
-from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.case import Case, random_source
+from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.lazy import lazy
-from contactverif.contract.pairing import Pairing
-from contactverif.contract.subject import Call, CheckedFormulation, Subject
+from contactverif.contract.subject import Call, CheckedFormulation, Subject, lazy
 from contactverif.strategies import general_cases, tie_cases
 
 

@@ -19,11 +19,10 @@ from scipy import sparse
 from scipy.sparse import csgraph, csr_array
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray, dense
-from contactverif.contract.case import Case
-from contactverif.contract.cases import Cases
+from contactverif.contract.case import Case, Cases
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
-from contactverif.contract.pairing import Pairing
 from contactverif.contract.property import WITH_BARRIER, Property, Verdict, judge
 from contactverif.contract.subject import Subject
 from contactverif.problems.long_states import long_face_states, long_states

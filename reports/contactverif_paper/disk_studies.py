@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, difference, disk_scene, flatter, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_round_ticks
 from contactverif_paper.paper_columns import Column, Formulations, to_group, variables_of

@@ -20,7 +20,7 @@ from matplotlib.path import Path
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif.problems import hertz
 from contactverif_paper.disk_solutions import PAPER, DiskSolution, disk_scene, solve_disk
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_round_ticks

@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray, dense
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif.mechanics import newton
 from contactverif.mechanics.newton import Trace
 from contactverif.mechanics.system import System

@@ -19,7 +19,7 @@ import numpy as np
 from contactverif.contract import schema
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
 from contactverif_paper.paper_columns import Column, name_columns, variables_of

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif.mechanics import newton
 from contactverif.mechanics.bodies import Rectangle
 from contactverif.mechanics.scene import Scene

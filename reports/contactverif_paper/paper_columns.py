@@ -13,7 +13,7 @@ from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
-from contactverif.contract.columns import Group, Variable, codes, numbers, words
+from contactverif.contract.schema import Group, Variable, codes, numbers, words
 from contactverif_paper.paper_formulations import PaperFormulation
 
 WORDS = "words"  # Stands in place of a unit where a field holds words.

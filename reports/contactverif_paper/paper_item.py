@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from matplotlib.figure import Figure
 
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif_paper.paper_columns import WORDS, Column, to_group
 
 Progress = Callable[[str], None]  # The callback that reports what comes next, in a few words.

@@ -16,7 +16,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from contactverif.contract import schema
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif_paper.figure_style import render_figure
 from contactverif_paper.paper_columns import variables_of
 from contactverif_paper.paper_item import OURS, Agreement, Paper, PaperFigure, Progress, Statement, sentence

@@ -24,7 +24,7 @@ from matplotlib.ticker import MaxNLocator
 
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.columns import Group
+from contactverif.contract.schema import Group
 from contactverif.mechanics import newton
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import stress_error

@@ -23,8 +23,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.case import Case
-from contactverif.contract.columns import Group
 from contactverif.contract.interface import Interface
+from contactverif.contract.schema import Group
 from contactverif.mechanics import newton
 from contactverif.mechanics.newton import Trace
 from contactverif.problems import catalogue

@@ -15,7 +15,7 @@ from enum import IntEnum
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.contract.foreign_text import LONGEST_FACT, name_line, one_line
+from contactverif.contract.errors import LONGEST_FACT, name_line, one_line
 
 ERRORS = {
     "forces": "E_F of nodal forces, the larger one of slave and master",

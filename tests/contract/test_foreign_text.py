@@ -6,7 +6,7 @@ from foreign_texts import TEXTS, hidden_characters
 
 from contactverif import Case, Finding, Interface, Measurement, MisuseError, Quantity, Subject
 from contactverif.contract.counterexample import case_id, named_case_id, typeable
-from contactverif.contract.foreign_text import (
+from contactverif.contract.errors import (
     LONGEST_LINE,
     LONGEST_NAME,
     describe_error,

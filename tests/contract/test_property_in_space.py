@@ -9,7 +9,7 @@ from subjects import load_property, load_subject
 
 import contactverif_surfaces
 from contactverif import Interface, MisuseError, Property, Subject, Traits, Verdict, load_properties, named_case
-from contactverif.contract.cases import name_of_source
+from contactverif.contract.case import name_of_source
 from contactverif.run.run import run
 
 IN_SPACE = Traits().revise(dimensions=(3,))

@@ -7,7 +7,7 @@ import pytest
 from subjects import load_property
 
 from contactverif import Verdict, judge_case, load_scene
-from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.subject import EngineSubject
 from contactverif.problems.catalogue import load_scene_case
 from contactverif_engines.calculix import FIELD, CalculiX, Layer, make_layer, read_displacements, write_deck
 

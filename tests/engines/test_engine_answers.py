@@ -11,8 +11,8 @@ from subjects import load_property
 
 from contactverif import Case, MisuseError, Verdict, judge_case, load_scene
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
-from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.errors import ContractError
+from contactverif.contract.subject import EngineSubject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote import engine_program, load_remote_engine

@@ -5,8 +5,8 @@ import pytest
 from plain_engine import Plain
 
 from contactverif import Property, Verdict, judge_case
-from contactverif.contract.engine_subject import EngineSubject
 from contactverif.contract.measurement import Quantity
+from contactverif.contract.subject import EngineSubject
 from contactverif.plugins.registry import load_properties, property_ids
 from contactverif.sampling.draw import Sampling, draw_cases
 from contactverif_properties.patch_bent import count_bare

@@ -8,7 +8,7 @@ import pytest
 from subjects import load_property
 
 from contactverif import Verdict, judge_case, load_scene
-from contactverif.contract.engine_subject import EngineSubject
+from contactverif.contract.subject import EngineSubject
 from contactverif.isolation.limits import Limits
 from contactverif.plugins.registry import load_engine
 from contactverif.problems.catalogue import load_scene_case

@@ -10,7 +10,7 @@ import pytest
 from subjects import load_property, load_subject
 
 from contactverif import Interface, MisuseError
-from contactverif.contract.faces import turns_of
+from contactverif.contract.interface import turns_of
 from contactverif.meshes.mesh_file import read_interface, read_sides
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases

@@ -9,7 +9,7 @@ from subjects import load_subject
 
 from contactverif import MisuseError, Scene
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.names import parse_name, unknown_name_error
+from contactverif.contract.errors import parse_name, unknown_name_error
 from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
 from contactverif.problems import catalogue

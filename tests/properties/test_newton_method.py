@@ -11,7 +11,7 @@ from subjects import Changed, change_verbs, judge_as, load_subject
 import contactverif_nts
 from contactverif import Case, End, Rectangle, Subject, Trace, Traits, Verdict, judge_case, solve, two_blocks
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.pairing import Pairing
+from contactverif.contract.formulation import Pairing
 from contactverif.mechanics.changed_scenes import snap
 from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from handmade_report import small_run
 
-from contactverif.contract.columns import Group, codes, numbers, words
+from contactverif.contract.schema import Group, codes, numbers, words
 from contactverif_reports.netcdf.file_groups import write_tree
 from contactverif_reports.netcdf.write import tree_of
 

@@ -7,7 +7,7 @@ import pytest
 from test_run import ZERO, a_case, sizes, subject
 
 from contactverif import Outcome, Property, Verdict
-from contactverif.contract.cases import Cases
+from contactverif.contract.case import Cases
 from contactverif.run import run as driver
 from contactverif.run.run import RunMeter, run
 from contactverif.run.scheduler import Progress

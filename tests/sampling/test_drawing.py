@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from subjects import same_case
 
 from contactverif import Case, Interface, Measurement, Property, Quantity, Subject, Traits, Verdict, load_properties
-from contactverif.contract.cases import random_source
+from contactverif.contract.case import random_source
 from contactverif.run.rows import WHOLE
 from contactverif.run.run import run
 from contactverif.sampling.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from hostile_kit import EITHER, answers
 
-from contactverif.contract.pairing import Pairing
+from contactverif.contract.formulation import Pairing
 
 NUMBER_OF_NAMES = 200_000
 

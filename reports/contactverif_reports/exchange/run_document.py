@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from contactverif.contract.columns import value_of
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
 from contactverif.contract.result import Row, Run
-from contactverif.contract.schema import ROW, Column
+from contactverif.contract.schema import ROW, ReportColumn, value_of
 from contactverif_reports.files import whole
 from contactverif_reports.plot.text import as_text
 
@@ -53,7 +52,7 @@ class Example(msgspec.Struct, frozen=True, kw_only=True):
     drawing: str
 
 
-def _type_of(column: Column) -> Any:
+def _type_of(column: ReportColumn) -> Any:
     """Return the type of the key of a column."""
     types: dict[str, Any] = {
         "words": str,

@@ -18,8 +18,7 @@ from xml.etree import ElementTree
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import printable
+from contactverif.contract.errors import MisuseError, printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, percent
 from contactverif_reports.files import check_writable, checked_name, whole

@@ -11,9 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.columns import Group, Variable, codes, numbers, words
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.schema import NONE, RATIO, SECONDS, Column, text
+from contactverif.contract.schema import (
+    NONE,
+    RATIO,
+    SECONDS,
+    Group,
+    ReportColumn,
+    Variable,
+    codes,
+    numbers,
+    text,
+    words,
+)
 from contactverif_reports.bench_results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.file_groups import read_groups, write_tree
@@ -28,23 +38,23 @@ _OUTCOMES = {outcome.word.replace(" ", "_"): int(outcome) for outcome in Outcome
 _NO_SOLUTION = "NaN without a solution, or where nothing is reported"
 # The arrays of `BenchResults`, by their attribute: what a file holds, reads and checks of them.
 _ARRAYS = (
-    Column("slave_segments", "segments", "count", "number of slave segments", axes=("cell",)),
-    Column("unknowns", "unknowns", "count", "number of free unknowns of all bodies", axes=("cell",)),
-    Column(
+    ReportColumn("slave_segments", "segments", "count", "number of slave segments", axes=("cell",)),
+    ReportColumn("unknowns", "unknowns", "count", "number of free unknowns of all bodies", axes=("cell",)),
+    ReportColumn(
         "best_pressure_error", "best_pressure", "real",
         "error of the best continuous pressure that is linear between the slave's nodes", axes=("cell",),
     ),
-    Column("outcome", "outcomes", "code", "how the run ended", axes=_SOLUTION, meanings=_OUTCOMES),
-    Column("error", "errors", "real", "error", _NO_SOLUTION, axes=(*_SOLUTION, "error_kind")),
-    Column("count", "counts", "count", "count", axes=(*_SOLUTION, "count_kind")),
-    Column("work", "work", "count", "work", "entries are 0 without a solution", axes=(*_RUN, "work_kind")),
+    ReportColumn("outcome", "outcomes", "code", "how the run ended", axes=_SOLUTION, meanings=_OUTCOMES),
+    ReportColumn("error", "errors", "real", "error", _NO_SOLUTION, axes=(*_SOLUTION, "error_kind")),
+    ReportColumn("count", "counts", "count", "count", axes=(*_SOLUTION, "count_kind")),
+    ReportColumn("work", "work", "count", "work", "entries are 0 without a solution", axes=(*_RUN, "work_kind")),
 )  # fmt: skip
 _TIMES = (
-    Column(
+    ReportColumn(
         "evaluation_seconds", "evaluation", "real", "least time of one evaluation: search, forces and tangent",
         "by the clock of the plugin's process; NaN where it crashed", SECONDS, (*_RUN, "process"),
     ),
-    Column(
+    ReportColumn(
         "factorisation_seconds", "factorisation", "real", "least time of one factorisation of the whole system",
         "NaN without one", SECONDS, _RUN,
     ),
@@ -80,7 +90,7 @@ def bench_tree(results: BenchResults) -> dict[str, Group]:
     }
 
 
-def _variable(column: Column, results: BenchResults) -> Variable:
+def _variable(column: ReportColumn, results: BenchResults) -> Variable:
     values = getattr(results, column.path)
     if column.meanings is not None:
         return codes(column.axes, values, column.meanings, column.meaning)

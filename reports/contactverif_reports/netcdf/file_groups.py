@@ -17,8 +17,8 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.contract.columns import Group, Variable
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.schema import Group, Variable
 from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
 from contactverif.isolation.wire import PackedArray
 

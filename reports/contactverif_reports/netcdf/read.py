@@ -20,7 +20,6 @@ import numpy as np
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.columns import Group, StoredColumns
 from contactverif.contract.counterexample import (
     Counterexample,
     Origin,
@@ -31,6 +30,7 @@ from contactverif.contract.counterexample import (
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Row, Run
+from contactverif.contract.schema import Group, StoredColumns
 from contactverif_reports.netcdf.file_groups import read_groups
 from contactverif_reports.netcdf.stored_cases import case_of_group, read_forces, read_named_cases
 from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from contactverif.contract import schema
 from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import BODIES, Case
-from contactverif.contract.columns import Group, Variable, codes, numbers, words
 from contactverif.contract.counterexample import Counterexample, counterexamples, distinct, named_failures, typeable
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.result import NodalForces, Run
+from contactverif.contract.schema import Group, Variable, codes, numbers, words
 from contactverif_reports.netcdf.stored_outcomes import coordinates, outcome_axes, outcome_variables
 
 _FOLDER = f"/{schema.NAMED_CASES}"

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactverif.contract import schema
-from contactverif.contract.columns import Group, Variable, codes, join, numbers, to_variables, words
 from contactverif.contract.counterexample import distinct, typeable
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import Result, Row, Run
+from contactverif.contract.schema import Group, Variable, codes, join, numbers, to_variables, words
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.stored_cases import counterexample_groups, named_case_groups
 from contactverif_reports.netcdf.stored_outcomes import common_unit, coordinates, outcome_axes, outcome_variables

@@ -20,8 +20,7 @@ from matplotlib.text import Text
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.foreign_text import printable
+from contactverif.contract.errors import MisuseError, printable
 from contactverif.contract.interface import PLANE, Surface
 from contactverif_reports.files import checked_name, whole
 from contactverif_reports.plot.geometry import Course, Gaps, format_number, one_digit, segment_lengths, unit_of

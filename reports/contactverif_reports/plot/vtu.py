@@ -11,7 +11,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.faces import turns_of
+from contactverif.contract.interface import turns_of
 from contactverif.contract.result import NodalForces
 from contactverif_reports.files import checked_name, whole
 from contactverif_reports.plot.solved_scene import Solution, SolvedScene, pressures_across
