@@ -60,7 +60,7 @@ BUDGET = {
 SUM = Weight(288, 66131, 43505)
 TESTS = 50730  # Lines of tests and evidence.
 COMMANDS = 14
-WORDS = 48805  # Words of Markdown, without the changelog and the stored results under reports/.
+WORDS = 40000  # Words of Markdown, without the changelog and the stored results under reports/.
 SILENT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 
@@ -107,10 +107,11 @@ def weigh_tests() -> int:
 
 
 def count_words() -> int:
-    """Return the words of all Markdown that is kept; a link to a file says nothing again."""
+    """Return the words of all Markdown that is kept: they have a letter or a digit. A link to a file says nothing again."""
     names = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     paths = [ROOT / name for name in names.splitlines() if not name.startswith("reports/") and name != "CHANGELOG.md"]
-    return sum(len(path.read_text(encoding="utf-8").split()) for path in paths if not path.is_symlink())
+    texts = [path.read_text(encoding="utf-8") for path in paths if not path.is_symlink()]
+    return sum(1 for text in texts for word in text.split() if re.search(r"\w", word))
 
 
 def too_heavy(weight: Weight, most: Weight) -> bool:
