@@ -8,8 +8,7 @@ from typing import Any
 
 import msgspec
 
-from contactverif.contract.property import Outcome, Verdict
-from contactverif.contract.records import part_of
+from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif.plugins.provenance import machine
 from contactverif.plugins.registry import load_formulation, load_properties
@@ -60,7 +59,7 @@ def forge(journal: Path, change: Callable[[Record], Record]) -> None:
 
 def say_pass(record: Record) -> Record:
     """Return the form of a failure as that of a pass, with the same numbers."""
-    if isinstance(record, FormRecord) and part_of(Outcome, record.form, "verdict") == Verdict.FAIL:
+    if isinstance(record, FormRecord) and record.form[1] == Verdict.FAIL:
         case, _, _, *others = record.form
         return FormRecord([case, int(Verdict.PASS), "", *others])
     return record

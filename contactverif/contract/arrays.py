@@ -31,7 +31,12 @@ def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
     It stands on immutable bytes, so that nobody can make it writeable again. An array that already does is returned.
     """
     array = np.asarray(values, dtype=dtype)
-    return array if _is_frozen(array) else np.ndarray(array.shape, array.dtype, array.tobytes())
+    base: Any = array.base
+    while type(base) is np.ndarray:
+        base = base.base
+    if type(base) is bytes and type(array) is np.ndarray and array.flags.c_contiguous:
+        return array
+    return np.ndarray(array.shape, array.dtype, array.tobytes())
 
 
 def freeze_together(arrays: Collection[NDArray[_Scalar]], dtype: type[_Scalar]) -> list[NDArray[_Scalar]]:
@@ -47,14 +52,6 @@ def freeze_together(arrays: Collection[NDArray[_Scalar]], dtype: type[_Scalar]) 
         begin, end = end, end + array.size
         parts.append(together[begin:end] if array.ndim == 1 else together[begin:end].reshape(array.shape))
     return [*parts, together]
-
-
-def _is_frozen(array: NDArray[Any]) -> bool:
-    """Return whether an array is contiguous and stands on immutable bytes."""
-    base: Any = array.base
-    while type(base) is np.ndarray:
-        base = base.base
-    return type(base) is bytes and type(array) is np.ndarray and array.flags.c_contiguous
 
 
 @cache
@@ -105,10 +102,7 @@ def as_floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> Float
 
 def check_shape(argument: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
     """Check the shape of an array, in which −1 stands for any length."""
-    fits = array.ndim == len(shape) and all(
-        length in (-1, actual) for length, actual in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
+    if array.ndim != len(shape) or any(n not in (-1, actual) for n, actual in zip(shape, array.shape, strict=True)):
         lengths = ["n" if length < 0 else str(length) for length in shape]
         needed = f"shape ({lengths[0]},)" if len(shape) == 1 else f"shape ({', '.join(lengths)})"
         raise MisuseError(argument, f"shape {array.shape}", needed)

@@ -99,10 +99,15 @@ class Body:
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
         self._set_material("young", 0.0, np.inf, "Young's modulus > 0")
         self._set_material("poisson", -1.0, 0.5, _POISSON)
-        if not self.rigid:
-            self._check_turns()
-        elif not self.fixed.all():
+        if self.rigid and not self.fixed.all():
             self._refuse("fixed", "a free node of a rigid body", "every component of every node fixed")
+        corners, following = self.nodes[self.cells], _following(self.cells.shape[1])  # (n_cells, n_corners, 2)
+        to_next = corners[:, following] - corners
+        after = to_next[:, following]
+        turn = to_next[..., 0] * after[..., 1] - to_next[..., 1] * after[..., 0]
+        if not (turn > 0).all():
+            bad = np.flatnonzero((turn <= 0).any(axis=1))
+            self._refuse("cells", f"cell {bad[0]}, which is clockwise, folded or flat", "convex, counter-clockwise")
         if mesh.fault is not None:
             self._refuse(*mesh.fault)
 
@@ -143,16 +148,6 @@ class Body:
             self._refuse(name, f"{getattr(self, name)!r}", needed)
         object.__setattr__(self, name, float(number))
 
-    def _check_turns(self) -> None:
-        corners = self.nodes[self.cells]  # (n_cells, n_corners, 2)
-        n_corners = self.cells.shape[1]
-        to_next = corners[:, _following(n_corners)] - corners
-        after = to_next[:, _following(n_corners)]
-        turn = to_next[..., 0] * after[..., 1] - to_next[..., 1] * after[..., 0]
-        if not (turn > 0).all():
-            bad = np.flatnonzero((turn <= 0).any(axis=1))
-            self._refuse("cells", f"cell {bad[0]}, which is clockwise, folded or flat", "convex, counter-clockwise")
-
     def _refuse(self, name: str, found: str, needed: str) -> None:
         raise MisuseError(f"{self.name}: {name}", found, needed)
 
@@ -174,7 +169,7 @@ def _check_mesh(n_nodes: int, shape: tuple[int, int], cell_bytes: bytes, contact
     fault = _find_wrong_number(n_nodes, cells, contact)
     is_numbered = fault is None
     if fault is None and len(cells):
-        fault = _find_wrong_cell(n_nodes, cells) or _find_wrong_edge(n_nodes, cells, contact)
+        fault = _find_wrong_cell(n_nodes, cells, contact)
     if fault is None and any(len(set(ends)) < len(ends) for ends in contact.T.tolist()):
         fault = "contact", "two edges that begin or end at one node", "each edge once, in chains"
     return _MeshCheck(freeze(np.unique(contact), np.int64), is_numbered, fault)
@@ -194,19 +189,15 @@ def _find_wrong_number(n_nodes: int, cells: IntArray, contact: IntArray) -> tupl
     return None
 
 
-def _find_wrong_cell(n_nodes: int, cells: IntArray) -> tuple[str, str, str] | None:
+def _find_wrong_cell(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[str, str, str] | None:
     unused = np.setdiff1d(np.arange(n_nodes), cells)
     if len(unused):
         return "nodes", f"node {unused[0]} in no cell", "every node in a cell"
-    ordered = np.sort(cells * n_nodes + cells[:, _following(cells.shape[1])], axis=None)
-    if (ordered[1:] == ordered[:-1]).any():
-        return "cells", "two cells on the same side of an edge", "cells that do not overlap"
-    return None
-
-
-def _find_wrong_edge(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[str, str, str] | None:
     following = cells[:, _following(cells.shape[1])]
     edges = cells * n_nodes + following  # Each edge as one number, the cell on its left.
+    ordered = np.sort(edges, axis=None)
+    if (ordered[1:] == ordered[:-1]).any():
+        return "cells", "two cells on the same side of an edge", "cells that do not overlap"
     outer = edges[~np.isin(edges, following * n_nodes + cells)]
     wrong = np.flatnonzero(~np.isin(contact[:, 0] * n_nodes + contact[:, 1], outer))
     if not len(wrong):

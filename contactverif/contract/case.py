@@ -80,23 +80,27 @@ class Case:
     kind: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "z", self._check_state())
-        object.__setattr__(self, "penalty", _as_penalty(self.penalty))
-        object.__setattr__(self, "seed", _as_seed(self.seed))
-        clean(self, names=("name", "kind"))
-        parameters = {name_line(name): freeze(values, np.float64) for name, values in self.parameters.items()}
-        object.__setattr__(self, "parameters", parameters)
-
-    def _check_state(self) -> FloatArray:
         raw, n_entries = np.asarray(self.z), self.interface.n_unknowns + self.n_multipliers
         if raw.dtype.kind not in "fiu":
             raise MisuseError("z", f"dtype {raw.dtype}", "real numbers")
+        if raw.shape != (n_entries,):
+            needed = f"({n_entries},): n_nodes × dim, flat, then multipliers if any"
+            raise MisuseError("z", f"shape {raw.shape}", needed)
         z = freeze(raw, np.float64)
-        if z.shape != (n_entries,):
-            raise MisuseError("z", f"shape {z.shape}", f"({n_entries},): n_nodes × dim, flat, then multipliers if any")
         if not np.isfinite(z).all():
             raise MisuseError("z", "NaN or infinity", "finite positions")
-        return z
+        object.__setattr__(self, "z", z)
+        for name, kind, dtypes, low, high, needed in (
+            ("penalty", float, "fiu", 0, np.inf, "a finite number > 0"),
+            ("seed", int, "iu", -1, 2**63, "an integer from 0 to 2^63 − 1"),
+        ):
+            number = np.asarray(value := getattr(self, name))
+            if number.shape != () or number.dtype.kind not in dtypes or not low < number < high:
+                raise MisuseError(name, f"{value!r}", needed)
+            object.__setattr__(self, name, kind(value))
+        clean(self, names=("name", "kind"))
+        parameters = {name_line(name): freeze(values, np.float64) for name, values in self.parameters.items()}
+        object.__setattr__(self, "parameters", parameters)
 
     @property
     def positions(self) -> FloatArray:
@@ -163,13 +167,7 @@ class Case:
         return {name.removeprefix(BODIES): values for name, values in arrays if name.startswith(BODIES)}
 
     def parameter(self, name: str) -> float:
-        """Return a parameter that is one number.
-
-        Raises
-        ------
-        KeyError
-            If the case has no parameter of that name.
-        """
+        """Return a parameter that is one number."""
         return float(self.parameters[name])
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
@@ -190,30 +188,17 @@ class Case:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> Case:
-        """Return the case whose `to_arrays` gave these arrays.
-
-        Raises
-        ------
-        KeyError
-            If an array is missing.
-        MisuseError
-            If the arrays are not those of a case.
-        """
-        interface = Interface(
-            np.asarray(arrays["nodes"], dtype=np.float64),
-            Surface(np.asarray(arrays["slave_segments"])),
-            Surface(np.asarray(arrays["master_segments"])),
-        )
-        parameters = {
-            name.removeprefix(_PREFIX): np.asarray(values, dtype=np.float64)
-            for name, values in arrays.items()
-            if name.startswith(_PREFIX)
-        }
+        """Return the case whose `to_arrays` gave these arrays; a KeyError or MisuseError says that they are damaged."""
+        slave, master = (Surface(np.asarray(arrays[f"{side}_segments"])) for side in ("slave", "master"))
         return cls(
-            interface,
+            Interface(np.asarray(arrays["nodes"], dtype=np.float64), slave, master),
             np.asarray(arrays["z"], dtype=np.float64),
             float(np.asarray(arrays["penalty"])),
-            parameters,
+            {
+                name.removeprefix(_PREFIX): np.asarray(values, dtype=np.float64)
+                for name, values in arrays.items()
+                if name.startswith(_PREFIX)
+            },
             int(np.asarray(arrays["seed"])),
             str(np.asarray(arrays["name"])),
             kind=str(np.asarray(arrays.get("kind", ""))),
@@ -253,23 +238,7 @@ class CaseSummary:
         )
 
 
-def _as_penalty(value: float) -> float:
-    penalty = np.asarray(value)
-    if penalty.shape != () or penalty.dtype.kind not in "fiu" or not 0 < penalty < np.inf:
-        raise MisuseError("penalty", f"{value!r}", "a finite number > 0")
-    return float(value)
-
-
-def _as_seed(value: int) -> int:
-    seed = np.asarray(value)
-    if seed.shape != () or seed.dtype.kind not in "iu" or not 0 <= seed < 2**63:
-        raise MisuseError("seed", f"{value!r}", "an integer from 0 to 2^63 − 1")
-    return int(value)
-
-
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-
-
 OWN_MESHES = "own meshes with a known answer"
 
 
@@ -316,13 +285,7 @@ class Cases:
 
     @classmethod
     def by_kind(cls, make: Callable[..., Mapping[str, Any] | Any]) -> Cases:
-        """Return random cases of several kinds of situation, each with the same share.
-
-        Parameters
-        ----------
-        make : Callable[..., Mapping[str, Any] | Any]
-            As in `random`, but it returns {kind: strategy}.
-        """
+        """Return random cases of several kinds of situation with the same share: `make` returns {kind: strategy}."""
         return cls(make, needs=needs_of_place(make))
 
     @classmethod
@@ -334,14 +297,7 @@ class Cases:
     ) -> Cases:
         """Return a list of cases, each with a name of its own; tables and reports call it by that name.
 
-        Parameters
-        ----------
-        make : Callable[[], tuple[Case, ...]]
-            Returns the list.
-        on_place : Callable[[Any], Any]
-            Takes an interface or a scene, and returns a strategy, or None if there are no cases.
-        needs : str
-            What an interface or a scene must be so that there are cases.
+        On an interface or a scene, which must be what `needs` says, `on_place` returns a strategy, or None.
         """
         return cls(make, is_list=True, on_place=on_place, needs=needs)
 
@@ -384,17 +340,10 @@ class _OnFaces:
 
 
 def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function]:
-    """Return a decorator that stores a name at a function that makes cases, and what it needs of an interface.
+    """Return a decorator that stores a name, which no other function has, at a function that makes cases.
 
     Properties with this function are judged on the same cases. A function without a stored name has the id of its
-    property instead.
-
-    Parameters
-    ----------
-    name : str
-        A name that no other function has.
-    needs : str
-        What an interface or a scene must be so that the function makes cases on it: "a flat interface".
+    property instead. `needs` says what an interface or a scene must be so that there are cases: "a flat interface".
     """
 
     def store(function: _Function) -> _Function:

@@ -70,9 +70,7 @@ LONGEST_FACT = 20_000  # Characters of a fact about a run, such as its command.
 _UNSEEN = re.compile(
     "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
 )
-_SPACES = frozenset(
-    "\n\u00a0\u2002\u2003\u2007\u2008\u2009\u200a\u202f"
-)  # Harmless, though Python does not print them.
+_SPACES = frozenset("\n\u00a0\u2002\u2003\u2007\u2008\u2009\u200a\u202f")  # Harmless, but Python does not print them.
 _BREAKS = re.compile(r"[ \t]*(?:\r?\n|\t)[ \t\r\n]*")
 
 
@@ -105,7 +103,12 @@ def printable(text: str) -> str:
     plain = str.__str__(text)
     if plain.replace("\n", "").isprintable() and (plain.isascii() or not _UNSEEN.search(plain)):
         return plain
-    return "".join(map(_spell_out, plain))
+    return "".join(
+        character
+        if character in _SPACES or (character.isprintable() and not _UNSEEN.match(character))
+        else character.encode("unicode_escape").decode("ascii")
+        for character in plain
+    )
 
 
 def describe_error(error: BaseException) -> str:
@@ -148,12 +151,6 @@ def refuse(argument: str, *names: str) -> None:
     for name in names:
         if name_line(name) != name:
             raise MisuseError(argument, repr(name_line(name)), f"at most {LONGEST_NAME} characters that can be shown")
-
-
-def _spell_out(character: str) -> str:
-    if character in _SPACES or (character.isprintable() and not _UNSEEN.match(character)):
-        return character
-    return character.encode("unicode_escape").decode("ascii")
 
 
 def unknown_name_error(argument: str, name: str, names: Iterable[str], otherwise: str = "") -> MisuseError:

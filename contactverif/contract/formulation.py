@@ -171,7 +171,11 @@ class Pairing(Mapping[str, NDArray[Any]]):
         return len(self._arrays)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Pairing) and self.same_as(other)
+        """Return whether names, shapes and all values agree; what is in handles is not compared."""
+        if not isinstance(other, Pairing) or self.opaque is not other.opaque:
+            return False
+        mine, others = ({name: (a.shape, a.tobytes()) for name, a in each.items()} for each in (self, other))
+        return mine == others
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -180,17 +184,9 @@ class Pairing(Mapping[str, NDArray[Any]]):
         return f"Pairing({', '.join([*entries, *(['a handle'] if self.opaque else [])])})"
 
     def check_bounds(self, interface: Interface) -> None:
-        """Check that every integer can number something of the problem: a segment, node, unknown or entry, or −1.
+        """Raise a ContractError unless every integer can number something of the problem.
 
-        Parameters
-        ----------
-        interface : Interface
-            The interface that the pairing belongs to.
-
-        Raises
-        ------
-        ContractError
-            If an integer is below −1, or larger than both the number of unknowns and the longest array of the pairing.
+        That is −1, a segment, node or unknown, or an entry of the longest array of the pairing.
         """
         lowest, highest = self._integers.min(initial=0), self._integers.max(initial=0)
         if lowest >= -1 and highest <= interface.n_unknowns:
@@ -200,26 +196,6 @@ class Pairing(Mapping[str, NDArray[Any]]):
             outlier = lowest if lowest < -1 else highest
             name = next(name for name, values in self.items() if values.dtype == _INTEGER and (values == outlier).any())
             raise ContractError(f"pair: {name!r} holds {outlier}; needed integers from −1 to {most}")
-
-    def same_as(self, other: Pairing) -> bool:
-        """Return whether names, shapes and all values agree; what is in handles is not compared."""
-        mine, others = self._arrays, other._arrays
-        return (
-            self.opaque is other.opaque
-            and mine.keys() == others.keys()
-            and all(
-                values.shape == others[name].shape and values.tobytes() == others[name].tobytes()
-                for name, values in mine.items()
-            )
-        )
-
-
-def _false() -> BoolArray:
-    return np.zeros((), dtype=np.bool_)
-
-
-def _no_shape() -> FloatArray:
-    return np.zeros(())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -290,10 +266,10 @@ class ContactPoints:
     active: BoolArray
     area_from: FloatArray
     area_to: FloatArray
-    weighted: BoolArray = field(default_factory=_false)
-    on_master: BoolArray = field(default_factory=_false)
-    slave_shape: FloatArray = field(default_factory=_no_shape)
-    master_shape: FloatArray = field(default_factory=_no_shape)
+    weighted: BoolArray = field(default_factory=lambda: np.zeros((), np.bool_))
+    on_master: BoolArray = field(default_factory=lambda: np.zeros((), np.bool_))
+    slave_shape: FloatArray = field(default_factory=lambda: np.zeros(()))
+    master_shape: FloatArray = field(default_factory=lambda: np.zeros(()))
 
     def __post_init__(self) -> None:
         n_points = len(np.atleast_1d(np.asarray(self.slave_segment)))
@@ -306,9 +282,8 @@ class ContactPoints:
                 raw = np.full((n_points, 0)[:n_axes], raw)
             values: NDArray[Any] = freeze(raw, dtype.type)
             if values.ndim != n_axes or len(values) != n_points:
-                raise MisuseError(
-                    f"ContactPoints.{name}", f"shape {values.shape}", _needed_shape(name, n_points, n_axes)
-                )
+                second = "" if n_axes == 1 else " n_corners" if name.endswith("shape") else " dim"
+                raise MisuseError(f"ContactPoints.{name}", f"shape {values.shape}", f"({n_points},{second})")
             object.__setattr__(self, name, values)
 
     @classmethod
@@ -337,12 +312,6 @@ class ContactPoints:
     def select(self, selection: BoolArray | IntArray) -> ContactPoints:
         """Return some of the points, selected by mask (n_points,) or by number."""
         return ContactPoints(**{name: getattr(self, name)[selection] for name, *_ in _COLUMNS})
-
-
-def _needed_shape(name: str, n_points: int, n_axes: int) -> str:
-    """Return the shape of a field, in words."""
-    second = "n_corners" if name.endswith("shape") else "dim"
-    return f"({n_points}, {second})" if n_axes == 2 else f"({n_points},)"
 
 
 _OF_TWO_AXES = ("position", "normal", "slave_shape", "master_shape")
@@ -525,8 +494,8 @@ def evaluate_both(plugin: Any, interface: Interface, pairing: Pairing | None, z:
     >>> residual.shape, tangent.shape
     ((24,), (24, 24))
     """
-    if callable(in_one_call := getattr(plugin, "residual_and_tangent", None)):
-        residual, tangent = in_one_call(interface, pairing, z)
+    if callable(both := getattr(plugin, "residual_and_tangent", None)):
+        residual, tangent = both(interface, pairing, z)
         return residual, tangent
     return plugin.residual(interface, pairing, z), plugin.tangent(interface, pairing, z)
 

@@ -7,123 +7,19 @@ is a face of two corners.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray, as_array, freeze
 from contactverif.contract.errors import MisuseError
 
-TRIANGLE, QUADRILATERAL = 3, 4  # Numbers of corners.
-
-
-def link_faces(faces: IntArray) -> IntArray:
-    """Check faces (n_faces, n_corners), and return the face across each edge (n_faces, n_corners), −1 at the border.
-
-    Raises
-    ------
-    MisuseError
-        If a node number is negative or occurs twice in a face, an edge belongs to three faces, or the corners of two
-        neighbours are listed the other way round.
-    """
-    _check_corners(faces)
-    n_corners = faces.shape[1]
-    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)  # (n_faces · n_corners, 2)
-    first, second = _match_edges(edges, n_corners)
-    alike = np.flatnonzero((edges[first] == edges[second]).all(axis=1))
-    if len(alike):
-        numbers = " and ".join(str(int(places[alike[0]]) // n_corners) for places in (first, second))
-        pair = f"faces {numbers}, which both run along the edge {edges[first[alike[0]]].tolist()}"
-        raise MisuseError("faces", pair, "corners counter-clockwise seen from outside the body, throughout")
-    neighbours = np.full(faces.size, -1)
-    neighbours[first], neighbours[second] = second // n_corners, first // n_corners
-    return neighbours.reshape(faces.shape)
-
-
-def _check_corners(faces: IntArray) -> None:
-    """Check that the corners of each face are node numbers, and different ones."""
-    if faces.min() < 0:
-        raise MisuseError("faces", f"node number {faces.min()}", "node numbers ≥ 0")
-    twice = np.flatnonzero((np.diff(np.sort(faces, axis=1), axis=1) == 0).any(axis=1))
-    if len(twice):
-        corners = faces[twice[0]].tolist()
-        raise MisuseError("faces", f"face {twice[0]} with the corners {corners}", "different corners")
-
-
-def _match_edges(edges: IntArray, n_corners: int) -> tuple[IntArray, IntArray]:
-    """Return the places of both edges of each pair that has the same two nodes, of edges (n_faces · n_corners, 2)."""
-    keys, number, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    number = number.reshape(-1)
-    crowded = np.flatnonzero(counts > 2)
-    if len(crowded):
-        owners = np.flatnonzero(number == crowded[0]) // n_corners
-        those = f"faces {', '.join(map(str, owners[:4]))} on the edge {keys[crowded[0]].tolist()}"
-        raise MisuseError("faces", those, "a surface: at most two faces on an edge")
-    order = np.argsort(number, kind="stable")
-    matched = np.flatnonzero(number[order[1:]] == number[order[:-1]])
-    return order[matched], order[matched + 1]
-
-
-def measure_faces(corners: FloatArray) -> FloatArray:
-    """Return the areas (n_faces,) of faces with corners (n_faces, n_corners, 3); a quadrilateral is a bilinear face."""
-    if corners.shape[1] == TRIANGLE:
-        areas: FloatArray = np.linalg.norm(turns_of(corners)[:, 0], axis=1) / 2
-        return areas
-    # Where the face is flat, its Jacobian is linear in either coordinate, and the rule is exact. Else it is smooth.
-    places, weights = np.polynomial.legendre.leggauss(4)
-    areas = np.zeros(len(corners))
-    for s, weight_s in zip(places, weights, strict=True):
-        for t, weight_t in zip(places, weights, strict=True):
-            along_s = np.array([t - 1, 1 - t, 1 + t, -1 - t]) / 4
-            along_t = np.array([s - 1, -1 - s, 1 + s, 1 - s]) / 4
-            tangents = [np.einsum("a,fai->fi", shares, corners) for shares in (along_s, along_t)]
-            areas += weight_s * weight_t * np.linalg.norm(np.cross(*tangents), axis=1)
-    return areas
-
-
-def measure_heights(corners: FloatArray) -> FloatArray:
-    """Return the least distance (n_faces,) of a corner from an edge of its face that does not end there."""
-    n_corners = corners.shape[1]
-    heights = np.full(len(corners), np.inf)
-    for edge in range(n_corners):
-        start, run = corners[:, edge], corners[:, (edge + 1) % n_corners] - corners[:, edge]
-        for corner in range(n_corners):
-            if corner not in (edge, (edge + 1) % n_corners):
-                across = np.cross(run, corners[:, corner] - start)
-                heights = np.minimum(heights, np.linalg.norm(across, axis=1) / np.linalg.norm(run, axis=1))
-    return heights
-
-
-def turns_of(corners: FloatArray) -> FloatArray:
-    """Return the cross products (n_faces, n_corners, 3) of the edge after each corner and the one before, reversed."""
-    following, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
-    turns: FloatArray = np.cross(following - corners, before - corners)
-    return turns
-
-
-def check_faces(name: str, corners: FloatArray) -> None:
-    """Check that faces with corners (n_faces, n_corners, 3) have an area and no corner that points inwards.
-
-    Raises
-    ------
-    MisuseError
-        If a face has no area, or a quadrilateral is not convex along its normal.
-    """
-    turns = turns_of(corners)
-    normals = turns.sum(axis=1)
-    flat = np.flatnonzero(~normals.any(axis=1))
-    if len(flat):
-        raise MisuseError(name, f"face {flat[0]} of no area", "corners that do not lie on one line")
-    dented = np.flatnonzero((np.einsum("fci,fi->fc", turns, normals) <= 0).any(axis=1))
-    if len(dented):
-        dent = f"face {dented[0]}, a quadrilateral that is not convex"
-        raise MisuseError(name, dent, "four corners that point outwards")
-
-
+SEGMENT, TRIANGLE, QUADRILATERAL = 2, 3, 4  # Numbers of corners.
 PLANE, SPACE = 2, 3  # Numbers of coordinates.
-SEGMENT = 2  # The number of corners of a segment.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,52 +103,33 @@ class Surface:
         return self.faces
 
     def lengths(self, nodes: FloatArray) -> FloatArray:
-        """Return the lengths of the segments.
-
-        Parameters
-        ----------
-        nodes : FloatArray, shape (n_nodes, dim)
-            The positions of all nodes of the interface, reference or current.
-
-        Returns
-        -------
-        FloatArray, shape (n_segments,)
-            The lengths, in the unit of the positions.
-        """
+        """Return the lengths (n_segments,) at reference or current positions (n_nodes, dim)."""
         ends = nodes[self.segments]  # (n_segments, 2, dim)
         along = ends[:, 1] - ends[:, 0]
         lengths: FloatArray = np.sqrt((along * along).sum(axis=-1))
         return lengths
 
     def measures(self, nodes: FloatArray) -> FloatArray:
-        """Return the lengths of segments, or the areas of faces; a quadrilateral is bilinear.
-
-        Parameters
-        ----------
-        nodes : FloatArray, shape (n_nodes, dim)
-            The positions of all nodes of the interface, reference or current.
-
-        Returns
-        -------
-        FloatArray, shape (n_faces,)
-            The lengths or areas, in the unit of the positions or its square.
-        """
-        return self.lengths(nodes) if self.faces.shape[1] == SEGMENT else measure_faces(nodes[self.faces])
+        """Return the lengths of segments, or the areas of faces (n_faces,); a quadrilateral is bilinear."""
+        corners = nodes[self.faces]
+        if self.faces.shape[1] == SEGMENT:
+            return self.lengths(nodes)
+        if self.faces.shape[1] == TRIANGLE:
+            triangles: FloatArray = np.linalg.norm(turns_of(corners)[:, 0], axis=1) / 2
+            return triangles
+        # Where the face is flat, its Jacobian is linear in either coordinate, and the rule is exact. Else it is smooth.
+        points, weights = np.polynomial.legendre.leggauss(4)
+        areas = np.zeros(len(corners))
+        for s, weight_s in zip(points, weights, strict=True):
+            for t, weight_t in zip(points, weights, strict=True):
+                along_s = np.array([t - 1, 1 - t, 1 + t, -1 - t]) / 4
+                along_t = np.array([s - 1, -1 - s, 1 + s, 1 - s]) / 4
+                tangents = [np.einsum("a,fai->fi", shares, corners) for shares in (along_s, along_t)]
+                areas += weight_s * weight_t * np.linalg.norm(np.cross(*tangents), axis=1)
+        return areas
 
     def heights(self, nodes: FloatArray) -> FloatArray:
-        """Return the lengths of segments, or the least heights of faces.
-
-        Parameters
-        ----------
-        nodes : FloatArray, shape (n_nodes, dim)
-            The positions of all nodes of the interface, reference or current.
-
-        Returns
-        -------
-        FloatArray, shape (n_faces,)
-            The least distance of a corner from an edge of its face that does not end there, in the unit of the
-            positions.
-        """
+        """Return the lengths of segments, or for each face the least distance of a corner from an edge (n_faces,)."""
         return self.lengths(nodes) if self.faces.shape[1] == SEGMENT else measure_heights(nodes[self.faces])
 
 
@@ -301,31 +178,35 @@ class Interface:
     master: Surface
 
     def __post_init__(self) -> None:
-        for name, surface in (("slave", self.slave), ("master", self.master)):
+        sides = {"slave": self.slave, "master": self.master}
+        for name, surface in sides.items():
             if not isinstance(surface, Surface):
                 raise MisuseError(name, f"a {type(surface).__name__}", "a Surface")
-        nodes = _check_nodes(self.nodes)
-        for name, surface in (("slave", self.slave), ("master", self.master)):
+        raw = as_array("nodes", self.nodes)
+        if raw.ndim != 2 or raw.shape[1] not in (PLANE, SPACE):
+            needed = "shape (n_nodes, 2), or (n_nodes, 3) in space"
+            raise MisuseError("nodes", f"an array of shape {raw.shape}", needed)
+        if raw.dtype.kind not in "fiu":
+            raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
+        nodes = freeze(raw, np.float64)
+        if not np.isfinite(nodes).all():
+            bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))[0]
+            raise MisuseError("nodes", f"node {bad} at {tuple(nodes[bad].tolist())}", "finite coordinates")
+        for name, surface in sides.items():
             if (surface.faces.shape[1] == SEGMENT) != (nodes.shape[1] == PLANE):
                 corners = f"faces of {surface.faces.shape[1]} corners and nodes with {nodes.shape[1]} coordinates"
                 raise MisuseError(name, corners, "segments in the plane, triangles or quadrilaterals in space")
         object.__setattr__(self, "nodes", nodes)
-        used_slave, used_master = self.slave.nodes, self.master.nodes
-        n_slave = len(used_slave)
-        if used_slave[-1] != n_slave - 1:  # The numbers of a surface are different, ascending and ≥ 0.
-            raise MisuseError(
-                "slave",
-                f"nodes {_abbreviate(used_slave)}",
-                f"the first node numbers, 0 … {n_slave - 1}, each used",
-            )
-        if used_master[0] != n_slave or not n_slave + len(used_master) == len(nodes) == used_master[-1] + 1:
-            raise MisuseError(
-                "master",
-                f"nodes {_abbreviate(used_master)}",
-                f"all node numbers behind the slave's, {n_slave} … {len(nodes) - 1}, each used",
-            )
-        _check_positions("slave", self.slave, nodes)
-        _check_positions("master", self.master, nodes)
+        of_slave, of_master = self.slave.nodes, self.master.nodes
+        n_slave = len(of_slave)
+        if of_slave[-1] != n_slave - 1:  # The numbers of a surface are different, ascending and ≥ 0.
+            needed = f"the first node numbers, 0 … {n_slave - 1}, each used"
+            raise MisuseError("slave", f"nodes {_abbreviate(of_slave)}", needed)
+        if of_master[0] != n_slave or not n_slave + len(of_master) == len(nodes) == of_master[-1] + 1:
+            needed = f"all node numbers behind the slave's, {n_slave} … {len(nodes) - 1}, each used"
+            raise MisuseError("master", f"nodes {_abbreviate(of_master)}", needed)
+        for name, surface in sides.items():
+            _check_positions(name, surface, nodes)
 
     @classmethod
     def from_chains(cls, slave: ArrayLike, master: ArrayLike) -> Interface:
@@ -346,12 +227,8 @@ class Interface:
         MisuseError
             If the points form no such chain.
         """
-        points = [as_array(name, side) for name, side in (("slave", slave), ("master", master))]
-        for name, side in zip(("slave", "master"), points, strict=True):
-            if side.ndim != 2 or side.shape[1] != 2 or len(side) < 2:
-                raise MisuseError(name, f"an array of shape {side.shape}", "shape (n ≥ 2, 2), the points of a chain")
-        n_slave, n_master = map(len, points)
-        numbers = np.arange(n_slave + n_master)
+        points = _as_points({"slave": slave, "master": master}, PLANE, 2, "shape (n ≥ 2, 2), the points of a chain")
+        n_slave, numbers = len(points[0]), np.arange(sum(map(len, points)))
         segments = np.column_stack([numbers[:-1], numbers[1:]])
         return cls(np.vstack(points), Surface(segments[: n_slave - 1]), Surface(segments[n_slave:]))
 
@@ -392,10 +269,7 @@ class Interface:
         >>> interface.dim, interface.master.faces.tolist(), interface.slave.measures(interface.nodes).tolist()
         (3, [[3, 4, 5]], [0.5])
         """
-        points = [as_array(name, side) for name, side in (("slave", slave), ("master", master))]
-        for name, side in zip(("slave", "master"), points, strict=True):
-            if side.ndim != 2 or side.shape[1] != 3:
-                raise MisuseError(name, f"an array of shape {side.shape}", "shape (n_points, 3)")
+        points = _as_points({"slave": slave, "master": master}, SPACE, 0, "shape (n_points, 3)")
         corners = as_array("master_faces", master_faces)
         return cls(np.vstack(points), Surface(as_array("slave_faces", slave_faces)), Surface(corners + len(points[0])))
 
@@ -430,12 +304,8 @@ class Interface:
     def swap_roles(self) -> Interface:
         """Return the interface with the roles of slave and master exchanged; nodes are renumbered, slave first."""
         n_slave = self.n_slave_nodes
-        n_master = self.n_nodes - n_slave
-        return Interface(
-            np.vstack([self.nodes[n_slave:], self.nodes[:n_slave]]),
-            Surface(self.master.faces - n_slave),
-            Surface(self.slave.faces + n_master),
-        )
+        slave, master = Surface(self.master.faces - n_slave), Surface(self.slave.faces + self.n_nodes - n_slave)
+        return Interface(np.vstack([self.nodes[n_slave:], self.nodes[:n_slave]]), slave, master)
 
     def at(self, nodes: ArrayLike) -> Interface:
         """Return the interface with the same faces on other reference positions, shape (n_nodes, dim)."""
@@ -446,10 +316,18 @@ def _link(data: bytes, n_corners: int) -> list[IntArray]:
     """Check the faces (n_faces, n_corners) whose bytes are given; return neighbours, chain order and starts, nodes."""
     faces = np.frombuffer(data, np.int64).reshape(-1, n_corners)
     if n_corners == SEGMENT:
-        arrays = _link_segments(faces)
+        _check_chains(faces)
+        nodes, ends = np.unique(faces, return_inverse=True)
+        first, second = ends.reshape(faces.shape).T  # Node numbers without gaps.
+        starting, ending = (np.full(len(nodes), -1) for _ in range(2))
+        starting[first] = ending[second] = np.arange(len(faces))
+        neighbours = np.column_stack([ending[first], starting[second]])  # −1 at a free end.
+        order = _chain_order(neighbours)
+        starts = np.flatnonzero(np.append(True, neighbours[order[:-1], 1] != order[1:]))
+        arrays = [neighbours, order, starts, nodes]
     else:
         none = np.zeros(0, np.int64)
-        arrays = [link_faces(faces), none, none, np.unique(faces)]
+        arrays = [_link_faces(faces), none, none, np.unique(faces)]
     return [freeze(array, np.int64) for array in arrays]
 
 
@@ -457,39 +335,51 @@ _SMALL = 128  # Number of node numbers of a surface that is remembered: random m
 _link_small = lru_cache(maxsize=1024)(_link)
 
 
-def _link_segments(segments: IntArray) -> list[IntArray]:
-    """Check segments (n_segments, 2); return neighbours, chain order and starts, and nodes, as `Surface` has them."""
-    _check_chains(segments)
-    nodes, ends = np.unique(segments, return_inverse=True)
-    first, second = ends.reshape(segments.shape).T  # Node numbers without gaps.
-    starting, ending = (np.full(len(nodes), -1) for _ in range(2))
-    starting[first] = ending[second] = np.arange(len(segments))
-    neighbours = np.column_stack([ending[first], starting[second]])  # −1 at a free end.
-    order = _chain_order(neighbours)
-    starts = np.flatnonzero(np.append(True, neighbours[order[:-1], 1] != order[1:]))
-    return [neighbours, order, starts, nodes]
+def _link_faces(faces: IntArray) -> IntArray:
+    """Check faces (n_faces, n_corners) in space, and return the face across each edge, −1 at the border."""
+    n_corners = faces.shape[1]
+    if faces.min() < 0:
+        raise MisuseError("faces", f"node number {faces.min()}", "node numbers ≥ 0")
+    twice = np.flatnonzero((np.diff(np.sort(faces, axis=1), axis=1) == 0).any(axis=1))
+    if len(twice):
+        corners = faces[twice[0]].tolist()
+        raise MisuseError("faces", f"face {twice[0]} with the corners {corners}", "different corners")
+    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)  # (n_faces · n_corners, 2)
+    keys, number, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    number = number.reshape(-1)
+    crowded = np.flatnonzero(counts > 2)
+    if len(crowded):
+        owners = np.flatnonzero(number == crowded[0]) // n_corners
+        those = f"faces {', '.join(map(str, owners[:4]))} on the edge {keys[crowded[0]].tolist()}"
+        raise MisuseError("faces", those, "a surface: at most two faces on an edge")
+    order = np.argsort(number, kind="stable")
+    matched = np.flatnonzero(number[order[1:]] == number[order[:-1]])
+    first, second = order[matched], order[matched + 1]  # Both edges between the same two nodes.
+    alike = np.flatnonzero((edges[first] == edges[second]).all(axis=1))
+    if len(alike):
+        numbers = " and ".join(str(int(owners[alike[0]]) // n_corners) for owners in (first, second))
+        pair = f"faces {numbers}, which both run along the edge {edges[first[alike[0]]].tolist()}"
+        raise MisuseError("faces", pair, "corners counter-clockwise seen from outside the body, throughout")
+    neighbours = np.full(faces.size, -1)
+    neighbours[first], neighbours[second] = second // n_corners, first // n_corners
+    return neighbours.reshape(faces.shape)
 
 
 def _check_chains(segments: IntArray) -> None:
-    """Check that node numbers and connections are those of chains."""
     if segments.min() < 0:
         raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
     loops = np.flatnonzero(segments[:, 0] == segments[:, 1])
     if len(loops):
-        segment = loops[0]
-        node = segments[segment, 0]
-        raise MisuseError("segments", f"segment {segment} that begins and ends at node {node}", "two nodes")
+        found = f"segment {loops[0]} that begins and ends at node {segments[loops[0], 0]}"
+        raise MisuseError("segments", found, "two nodes")
     for end, verb in ((0, "begin"), (1, "end")):
         numbers = np.sort(segments[:, end])
         if (numbers[1:] == numbers[:-1]).any():
             numbers, counts = np.unique(numbers, return_counts=True)
             node = numbers[np.argmax(counts)]
             meeting = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
-            raise MisuseError(
-                "segments",
-                f"segments {meeting} that all {verb} at node {node}",
-                "chains: a node begins at most one segment and ends at most one (body on the left throughout)",
-            )
+            needed = "chains: a node begins at most one segment and ends at most one (body on the left throughout)"
+            raise MisuseError("segments", f"segments {meeting} that all {verb} at node {node}", needed)
 
 
 def _chain_order(neighbours: IntArray) -> IntArray:
@@ -509,44 +399,60 @@ def _chain_order(neighbours: IntArray) -> IntArray:
     return np.array(order, dtype=np.int64)
 
 
-def _check_nodes(values: ArrayLike) -> FloatArray:
-    """Return reference positions (n_nodes, 2 or 3), checked and read-only."""
-    raw = as_array("nodes", values)
-    if raw.ndim != 2 or raw.shape[1] not in (PLANE, SPACE):
-        raise MisuseError("nodes", f"an array of shape {raw.shape}", "shape (n_nodes, 2), or (n_nodes, 3) in space")
-    if raw.dtype.kind not in "fiu":
-        raise MisuseError("nodes", f"dtype {raw.dtype}", "real numbers")
-    nodes = freeze(raw, np.float64)
-    if not np.isfinite(nodes).all():
-        bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))[0]
-        raise MisuseError("nodes", f"node {bad} at {tuple(nodes[bad].tolist())}", "finite coordinates")
-    return nodes
-
-
 def _check_positions(name: str, surface: Surface, nodes: FloatArray) -> None:
     """Check that the segments of a surface have a length, or its faces an area, and its nodes a place of their own."""
-    used = surface.nodes
+    used, corners = surface.nodes, nodes[surface.faces]
     if surface.faces.shape[1] != SEGMENT:
-        check_faces(name, nodes[surface.faces])
+        turns = turns_of(corners)
+        normals = turns.sum(axis=1)
+        flat = np.flatnonzero(~normals.any(axis=1))
+        if len(flat):
+            raise MisuseError(name, f"face {flat[0]} of no area", "corners that do not lie on one line")
+        dented = np.flatnonzero((np.einsum("fci,fi->fc", turns, normals) <= 0).any(axis=1))
+        if len(dented):
+            dent = f"face {dented[0]}, a quadrilateral that is not convex"
+            raise MisuseError(name, dent, "four corners that point outwards")
     if len(set(map(tuple, nodes[used].tolist()))) == len(used):
         return
-    ends = nodes[surface.faces]
-    zero = np.flatnonzero((ends[:, 0] == ends[:, 1]).all(axis=1))
+    zero = np.flatnonzero((corners[:, 0] == corners[:, 1]).all(axis=1))
     if len(zero):
         raise MisuseError(name, f"segment {zero[0]} of zero length", "two different end positions")
     _, first, counts = np.unique(nodes[used], axis=0, return_index=True, return_counts=True)
     place = nodes[used[first[np.argmax(counts)]]]
-    twins = used[(nodes[used] == place).all(axis=1)]
-    raise MisuseError(
-        name,
-        f"coincident nodes {_abbreviate(twins)} at {tuple(place.tolist())}",
-        "one node a place on each surface (merge them, or move one)",
-    )
+    twins = f"coincident nodes {_abbreviate(used[(nodes[used] == place).all(axis=1)])} at {tuple(place.tolist())}"
+    raise MisuseError(name, twins, "one node a place on each surface (merge them, or move one)")
 
 
 def _abbreviate(numbers: IntArray) -> str:
-    listed = ", ".join(map(str, numbers[:5].tolist()))
-    return listed + (", …" if len(numbers) > 5 else "")
+    return ", ".join(map(str, numbers[:5].tolist())) + (", …" if len(numbers) > 5 else "")
+
+
+def _as_points(sides: Mapping[str, ArrayLike], dim: int, least: int, needed: str) -> list[NDArray[Any]]:
+    arrays = {name: as_array(name, values) for name, values in sides.items()}
+    for name, points in arrays.items():
+        if points.ndim != 2 or points.shape[1] != dim or len(points) < least:
+            raise MisuseError(name, f"an array of shape {points.shape}", needed)
+    return [*arrays.values()]
+
+
+def measure_heights(corners: FloatArray) -> FloatArray:
+    """Return the least distance (n_faces,) of a corner from an edge of its face that does not end there."""
+    n_corners = corners.shape[1]
+    heights = np.full(len(corners), np.inf)
+    for edge in range(n_corners):
+        start, run = corners[:, edge], corners[:, (edge + 1) % n_corners] - corners[:, edge]
+        for corner in range(n_corners):
+            if corner not in (edge, (edge + 1) % n_corners):
+                across = np.cross(run, corners[:, corner] - start)
+                heights = np.minimum(heights, np.linalg.norm(across, axis=1) / np.linalg.norm(run, axis=1))
+    return heights
+
+
+def turns_of(corners: FloatArray) -> FloatArray:
+    """Return the cross products (n_faces, n_corners, 3) of the edge after each corner and the one before, reversed."""
+    following, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
+    turns: FloatArray = np.cross(following - corners, before - corners)
+    return turns
 
 
 def split_states(interface: Interface, z: Array) -> tuple[Array, Array]:
@@ -584,8 +490,17 @@ def ways_to_master(interface: Interface) -> tuple[FloatArray, FloatArray]:
     Nodes look along the mean normal of the slave; around a ring each looks along its own. The way is a length, negative
     where the node is inside the master, and infinite where the node does not see the master.
     """
-    directions = _directions(interface)
-    pairs = zip(interface.nodes[: interface.n_slave_nodes], directions, strict=True)
+    surface, nodes, n_slave = interface.slave, interface.nodes, interface.n_slave_nodes
+    mean, directions = mean_normal(surface, nodes), np.zeros((n_slave, 2))
+    if np.hypot(*mean) > ONE_SIDED:
+        directions[:] = mean / np.hypot(*mean)
+    else:
+        along = np.diff(nodes[surface.segments], axis=1)[:, 0]
+        for end in surface.segments.T:
+            np.add.at(directions, end, np.column_stack([along[:, 1], -along[:, 0]]))
+        lengths = np.hypot(*directions.T)[:, None]
+        directions /= np.where(lengths > 0, lengths, 1.0)
+    pairs = zip(nodes[:n_slave], directions, strict=True)
     return np.array([_way_along(interface, point, direction) for point, direction in pairs]), directions
 
 
@@ -594,21 +509,6 @@ def mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray:
     along = np.diff(nodes[surface.segments], axis=1)[:, 0]
     normal: FloatArray = np.array([along[:, 1].sum(), -along[:, 0].sum()]) / np.hypot(*along.T).sum()
     return normal
-
-
-def _directions(interface: Interface) -> FloatArray:
-    """Return the unit vector (n_slave_nodes, 2) out of the slave along which each of its nodes looks."""
-    surface, nodes = interface.slave, interface.nodes
-    mean, normals = mean_normal(surface, nodes), np.zeros((interface.n_slave_nodes, 2))
-    if np.hypot(*mean) > ONE_SIDED:
-        normals[:] = mean / np.hypot(*mean)
-        return normals
-    along = np.diff(nodes[surface.segments], axis=1)[:, 0]
-    for end in surface.segments.T:
-        np.add.at(normals, end, np.column_stack([along[:, 1], -along[:, 0]]))
-    lengths = np.hypot(*normals.T)[:, None]
-    normals /= np.where(lengths > 0, lengths, 1.0)
-    return normals
 
 
 def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -> float:

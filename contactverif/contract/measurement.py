@@ -49,13 +49,7 @@ class Quantity:
         clean(self, lines=("tolerance", "reason"))
 
     def check(self, value: float, tolerance: float) -> CheckedNumber:
-        """Return a value of this quantity beside its tolerance.
-
-        Parameters
-        ----------
-        value, tolerance : float
-            Both in the unit of the quantity. A NaN value is a failure.
-        """
+        """Return a value of this quantity beside its tolerance, both in its unit. A NaN value is a failure."""
         return CheckedNumber(self, float(value), float(tolerance))
 
 
@@ -187,14 +181,6 @@ class Measurement:
 def check_all(
     values: Mapping[Quantity, float], tolerance: Mapping[Quantity, float] | float
 ) -> tuple[CheckedNumber, ...]:
-    """Return values beside one tolerance, or each beside its own; tolerances of what has no value play no part.
-
-    Parameters
-    ----------
-    values : Mapping[Quantity, float]
-        {quantity: value}, each in its unit.
-    tolerance : Mapping[Quantity, float] | float
-        {quantity: tolerance}, or one number for all.
-    """
+    """Return values beside one tolerance, or each beside its own; tolerances of what has no value play no part."""
     each = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(values, tolerance)
     return tuple(quantity.check(value, each[quantity]) for quantity, value in values.items())

@@ -52,9 +52,8 @@ class Verdict(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
+DECIDED = frozenset({Verdict.PASS, Verdict.FAIL, Verdict.CRASHED})  # The verdicts that count as judged.
 Measure = Callable[[Case, Subject], Measurement]
-
-
 Role = Literal["", "foundation", "exact", "comparison"]
 
 
@@ -242,25 +241,21 @@ class Property(PropertyInfo):
 
     def refusal(self, traits: Traits) -> str:
         """Return why the property is not asked of a formulation of these traits, or an empty string."""
-        if not traits.abilities.in_plane and (reason := self._refuse_in_space(traits)):
-            return reason
-        if traits.rules.enforcement in self.asks:
-            if traits.rules.enforcement == "barrier" and traits.rules.activation is None:
+        enforcement = traits.rules.enforcement
+        if not traits.abilities.in_plane:
+            if self.cases_in_space is None:
+                return "the interfaces are plane, and the formulation takes none of them"
+            if TRIANGLE not in traits.abilities.faces and not self.cases_in_space.takes_faces:
+                return "the interfaces in space are of triangles, and the formulation takes none of them"
+            if enforcement == "barrier":
+                return "the states in space penetrate, where a barrier is not defined"
+        if enforcement in self.asks:
+            if enforcement == "barrier" and traits.rules.activation is None:
                 return "the barrier does not state the trait `activation`, so no gap is known"
             return self.applicable(traits)
-        if traits.rules.enforcement == "barrier" and "penalty" in self.asks:
+        if enforcement == "barrier" and "penalty" in self.asks:
             return "the states penetrate, where a barrier is not defined"
-        return f"the enforcement is by a {traits.rules.enforcement}"
-
-    def _refuse_in_space(self, traits: Traits) -> str:
-        """Return why there is no case in space for a formulation of these traits, or an empty string."""
-        if self.cases_in_space is None:
-            return "the interfaces are plane, and the formulation takes none of them"
-        if TRIANGLE not in traits.abilities.faces and not self.cases_in_space.takes_faces:
-            return "the interfaces in space are of triangles, and the formulation takes none of them"
-        if traits.rules.enforcement == "barrier":
-            return "the states in space penetrate, where a barrier is not defined"
-        return ""
+        return f"the enforcement is by a {enforcement}"
 
     def __reduce__(self) -> str | tuple[Any, ...]:
         # The name of a decorated function is that of the property, so the function itself cannot be pickled by it.
@@ -324,13 +319,7 @@ class Outcome:
 
     @property
     def case(self) -> Case:
-        """The case itself.
-
-        Raises
-        ------
-        MisuseError
-            If only the summary of the case was stored.
-        """
+        """The case itself; a MisuseError says that only its summary was stored."""
         if not isinstance(self.case_or_summary, Case):
             needed = "a counterexample; of all other cases a report stores no more than that"
             raise MisuseError("case", "the summary of a case", needed)
@@ -343,27 +332,15 @@ class Outcome:
         return CaseSummary.from_case(case) if isinstance(case, Case) else case
 
 
-DECIDED = frozenset({Verdict.PASS, Verdict.FAIL, Verdict.CRASHED})  # The verdicts that count as judged.
-
-
 def checked_numbers(info: PropertyInfo, measurement: Measurement | None) -> tuple[CheckedNumber, ...]:
     """Return the measured numbers beside their tolerances, in the order of the quantities."""
     by_name = {number.quantity.name: number for number in measurement.numbers} if measurement is not None else {}
-    return tuple(
-        quantity.check(by_name[quantity.name].value, by_name[quantity.name].tolerance)
-        for quantity in info.quantities
-        if quantity.name in by_name
-    )
+    pairs = [(quantity, by_name[quantity.name]) for quantity in info.quantities if quantity.name in by_name]
+    return tuple(quantity.check(number.value, number.tolerance) for quantity, number in pairs)
 
 
 def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
-    """Return the verdict on a measurement, with its reason if it is no pass.
-
-    Raises
-    ------
-    ValueError
-        If a value is measured that the property does not declare.
-    """
+    """Return the verdict on a measurement, with its reason if it is no pass."""
     strangers = measurement.values.keys() - {quantity.name for quantity in info.quantities}
     if strangers:
         raise ValueError(f"{info.id} measured {sorted(strangers)}, which it does not declare as quantities")
@@ -372,7 +349,11 @@ def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
         if not isfinite(number.value):
             return Verdict.FAIL, f"{number.quantity.name} is {number.value}"
     failures = [measurement.broken] if measurement.broken else []
-    failures += [_failure(number) for number in numbers if isfinite(number.tolerance) and number.ratio > 1]
+    failures += [
+        f"{number.quantity.name} {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}"
+        for number in numbers
+        if isfinite(number.tolerance) and number.ratio > 1
+    ]
     if measurement.undecided and (failures or not numbers):
         return Verdict.UNDECIDED, measurement.undecided
     if failures:
@@ -384,13 +365,7 @@ def judge(info: PropertyInfo, measurement: Measurement) -> tuple[Verdict, str]:
 
 
 def judge_stored(info: PropertyInfo, outcome: Outcome) -> Outcome:
-    """Return an outcome with the verdict that follows from its numbers; one without numbers is returned as it is.
-
-    Raises
-    ------
-    ValueError
-        If the numbers are none of this property.
-    """
+    """Return an outcome with the verdict that follows from its numbers; one without numbers is returned as it is."""
     measurement = outcome.measurement
     if measurement is None:
         return outcome
@@ -400,11 +375,6 @@ def judge_stored(info: PropertyInfo, outcome: Outcome) -> Outcome:
     if (verdict, reason, False) == (outcome.verdict, outcome.reason, outcome.breach):
         return outcome
     return replace(outcome, verdict=verdict, reason=reason, breach=False)
-
-
-def _failure(number: CheckedNumber) -> str:
-    quantity = number.quantity
-    return f"{quantity.name} {number.value:.3g}, {quantity.sense} {number.tolerance:.3g}"
 
 
 class Outcomes(Sequence[Outcome]):

@@ -3,9 +3,8 @@
 The annotations of the fields are the declaration: nothing else says how an `Outcome` or any other result is stored.
 
     form, numbers = encode(outcome)            # (((), '', 'inside'), 1, …), [2.0, 1.0, 0.25, …]
-    outcome = decode(Outcome, form, numbers)   # ValueError unless both fit the declaration, and each other
-    read = decoder(Outcome, form)              # The same for many outcomes of one form: it is checked once.
-    outcome = read(numbers)
+    read = decoder(Outcome, form)              # ValueError unless the form fits the declaration; checked once for many
+    outcome = read(numbers)                    # ValueError unless the numbers fit the form
 
 The form is a nested tuple of words, truths, whole numbers and None: all that outcomes have in common. It can be
 hashed, so that a store keeps it once, and written as JSON or MessagePack, from which it may come back as lists. The
@@ -48,13 +47,11 @@ def encode(record: Any) -> tuple[Form, list[float]]:
     return _codec_of(kind).write(record, numbers), numbers
 
 
-def decode(kind: type[_Record], form: Sequence[Any], numbers: Sequence[float]) -> _Record:
-    """Return the record of which `encode` made a form and numbers; a ValueError says that they are damaged."""
-    return decoder(kind, form)(numbers)
-
-
 def decoder(kind: type[_Record], form: Sequence[Any]) -> Callable[[Sequence[float]], _Record]:
-    """Return the function that makes a record of its numbers, where many have one form; see `decode`."""
+    """Return the function that makes a record of its numbers, where many may have one form.
+
+    A ValueError says that form or numbers are damaged.
+    """
     hint: Any = kind
     try:
         read_record = _codec_of(hint).bind(form)
@@ -72,11 +69,6 @@ def decoder(kind: type[_Record], form: Sequence[Any]) -> Callable[[Sequence[floa
         return record
 
     return read
-
-
-def part_of(kind: type, form: Sequence[Any], name: str) -> Any:
-    """Return the form of one field of a record: that of the measurement is None where nothing was measured."""
-    return form[_record_codec(kind)[1].index(name)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,31 +97,21 @@ def _codec_of(hint: Any) -> _Codec:
     if hint in _LEAVES:
         return _LEAVES[hint]
     if is_dataclass(hint):
-        kind: Any = hint
-        return _record_codec(kind)[0]
+        return _record_codec(hint)
     if isinstance(hint, type) and issubclass(hint, Enum):
         return _constant(hint, lambda value: value.value)
     return _OF_ORIGINS[get_origin(hint)](*get_args(hint))
 
 
-def _stored_hints(kind: Any) -> dict[str, Any]:
-    """Return {name of a field: annotation} of the arguments of a dataclass."""
-    hints = get_type_hints(kind, include_extras=True)
-    return {field.name: hints[field.name] for field in fields(kind) if field.init}
-
-
-def _part_codec(hint: Any, name: str) -> tuple[Callable[[Any], Any], _Codec]:
-    """Return what gets the value of a field that is stored, and its codec."""
-    for mark in getattr(hint, "__metadata__", ()):
-        if isinstance(mark, StoredAs):
-            return attrgetter(mark.attribute), _codec_of(mark.kind)
-    return attrgetter(name), _codec_of(get_args(hint)[0] if get_origin(hint) is Annotated else hint)
-
-
-@cache
-def _record_codec(kind: Any) -> tuple[_Codec, list[str]]:
-    """Return the codec of a dataclass, and the names of its fields that have a form, in the order of its form."""
-    parts = [(name, *_part_codec(hint, name)) for name, hint in _stored_hints(kind).items()]
+def _record_codec(kind: Any) -> _Codec:
+    """Return the codec of a dataclass: the form is those of the arguments of its constructor that have one."""
+    hints, parts = get_type_hints(kind, include_extras=True), []
+    for name in [field.name for field in fields(kind) if field.init]:
+        attribute, hint = name, hints[name]
+        if get_origin(hint) is Annotated:
+            (mark,) = hint.__metadata__
+            attribute, hint = mark.attribute, mark.kind
+        parts.append((name, attrgetter(attribute), _codec_of(hint)))
     names = [name for name, _, codec in parts if codec.has_form]
     writers = [(getter, codec.write, codec.has_form) for _, getter, codec in parts]
 
@@ -152,11 +134,7 @@ def _record_codec(kind: Any) -> tuple[_Codec, list[str]]:
         pairs = list(readers.items())
         return lambda rest: kind(**words, **{name: reader(rest) for name, reader in pairs})
 
-    return _Codec(write, bind, has_numbers=any(codec.has_numbers for _, _, codec in parts)), names
-
-
-def _literal_codec(*words: str) -> _Codec:
-    return _constant(lambda form: _check(form, form in words))
+    return _Codec(write, bind, has_numbers=any(codec.has_numbers for _, _, codec in parts))
 
 
 def _optional_codec(*hints: Any) -> _Codec:
@@ -169,11 +147,10 @@ def _optional_codec(*hints: Any) -> _Codec:
         form = codec.write(value, numbers)
         return form if codec.has_form else True
 
-    return _Codec(
-        write,
-        lambda form: (lambda _: None) if form is None else codec.bind(form),
-        has_numbers=codec.has_numbers,
-    )
+    def bind(form: Any) -> _Reader:
+        return (lambda _: None) if form is None else codec.bind(form)
+
+    return _Codec(write, bind, has_numbers=codec.has_numbers)
 
 
 def _array_codec(_: Any, dtype_hint: Any) -> _Codec:
@@ -246,23 +223,23 @@ def _check_length(form: Any) -> Any:
     return _check(form, type(form) is int and form >= 0)
 
 
-def _write_number(value: Any, numbers: list[float]) -> None:
-    numbers.append(float(value))
-
-
 def _read_int(rest: Iterator[float]) -> int:
     number = next(rest)
     return int(_check(number, number.is_integer()))
 
 
+def _number(reader: _Reader) -> _Codec:
+    return _Codec(lambda value, numbers: numbers.append(float(value)), lambda _: reader, has_form=False)
+
+
 _LEAVES: dict[Any, _Codec] = {
-    float: _Codec(_write_number, lambda _: next, has_form=False),
-    int: _Codec(_write_number, lambda _: _read_int, has_form=False),
+    float: _number(next),
+    int: _number(_read_int),
     bool: _constant(lambda form: _check(form, type(form) is bool), bool),
     str: _constant(_check_word, _plain),
 }
 _OF_ORIGINS: dict[Any, Callable[..., _Codec]] = {
-    Literal: _literal_codec,
+    Literal: lambda *words: _constant(lambda form: _check(form, form in words)),
     Union: _optional_codec,
     UnionType: _optional_codec,
     np.ndarray: _array_codec,

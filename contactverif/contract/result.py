@@ -10,16 +10,17 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from enum import StrEnum
 from math import exp, lgamma, log, log1p
+from operator import add
 
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, freeze
 from contactverif.contract.errors import LONGEST_FACT, clean, name_line, one_line
 from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import CLOSED_CHAIN, Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.property import CLOSED_CHAIN, DECIDED, Outcome, PropertyInfo, Verdict, checked_numbers
 
 _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what right formulations decide was decided.
@@ -55,7 +56,7 @@ class Result(StrEnum):
 
 # The probability below which a count is no chance. A run of a thousand rows accuses one by chance once in ten runs.
 BY_CHANCE = 1e-4
-CaseKey = tuple[str, Verdict, bool]  # Kind, verdict, and whether the case was idle.
+CaseKey = tuple[str, Verdict, bool]  # All that counts depend on: kind, verdict, and whether the case was idle.
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,26 +69,17 @@ class CaseCounts:
     idle: int = 0  # Those of the judged cases in which nothing was in contact, so that a pass says little.
 
     def __add__(self, other: CaseCounts) -> CaseCounts:
-        return CaseCounts(
-            self.judged + other.judged,
-            self.failed + other.failed,
-            self.undecided + other.undecided,
-            self.idle + other.idle,
-        )
+        return CaseCounts(*map(add, astuple(self), astuple(other)))
 
     @property
     def cases(self) -> int:
         """The number of all cases."""
         return self.judged + self.undecided
 
-    def share(self, count: int) -> float:
-        """Return a number of cases as a share of all, 0 if there are none."""
-        return count / self.cases if self.cases else 0.0
-
     @property
     def undecided_share(self) -> float:
         """The share of undecided cases, 0 to 1."""
-        return self.share(self.undecided)
+        return self.undecided / self.cases if self.cases else 0.0
 
     @property
     def contact_share(self) -> float:
@@ -97,21 +89,7 @@ class CaseCounts:
     @property
     def idle_share(self) -> float:
         """The share of idle cases, 0 to 1."""
-        return self.share(self.idle)
-
-
-def key_of(outcome: Outcome) -> CaseKey:
-    """Return the kind of a case, its verdict, and whether it was idle: all that counts depend on."""
-    idle = outcome.measurement is not None and outcome.measurement.idle
-    return outcome.case_or_summary.kind, outcome.verdict, idle
-
-
-def count_by_kind(info: PropertyInfo, numbers: Mapping[CaseKey, int]) -> dict[str, CaseCounts]:
-    """Return {kind: counts}, the kinds of the property first; cases of no kind are under the empty word, at the end."""
-    counts = dict.fromkeys(info.kinds, CaseCounts())
-    for (kind, verdict, idle), number in sorted(numbers.items(), key=lambda entry: (not entry[0][0], entry[0])):
-        counts[kind] = counts.get(kind, CaseCounts()) + _counts(verdict, number, idle=idle)
-    return counts
+        return self.idle / self.cases if self.cases else 0.0
 
 
 def total(counts: Iterable[CaseCounts]) -> CaseCounts:
@@ -140,27 +118,15 @@ def whole_percent(share: float) -> str:
     return f"{share:.0%}" if share in (0.0, 1.0) else f"{min(max(round(100 * share), 1), 99)}%"
 
 
-def _counts(verdict: Verdict, number: int, *, idle: bool) -> CaseCounts:
-    if verdict is Verdict.UNDECIDED:
-        return CaseCounts(undecided=number)
-    failed = verdict in (Verdict.FAIL, Verdict.CRASHED)
-    return CaseCounts(judged=number, failed=number * failed, idle=number * idle)
-
-
 def exceeds(count: int, number: int, share: float) -> bool:
-    """Return whether `count` or more of `number` cases, each of probability `share`, are rarer than `BY_CHANCE`."""
+    """Return whether `count` or more of `number` cases, each of probability `share`, are rarer than `BY_CHANCE`.
+
+    The binomial term of n + 1 is ratio × the term of n, with ratio = (N − n) p / ((n + 1) (1 − p)). It is below 1 for n
+    above N p, and falls with n. So all terms behind n add up to at most term × ratio / (1 − ratio). They are left out
+    as soon as this is below the roundoff of the sum.
+    """
     if count <= number * share:
         return False
-    return _at_least(count, number, share) < BY_CHANCE
-
-
-def _at_least(count: int, number: int, share: float) -> float:
-    """Return the binomial probability of `count` or more, for a count above `number` × `share`.
-
-    The term of n + 1 is ratio × the term of n, with ratio = (N − n) p / ((n + 1) (1 − p)). It is below 1 for n above
-    N p, and falls with n. So all terms behind n add up to at most term × ratio / (1 − ratio). They are left out as soon
-    as this is below the roundoff of the sum.
-    """
     total = 0.0
     for n in range(count, number + 1):
         term = _probability(n, number, share)
@@ -168,7 +134,7 @@ def _at_least(count: int, number: int, share: float) -> float:
         ratio = (number - n) * share / ((n + 1) * (1 - share)) if share < 1 else 0.0
         if term * ratio <= UNIT_ROUNDOFF * total * (1 - ratio):
             break
-    return total
+    return total < BY_CHANCE
 
 
 def _probability(count: int, number: int, share: float) -> float:
@@ -209,7 +175,8 @@ class Tally:
         closest: ClosestNumber | None = None
         for case, outcome in enumerate(outcomes):
             verdicts[outcome.verdict] += 1
-            keys[key_of(outcome)] += 1
+            idle = outcome.measurement is not None and outcome.measurement.idle
+            keys[outcome.case_or_summary.kind, outcome.verdict, idle] += 1
             breach = breach or outcome.breach
             if outcome.decided:
                 closest = _closer(closest, info, outcome, case)
@@ -217,7 +184,13 @@ class Tally:
                 reasons[outcome.reason] += 1
         if witness is not None and witness.decided:
             closest = _closer(closest, info, witness, None)
-        kinds = count_by_kind(info, keys)
+        kinds = dict.fromkeys(info.kinds, CaseCounts())
+        # The kinds of the property first; cases of no kind are under the empty word, at the end.
+        for (kind, verdict, idle), n in sorted(keys.items(), key=lambda entry: (not entry[0][0], entry[0])):
+            failed = n * (verdict in (Verdict.FAIL, Verdict.CRASHED))
+            is_open = verdict is Verdict.UNDECIDED
+            counts = CaseCounts(undecided=n) if is_open else CaseCounts(judged=n, failed=failed, idle=n * idle)
+            kinds[kind] = kinds.get(kind, CaseCounts()) + counts
         return cls(
             verdicts=verdicts,
             reasons=dict(reasons.most_common()),
@@ -321,8 +294,7 @@ class Row:
     @property
     def judged(self) -> int:
         """The number of random cases that were decided."""
-        counts = self.tally.verdicts
-        return sum(counts.get(verdict, 0) for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.CRASHED))
+        return sum(self.tally.verdicts.get(verdict, 0) for verdict in DECIDED)
 
     @property
     def undecided(self) -> int:
@@ -472,13 +444,13 @@ class Run:
     diagnoses: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        diagnoses = {name_line(name): one_line(text) for name, text in self.diagnoses.items()}
-        object.__setattr__(self, "diagnoses", diagnoses)
-        provided = {name_line(name): parts for name, parts in self.provided.items()}
-        provenance = {name_line(name): one_line(value, LONGEST_FACT) for name, value in self.provenance.items()}
-        object.__setattr__(self, "provided", provided)
-        object.__setattr__(self, "provenance", provenance)
-        object.__setattr__(self, "opposite_signs", tuple(map(name_line, self.opposite_signs)))
+        for attribute, value in {
+            "provided": {name_line(name): parts for name, parts in self.provided.items()},
+            "provenance": {name_line(name): one_line(value, LONGEST_FACT) for name, value in self.provenance.items()},
+            "opposite_signs": tuple(map(name_line, self.opposite_signs)),
+            "diagnoses": {name_line(name): one_line(text) for name, text in self.diagnoses.items()},
+        }.items():
+            object.__setattr__(self, attribute, value)
 
     @property
     def formulations(self) -> tuple[str, ...]:
@@ -548,26 +520,18 @@ class Coverage:
     # "…", so that cases that differ in a number alone have one reason.
     reasons: Mapping[str, int]
 
-    @classmethod
-    def from_rows(cls, info: PropertyInfo, rows: list[Row]) -> Coverage:
-        """Add up the rows of a property."""
+
+def coverage_of(run: Run) -> tuple[Coverage, ...]:
+    """Return the coverage of each property of which a case was judged, in the order of the run."""
+    coverage = []
+    for id_ in run.properties:
+        rows = [row for row in run.rows if row.property_id == id_ and row.outcomes]
+        if not rows:
+            continue
         reasons: Counter[str] = Counter()
         for row in rows:
             for reason, number in row.tally.reasons.items():
                 reasons[_NUMBER.sub("…", reason)] += number
-        return cls(
-            info,
-            n_formulations=len(rows),
-            counts=total(row.tally.counts for row in rows),
-            kinds=add_by_kind(row.tally.kinds for row in rows),
-            reasons=dict(reasons.most_common()),
-        )
-
-
-def coverage_of(run: Run) -> tuple[Coverage, ...]:
-    """Return the coverage of each property of which a case was judged, in the order of the run."""
-    judged = [row for row in run.rows if row.outcomes]
-    by_property: dict[str, list[Row]] = {id_: [] for id_ in run.properties}
-    for row in judged:
-        by_property[row.property_id].append(row)
-    return tuple(Coverage.from_rows(rows[0].info, rows) for rows in by_property.values() if rows)
+        counts, kinds = total(row.tally.counts for row in rows), add_by_kind(row.tally.kinds for row in rows)
+        coverage.append(Coverage(rows[0].info, len(rows), counts, kinds, dict(reasons.most_common())))
+    return tuple(coverage)

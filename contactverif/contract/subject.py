@@ -144,7 +144,11 @@ class Subject:
             raise ContractError(f"make: {flaw}")
         plugin = _call_plugin("make", make, penalty=1.0)
         if not callable(getattr(plugin, "residual", None)):
-            hint = _nearest(plugin, "residual")
+            names = [
+                name for name in _call_plugin("residual", dir, plugin) if isinstance(name, str) and name != "residual"
+            ]
+            near = get_close_matches("residual", names, n=1)
+            hint = f"; the nearest name is `{name_line(near[0])}`" if near else ""
             raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`{hint}")
         traits = _call_plugin("traits", getattr, plugin, "traits", Traits())
         if not isinstance(traits, Traits):
@@ -160,16 +164,8 @@ class Subject:
     def penalty(self, case: Case) -> float:
         """Return the penalty of a case in the unit that the formulation takes.
 
-        Parameters
-        ----------
-        case : Case
-            The case with the distributed stiffness ε̂.
-
-        Returns
-        -------
-        float
-            The stiffness ε̂ itself; for a nodal formulation ε̂ × the mean length of the slave segments in the reference,
-            and in space ε̂ × the slave's area over the number of its nodes.
+        It is ε̂ itself; for a nodal formulation ε̂ × the mean length of the slave segments in the reference, and in space
+        ε̂ × the slave's area over the number of its nodes.
         """
         return self._convert(case.interface, case.penalty)
 
@@ -238,35 +234,26 @@ class CheckedFormulation:
         return self._counts[id(interface)][1]
 
     def _count_multipliers(self, interface: Interface) -> int:
-        self._check_kind(interface)
-        count = self._call_n_multipliers(interface)
-        if (count > 0) is not (self._traits.rules.enforcement == "multiplier"):
-            needed = '"multiplier"' if count else "n_multipliers(interface) ≥ 1"
-            trait = f"{count} of them, with the trait enforcement {self._traits.rules.enforcement!r}"
-            raise ContractError(f"n_multipliers: {trait}; needed {needed}")
-        return count
-
-    def _check_kind(self, interface: Interface) -> None:
-        """Refuse what the formulation does not take: a kernel may read past the corners of a face that it expects."""
-        abilities = self._traits.abilities
+        abilities, enforcement = self._traits.abilities, self._traits.rules.enforcement
         if interface.dim not in abilities.dimensions:
             needed = f"{' or '.join(map(str, abilities.dimensions))}, which the formulation takes"
             raise MisuseError("interface", f"nodes with {interface.dim} coordinates", needed)
+        # A kernel may read past the corners of a face that it expects.
         for side in (interface.slave, interface.master) if interface.dim != PLANE else ():
             if (corners := side.faces.shape[1]) not in abilities.faces:
                 needed = f"{' or '.join(map(str, abilities.faces))}, which the formulation takes"
                 raise MisuseError("interface", f"faces with {corners} corners", needed)
-
-    def _call_n_multipliers(self, interface: Interface) -> int:
-        count = _call_plugin("n_multipliers", getattr, self.plugin, "n_multipliers", None)
-        if count is None:
-            return 0
-        number = _call_plugin("n_multipliers", count, interface)
-        if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < 0:
-            raise ContractError(f"n_multipliers: returned {number!r}; needed an integer ≥ 0")
-        if number > (most := MULTIPLIERS_AN_UNKNOWN * interface.n_unknowns):
-            raise ContractError(f"n_multipliers: returned {int(number)}; needed at most {most} on this interface")
-        return int(number)
+        method = _call_plugin("n_multipliers", getattr, self.plugin, "n_multipliers", None)
+        count = 0 if method is None else _call_plugin("n_multipliers", method, interface)
+        if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 0:
+            raise ContractError(f"n_multipliers: returned {count!r}; needed an integer ≥ 0")
+        if count > (most := MULTIPLIERS_AN_UNKNOWN * interface.n_unknowns):
+            raise ContractError(f"n_multipliers: returned {int(count)}; needed at most {most} on this interface")
+        if bool(count) is not (enforcement == "multiplier"):
+            needed = '"multiplier"' if count else "n_multipliers(interface) ≥ 1"
+            trait = f"{int(count)} of them, with the trait enforcement {enforcement!r}"
+            raise ContractError(f"n_multipliers: {trait}; needed {needed}")
+        return int(count)
 
     def pair(self, interface: Interface, z: FloatArray) -> Pairing | None:
         """Return the pairing at one state z (n_unknowns,); None if the plugin has no ``pair``, or one with a handle.
@@ -293,6 +280,11 @@ class CheckedFormulation:
     def _pairing_at(self, interface: Interface, pairing: Pairing | None, z: Array) -> Pairing | None:
         return self.own_pairing(interface, z.real) if self.decides_anew(pairing) else pairing
 
+    def _ask(self, verb: str, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
+        self._check_size(interface, z)
+        pairing = self._pairing_at(interface, pairing, z)
+        return _call_plugin(verb, getattr(self.plugin, verb), interface, pairing, freeze(z, np.float64))
+
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns); a loop calls a plugin that is not batched."""
         self._check_size(interface, z)
@@ -311,10 +303,7 @@ class CheckedFormulation:
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the tangent (n_unknowns, n_unknowns) at z (n_unknowns,), dense or a csr, csc or coo array of scipy."""
-        self._check_size(interface, z)
-        pairing = self._pairing_at(interface, pairing, z)
-        tangent = _call_plugin("tangent", self.plugin.tangent, interface, pairing, freeze(z, np.float64))
-        return self._check_tangent("tangent", tangent, z.size)
+        return self._check_tangent("tangent", self._ask("tangent", interface, pairing, z), z.size)
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing | None, z: FloatArray
@@ -322,10 +311,7 @@ class CheckedFormulation:
         """Return residual (n_unknowns,) and tangent, as `tangent` does, at z (n_unknowns,); one call where possible."""
         if "residual_and_tangent" not in self.provides:
             return self.residual(interface, pairing, z), self.tangent(interface, pairing, z)
-        self._check_size(interface, z)
-        pairing = self._pairing_at(interface, pairing, z)
-        verb = "residual_and_tangent"
-        answer = _call_plugin(verb, self.plugin.residual_and_tangent, interface, pairing, freeze(z, np.float64))
+        answer = self._ask(verb := "residual_and_tangent", interface, pairing, z)
         if not isinstance(answer, tuple) or len(answer) != 2:
             kind = f"a tuple of {len(answer)}" if isinstance(answer, tuple) else f"a {type(answer).__name__}"
             raise ContractError(f"{verb}: returned {kind}; needed a tuple (residual, tangent)")
@@ -333,23 +319,21 @@ class CheckedFormulation:
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points at one state z (n_unknowns,)."""
-        self._check_size(interface, z)
-        pairing = self._pairing_at(interface, pairing, z)
-        points = _call_plugin("contact_points", self.plugin.contact_points, interface, pairing, freeze(z, np.float64))
+        points = self._ask("contact_points", interface, pairing, z)
         if not isinstance(points, ContactPoints):
             raise ContractError(f"contact_points: returned a {type(points).__name__}; needed ContactPoints")
         counts = np.array([len(interface.slave), len(interface.master)])
         if len(points.gap) > (most := POINTS_A_SEGMENT * int(counts.sum())):
             raise ContractError(f"contact_points: {len(points.gap)} of them; needed at most {most} on this interface")
-        for name, role in (("slave_segment", 0), ("master_segment", 1)):
+        for role, name in enumerate(("slave_segment", "master_segment")):
             numbers, limits = (
                 getattr(points, name),
                 counts[role ^ points.on_master],
             )  # A second pass exchanges the roles.
             outliers = np.flatnonzero((numbers < -1) | (numbers >= limits))
             if len(outliers):
-                first = outliers[0]
-                raise ContractError(f"contact_points: {name} {numbers[first]}; needed −1 to {limits[first] - 1}")
+                found, limit = numbers[outliers[0]], limits[outliers[0]]
+                raise ContractError(f"contact_points: {name} {found}; needed −1 to {limit - 1}")
         return points
 
     def answers(self, calls: Sequence[Call]) -> list[Any]:
@@ -368,11 +352,14 @@ class CheckedFormulation:
 
     def _check_tangent(self, verb: str, tangent: Any, size: int) -> Any:
         """Return a copy of the tangent (size, size), dense or sparse; an error begins with the verb."""
-        _check_matrix(verb, tangent, size)
+        if not (isinstance(tangent, np.ndarray) or sparse_of_scipy().issparse(tangent)):
+            raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
+        if tangent.shape != (size, size):
+            raise ContractError(f"{verb}: returned shape {tangent.shape}; needed {(size, size)}")
+        if tangent.dtype != np.float64:
+            raise ContractError(f"{verb}: returned dtype {tangent.dtype}; needed float64")
         tangent = np.array(tangent) if isinstance(tangent, np.ndarray) else self.copy_matrix(verb, tangent)
-        entries = tangent if isinstance(tangent, np.ndarray) else tangent.data
-        if not np.isfinite(entries).all():
-            raise NonFiniteError(f"{verb}: {_describe_non_finite(entries)}")
+        _check_finite(verb, tangent if isinstance(tangent, np.ndarray) else tangent.data)
         return tangent
 
     def _check_size(self, interface: Interface, z: Array) -> None:
@@ -399,13 +386,6 @@ def _flaw_of_factory(make: Callable[..., Any]) -> str:
     return ""
 
 
-def _nearest(plugin: Any, method: str) -> str:
-    """Return the name of a plugin that is nearest to that of a method it lacks, in words; empty if none is near."""
-    names = [name for name in _call_plugin(method, dir, plugin) if isinstance(name, str) and name != method]
-    near = get_close_matches(method, names, n=1)
-    return f"; the nearest name is `{name_line(near[0])}`" if near else ""
-
-
 def _call_plugin(method: str, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Return the answer of a plugin; whatever it raises becomes a PluginError that names the method."""
     try:
@@ -427,19 +407,15 @@ def _check_forces(verb: str, forces: Any, z: Array) -> Array:
         raise ContractError(f"{verb}: returned shape {copy.shape}; needed {z.shape}, that of z")
     if copy.dtype != z.dtype:
         raise ContractError(f"{verb}: returned dtype {copy.dtype}; needed {z.dtype}, that of z")
-    if not np.isfinite(copy).all():
-        raise NonFiniteError(f"{verb}: {_describe_non_finite(copy)}")
+    _check_finite(verb, copy)
     return copy
 
 
-def _check_matrix(verb: str, tangent: Any, size: int) -> None:
-    """Check that a tangent is a matrix (size, size) of floats, dense or sparse."""
-    if not (isinstance(tangent, np.ndarray) or sparse_of_scipy().issparse(tangent)):
-        raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
-    if tangent.shape != (size, size):
-        raise ContractError(f"{verb}: returned shape {tangent.shape}; needed {(size, size)}")
-    if tangent.dtype != np.float64:
-        raise ContractError(f"{verb}: returned dtype {tangent.dtype}; needed float64")
+def _check_finite(verb: str, values: Array) -> None:
+    if not np.isfinite(values).all():
+        bad = np.flatnonzero(~np.isfinite(values).reshape(-1))
+        found = f"{values.reshape(-1)[bad[0]]} in {len(bad)} of {values.size} entries"
+        raise NonFiniteError(f"{verb}: {found}")
 
 
 def copy_entries(verb: str, tangent: Any) -> Any:
@@ -472,11 +448,6 @@ def _copy_compressed(tangent: Any) -> Any:
     if not 0 <= matrix.indices.min(initial=0) <= matrix.indices.max(initial=0) < size:
         raise ValueError(f"indices must be < {size} and ≥ 0")
     return matrix
-
-
-def _describe_non_finite(values: Array) -> str:
-    bad = np.flatnonzero(~np.isfinite(values).reshape(-1))
-    return f"{values.reshape(-1)[bad[0]]} in {len(bad)} of {values.size} entries"
 
 
 def ask_first(subject: Subject, case: Case, parts: Collection[str]) -> FirstAnswers:
@@ -561,7 +532,7 @@ class EngineSubject(Subject):
         NonFiniteError
             If it says that it has converged, and a displacement is NaN or infinite.
         """
-        answer = self._call(scene)
+        answer = _call_plugin(SOLVE, self.engine.solve, scene)
         if not isinstance(answer, EngineAnswer):
             raise ContractError(f"solve: returned a {type(answer).__name__}; needed an EngineAnswer")
         if flaw := answer.flaw(scene):
@@ -569,17 +540,6 @@ class EngineSubject(Subject):
         if answer.converged and not np.isfinite(answer.displacements).all():
             raise NonFiniteError("solve: converged, with displacements that are not finite")
         return answer
-
-    def _call(self, scene: SceneArrays) -> Any:
-        """Return what the engine answers; whatever it raises becomes a PluginError."""
-        try:
-            return self.engine.solve(scene)
-        except (KeyboardInterrupt, ContractError):
-            raise
-        except BaseException as error:  # A code may raise anything, and its mistake is a row of the report.
-            kinds = ((MemoryError, "memory"), (SystemExit, "exit"))
-            cause = next((word for kind, word in kinds if isinstance(error, kind)), "exception")
-            raise PluginError(f"solve: {describe_error(error)}{place_of_error(error)}", cause) from error
 
 
 def _as_traits(traits: EngineTraits) -> Traits:

@@ -198,10 +198,10 @@ class Abilities:
 
     def __post_init__(self) -> None:
         _check_values(self, "abilities")
-        if self.dimensions not in ((2,), (3,), (2, 3)):
-            raise ContractError(f"Traits.abilities.dimensions: found {self.dimensions!r}; needed (2,), (3,) or (2, 3)")
-        if self.faces not in ((3,), (4,), (3, 4)):
-            raise ContractError(f"Traits.abilities.faces: found {self.faces!r}; needed (3,), (4,) or (3, 4)")
+        for name, first, second in (("dimensions", 2, 3), ("faces", 3, 4)):
+            if (value := getattr(self, name)) not in ((first,), (second,), (first, second)):
+                needed = f"({first},), ({second},) or ({first}, {second})"
+                raise ContractError(f"Traits.abilities.{name}: found {value!r}; needed {needed}")
 
     @property
     def in_plane(self) -> bool:
@@ -232,11 +232,12 @@ class Evidence:
     source: str = ""
 
     def __post_init__(self) -> None:
-        witnesses: object = self.witnesses
-        if not isinstance(witnesses, Mapping):
-            needed = "{property id: name of a case}"
-            raise ContractError(f"Traits.evidence.witnesses: found a {type(witnesses).__name__}; needed {needed}")
-        check_published_forces(self.published_forces)
+        needs = {"witnesses": "{property id: name of a case}", "published_forces": "{name of a flat case: forces}"}
+        for name, needed in needs.items():
+            if not isinstance(value := getattr(self, name), Mapping):
+                raise ContractError(f"Traits.evidence.{name}: found a {type(value).__name__}; needed {needed}")
+        for text in self.published_forces.values():
+            (_parse_once if isinstance(text, str) else parse_forces)(text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,17 +289,9 @@ class Traits:
                 raise ContractError(f"Traits.{entry.name}: found a {actual.__name__}; needed {kind.__name__}(…)")
 
     def witness(self, property_id: str) -> str | None:
-        """Return the name of the case that shows that a promise "does not" holds.
+        """Return the name of the case that shows that a promise "does not" holds; None if there is none.
 
-        Parameters
-        ----------
-        property_id : str
-            The id of a property, such as ``"patch.flat.solve"``.
-
-        Returns
-        -------
-        str | None
-            The name from `Evidence.witnesses` for the id or for the longest beginning of it; None if there is none.
+        It is the one from `Evidence.witnesses` for the id of the property, or for the longest beginning of it.
         """
         parts = property_id.split(".")
         for n in range(len(parts), 0, -1):
@@ -309,15 +302,7 @@ class Traits:
     def revise(self, **changes: Any) -> Traits:
         """Return these traits with some changed, such as those of a formulation that wraps another one.
 
-        Parameters
-        ----------
-        **changes : Any
-            New values by the name of the trait, whatever its group: ``traits.revise(symmetric=True, area=None)``.
-
-        Raises
-        ------
-        ContractError
-            If there is no such trait, or it does not take the value.
+        New values stand by the name of the trait, whatever its group: ``traits.revise(symmetric=True, area=None)``.
         """
         if strangers := changes.keys() - _GROUPS.keys():
             raise ContractError(f"Traits: found {', '.join(sorted(strangers))}; needed {', '.join(_GROUPS)}")
@@ -363,16 +348,6 @@ def format_forces(slave: Fractions, master: Fractions) -> str:
 _parse_once = lru_cache(maxsize=64)(parse_forces)  # Traits are made anew for each penalty.
 
 
-def check_published_forces(forces: object) -> None:
-    """Raise a `ContractError` unless this maps names of cases to forces."""
-    if not isinstance(forces, Mapping):
-        raise ContractError(
-            f"Traits.evidence.published_forces: found a {type(forces).__name__}; needed {{name of a flat case: forces}}"
-        )
-    for text in forces.values():
-        (_parse_once if isinstance(text, str) else parse_forces)(text)
-
-
 def traits_behind(statement: Callable[[Traits], object], traits: Traits) -> dict[str, Any]:
     """Return ``{name: value}`` of the traits without any one of which a statement about them would be another."""
     stated, silent = statement(traits), Traits().by_name()
@@ -395,15 +370,11 @@ def _listed_values(kind: type) -> dict[str, tuple[object, ...]]:
     listed = {}
     for name, annotation in get_type_hints(kind).items():
         parts = (annotation,) if annotation is bool or get_origin(annotation) is Literal else get_args(annotation)
-        values = [value for part in parts for value in _VALUES_OF_TYPES.get(part) or _words(part)]
+        words = {part: get_args(part) for part in parts if get_origin(part) is Literal}
+        values = [value for part in parts for value in _VALUES_OF_TYPES.get(part) or words.get(part, ())]
         if values and float not in parts:
             listed[name] = tuple(values)
     return listed
-
-
-def _words(annotation: Any) -> tuple[object, ...]:
-    """Return the words of a Literal, and nothing for other annotations."""
-    return get_args(annotation) if get_origin(annotation) is Literal else ()
 
 
 def _check_values(group: Any, path: str) -> None:

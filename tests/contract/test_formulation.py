@@ -87,7 +87,7 @@ def test_entries_of_a_pattern_may_number_more_than_unknowns() -> None:
 
 def test_same_as() -> None:
     pairing = Pairing({"a": np.array([1, 2]), "b": np.array([True])})
-    assert pairing.same_as(Pairing(dict(reversed(list(pairing.items())))))
+    assert pairing == Pairing(dict(reversed(list(pairing.items()))))
     for other in (
         {"a": np.array([1, 3]), "b": np.array([True])},
         {"a": np.array([[1, 2]]), "b": np.array([True])},
@@ -95,9 +95,9 @@ def test_same_as() -> None:
         {"a": np.array([1, 2])},
         {},
     ):
-        assert not pairing.same_as(Pairing(other))
-        assert not Pairing(other).same_as(pairing)
-    assert Pairing({}).same_as(Pairing({}))
+        assert pairing != Pairing(other)
+        assert Pairing(other) != pairing
+    assert Pairing({}) == Pairing({})
 
 
 def test_no_traits_promise_nothing() -> None:
