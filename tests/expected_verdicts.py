@@ -187,7 +187,7 @@ def expected_verdict(name: str, property_id: str) -> Verdict:
 
 
 def matrix() -> str:
-    """Return two tables in Markdown: a row for each formulation, a column for each property that some formulation fails."""
+    """Return two tables in Markdown: a row for each formulation, a column for each property that one of them fails."""
     failed = [name for name in property_ids() if any(expected_verdict(each, name) is Verdict.FAIL for each in FAILS)]
     ids = [name for name in failed if name not in FOLLOWS]
     patch = [name for name in ids if name.startswith("patch.")]

@@ -107,7 +107,7 @@ def weigh_tests() -> int:
 
 
 def count_words() -> int:
-    """Return the words of all Markdown that is kept: they have a letter or a digit. A link to a file says nothing again."""
+    """Return the words of all Markdown that is kept: they have a letter or a digit. A link to a file counts once."""
     names = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     paths = [ROOT / name for name in names.splitlines() if not name.startswith("reports/") and name != "CHANGELOG.md"]
     texts = [path.read_text(encoding="utf-8") for path in paths if not path.is_symlink()]
