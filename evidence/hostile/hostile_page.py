@@ -4,7 +4,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-sys.path += [str(Path(__file__).parents[2] / folder / "trust") for folder in ("tests", "evidence")]
+sys.path.append(str(Path(__file__).parents[1] / "trust"))
 
 from catalogue import PLUGINS
 from containment import CHECKS

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-sys.path += [str(Path(__file__).parents[2] / folder / "trust") for folder in ("tests", "evidence")]
+sys.path.append(str(Path(__file__).parents[1] / "trust"))
 
 from tables import FOLDER, keep_commit
 

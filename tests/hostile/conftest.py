@@ -3,6 +3,4 @@
 import sys
 from pathlib import Path
 
-sys.path += [
-    str(Path(__file__).parents[2] / folder) for folder in ("evidence/hostile", "tests/trust", "evidence/trust")
-]
+sys.path += [str(Path(__file__).parents[2] / folder) for folder in ("evidence/hostile", "evidence/trust")]

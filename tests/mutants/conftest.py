@@ -2,12 +2,15 @@
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import pytest
-from killing import EXAMPLES, KEY, as_lines
+from zoo.killing import EXAMPLES, KEY, KILL_TABLE, as_lines
 
-FILE = Path(__file__).parents[2] / "reports" / "trust" / "kills.csv"
+sys.path.append(
+    str(Path(__file__).parents[2] / "evidence" / "trust")
+)  # A campaign there asks what some tests ask here.
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -18,26 +21,17 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     cells = [dict(report.user_properties)[KEY] for report in reports if KEY in dict(report.user_properties)]
     if not cells:
         return
-    rows = _kept_rows()
-    ids = list(dict.fromkeys([*next(iter(rows.values()), {}), *(json.loads(cell)[1] for cell in cells)]))
+    rows = {}
+    if KILL_TABLE.exists():
+        with KILL_TABLE.open(encoding="utf-8", newline="") as stream:
+            rows = {row.pop("mutant"): row for row in csv.DictReader(stream)}
+    ids = [name for name in next(iter(rows.values()), {}) if name != "caught by"]
+    ids = list(dict.fromkeys([*ids, *(json.loads(cell)[1] for cell in cells)]))
     matrix = {}
     for name, intended, number in map(json.loads, dict.fromkeys(cells)):
-        row = {question: _as_number(rows.get(name, {}).get(question, "")) for question in ids}
+        row = {each: int(cell) if (cell := rows.get(name, {}).get(each, "")).isdigit() else 0 for each in ids}
         matrix[name] = intended, row | {intended: number}
     terminalreporter.section("kill matrix")
-    heading = f"the first of {EXAMPLES} cases that caught the mutant, in brackets; all others from {FILE.name}"
+    heading = f"the first of {EXAMPLES} cases that caught the mutant, in brackets; all others from {KILL_TABLE.name}"
     for line in (heading, *as_lines(matrix)):
         terminalreporter.write_line(line)
-
-
-def _as_number(cell: str) -> int:
-    """Return the number of the first case, 0 where none catches the mutant or the property was not asked."""
-    return int(cell) if cell.isdigit() else 0
-
-
-def _kept_rows() -> dict[str, dict[str, str]]:
-    """Return {mutant: {property: number of the first case, or empty}} of the kept table."""
-    if not FILE.exists():
-        return {}
-    with FILE.open(encoding="utf-8", newline="") as stream:
-        return {row.pop("mutant"): {k: v for k, v in row.items() if k != "caught by"} for row in csv.DictReader(stream)}

@@ -3,24 +3,49 @@
 import csv
 import json
 from collections.abc import Callable
-from pathlib import Path
+from dataclasses import fields
 
 import pytest
-from killing import KEY, as_lines, cases, first_kill, first_kill_without_points, properties
-from mutate import Mutant, changed_line
 from subjects import load_property, load_subject
-from without_points import CAUGHT_BY, RIGHT_WITHOUT, reports_alone
-from wrong import MUTANTS, SURVIVORS
+from zoo.killing import (
+    CAUGHT_BY,
+    KEY,
+    KILL_TABLE,
+    MUTANTS,
+    MUTANTS_IN_SPACE,
+    RIGHT_WITHOUT,
+    SURVIVORS,
+    as_lines,
+    cases,
+    faces,
+    first_accused,
+    first_kill,
+    first_kill_without_points,
+    properties,
+    reports_alone,
+)
+from zoo.making import Mutant, line
 
 from contactverif import Subject, Verdict, judge_case
-from contactverif.plugins.registry import load_formulation, load_properties, property_ids
+from contactverif.contract.formulation import ContactPoints
+from contactverif.plugins.registry import load_formulation, load_properties
 from contactverif.run.run import run
 
-KILL_TABLE = Path(__file__).parents[2] / "reports" / "trust" / "kills.csv"
-
-
-def mutant_named(name: str) -> Mutant:
-    return next(mutant for mutant in MUTANTS if mutant.name == name)
+BY_NAME = {mutant.name: mutant for mutant in MUTANTS}
+FEW = {"tangent.long": 1}  # States in space of a right formulation, where it is not 4.
+# The words for the arrays of contact points in the names of mutants.
+WORDS = {
+    **{name: name for name in ("position", "normal", "gap", "pressure", "weight")},
+    "slave_segment": "slave segment",
+    "c": "place on the slave",
+    "master_segment": "master segment",
+    "xi": "ξ",
+    "active": "activity",
+    "area_from": "area reported from",
+    "area_to": "of the area reported",
+    "weighted": "weighted nodes",
+    "on_master": "second pass",
+}
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
@@ -34,15 +59,36 @@ def test_the_mutant_is_caught_by_the_property_that_is_meant_to(
         assert bool(first_kill_without_points(mutant)) is (mutant.name not in RIGHT_WITHOUT), "without contact points"
 
 
+@pytest.mark.parametrize("mutant", MUTANTS_IN_SPACE, ids=lambda mutant: mutant.name)
+def test_the_mutant_in_space_is_caught_by_the_property_that_is_meant_to(mutant: Mutant) -> None:
+    number, reason = first_accused(properties(True)[mutant.caught_by], Subject(mutant.name, mutant.make), 60)
+    assert number, f"survives {mutant.caught_by}"
+    print(f"\ncase {number}: {reason}")
+
+
+@pytest.mark.parametrize("in_space", [False, True])
+def test_every_property_has_its_mutant(in_space: bool) -> None:
+    mutants = MUTANTS_IN_SPACE if in_space else MUTANTS
+    assert {mutant.caught_by for mutant in mutants} == set(properties(in_space))
+    assert len({mutant.name for mutant in mutants}) == len(mutants) >= 15
+
+
+def test_each_array_of_contact_points_has_a_mutant() -> None:
+    """The kill matrix says that each of them dies; in the plane there are no shape functions of faces."""
+    assert set(WORDS) == {entry.name for entry in fields(ContactPoints)} - {"slave_shape", "master_shape"}
+    names = [mutant.name for mutant in MUTANTS if mutant.caught_by.startswith("projection.")]
+    assert all(any(word in name for name in names) for word in WORDS.values())
+
+
 def test_each_remark_on_mutants_without_points_is_about_one_of_them() -> None:
     remarks = [*CAUGHT_BY, *RIGHT_WITHOUT]
-    assert set(remarks) <= {mutant.name for mutant in MUTANTS}
+    assert set(remarks) <= set(BY_NAME)
     assert len(set(remarks)) == len(remarks)
-    assert not [name for name in remarks if reports_alone(mutant_named(name))]
+    assert not [name for name in remarks if reports_alone(BY_NAME[name])]
 
 
 def test_a_mutant_whose_property_is_missing_survives() -> None:
-    """Once `tox -e trust` catches one of them, it belongs to MUTANTS."""
+    """Once `tox -e trust` catches one of them, it is no survivor any more."""
     with KILL_TABLE.open(encoding="utf-8", newline="") as stream:
         rows = {row["mutant"]: row for row in csv.DictReader(stream)}
     for mutant in SURVIVORS:
@@ -50,7 +96,7 @@ def test_a_mutant_whose_property_is_missing_survives() -> None:
 
 
 def test_a_run_accuses_a_mutant_and_shrinks_its_case() -> None:
-    mutant = mutant_named("ξ of the last segment from its other end")
+    mutant = BY_NAME["ξ of the last segment from its other end"]
     result = run([Subject(mutant.name, mutant.make)], [load_property(mutant.caught_by)], profile="ci")
     (row,) = result.rows
     assert row.unexpected == "promised to pass, but fails"
@@ -62,16 +108,11 @@ def test_a_run_accuses_a_mutant_and_shrinks_its_case() -> None:
 
 
 def test_a_mutant_that_changes_the_mesh_lets_no_other_formulation_fail() -> None:
-    mutant = mutant_named("interface modified")
+    mutant = BY_NAME["interface modified"]
     innocent = load_formulation("vts-ppt-balanced:area=reference")
     questions = load_properties(["patch.*", "purity"])
     result = run([Subject(mutant.name, mutant.make), innocent], questions, examples=40, seed=1)
     assert {row.formulation for row in result.rows if row.unexpected} == {mutant.name}
-
-
-def test_every_property_has_its_mutant() -> None:
-    assert {mutant.caught_by for mutant in MUTANTS} == set(property_ids())
-    assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS) >= 15
 
 
 # `test_verdicts.py` judges those without options.
@@ -79,12 +120,12 @@ def test_every_property_has_its_mutant() -> None:
 def test_what_the_mutants_are_made_from_is_not_accused(name: str) -> None:
     subject = load_subject(name)
     decided = planned = 0
-    for question in properties():
+    for question in properties().values():
         if question.promise(subject.traits) is not True or question.refusal_of(subject):
             continue
         examples = 10 if question.bodies else 40  # Scenes are slow, and `test_verdicts.py` asks more of each.
-        planned += len(cases(question.id, examples))
-        for case in cases(question.id, examples):
+        planned += len(cases(question, examples))
+        for case in cases(question, examples):
             outcome = judge_case(question, case, subject)
             assert outcome.verdict in (Verdict.PASS, Verdict.UNDECIDED), (question.id, outcome.reason, case)
             decided += outcome.decided
@@ -92,9 +133,16 @@ def test_what_the_mutants_are_made_from_is_not_accused(name: str) -> None:
     assert planned >= 400
 
 
+@pytest.mark.parametrize("name", faces.RIGHT)
+def test_no_right_formulation_on_faces_is_accused(name: str) -> None:
+    for question in properties(True).values():
+        number, reason = first_accused(question, load_subject(name), FEW.get(question.id, 4))
+        assert not number, f"{question.id}, case {number}: {reason}"
+
+
 def test_a_mutant_whose_line_is_gone_says_so() -> None:
     with pytest.raises(AssertionError, match="no line 'no such line'"):
-        changed_line("vts_ppt_force", "no such line", "", factory="vts_ppt")
+        line("gone", "units", "vts_ppt_force", "no such line", "")
 
 
 def test_the_matrix_marks_what_was_meant_and_what_survives() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from readable_cells import centre_points
 from subjects import load_property, load_subject
-from wrong_surfaces import STS, by_rule
+from zoo.faces import STS, by_rule
 
 from contactverif import Case, Subject
 from contactverif.sampling.draw import draw_cases

@@ -1,0 +1,89 @@
+"""Tables that campaigns fill a line at a time and continue after a stop, and what campaigns share beside them."""
+
+import csv
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+FOLDER, TESTS = ROOT / "reports" / "trust", ROOT / "tests"
+COMMITS = "commits.csv"  # {table: commit}
+SURVIVES = "survives: "  # Before the name of a mutant that no property is meant to catch.
+UNKNOWN = "-"  # The cell of a property that was not asked.
+
+
+def read(name: str) -> list[dict[str, str]]:
+    """Return the lines of a table in `reports/trust`, none where it is missing."""
+    file = FOLDER / name
+    if not file.exists():
+        return []
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def fill(
+    name: str, heads: Iterable[str], keys: Iterable[str], cells: Callable[[str], list[str]], processes: int = 1
+) -> None:
+    """Write a table with a line for each key, in their order: the key, then its cells; the first head is the key's.
+
+    Lines that are there stay as they are, if the table has the same heads. Delete the file to begin anew. `processes`
+    share the keys, so `cells` is a function of a module.
+    """
+    heads, keys = list(heads), list(keys)
+    lines = {row[heads[0]]: [row[head] for head in heads] for row in read(name) if list(row) == heads}
+    lines = {key: line for key, line in lines.items() if key in keys}
+    _write(name, heads, lines, keys)
+    missing = [key for key in keys if key not in lines]
+    if missing:
+        keep_commit(name)
+    # A process that dies ends this one, too; a `multiprocessing.Pool` would wait for its line for ever.
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for number, (key, line) in enumerate(zip(missing, pool.map(cells, missing), strict=True), 1):
+            lines[key] = [key, *line]
+            _write(name, heads, lines, keys)
+            print(f"{number} of {len(missing)}: {key}", flush=True)
+
+
+def fill_all(*tables: tuple[str, Iterable[str], Callable[[str], list[str]], Iterable[str]]) -> None:
+    """Fill tables (name, heads, cells, keys) with the processes that the command line asks for, or one."""
+    for name, heads, cells, keys in tables:
+        fill(name, heads, keys, cells, processes=int(sys.argv[1]) if len(sys.argv) > 1 else 1)
+
+
+def keep_commit(name: str) -> None:
+    """Note with which commit a table was filled last."""
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], check=True, capture_output=True, text=True).stdout
+    commits = {row["table"]: [row["table"], row["commit"]] for row in read(COMMITS)} | {name: [name, commit.strip()]}
+    _write(COMMITS, ["table", "commit"], commits, sorted(commits))
+
+
+def commits_of(tables: Iterable[str]) -> str:
+    """Return with which commit each of some tables was filled, in Markdown."""
+    tables = set(tables)
+    return ", ".join(f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in tables)
+
+
+def _write(name: str, heads: list[str], lines: dict[str, list[str]], keys: list[str]) -> None:
+    with (FOLDER / name).open("w", encoding="utf-8", newline="") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(heads)
+        table.writerows(lines[key] for key in keys if key in lines)
+
+
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]], align: str = "--:") -> str:
+    """Return a table in Markdown, its first column to the left and all others aligned by some marks."""
+    lines = [f"| {' | '.join(heads)} |", f"|---|{f'{align}|' * (len(heads) - 1)}"]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
+
+
+def install(folder: Path, targets: dict[str, str]) -> str:
+    """Make {name: module:factory} entry points of a project in a folder; return the folder for the path of Python."""
+    about = folder / "campaign-1.0.dist-info"
+    about.mkdir(parents=True, exist_ok=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: campaign\nVersion: 1.0\n")
+    lines = [f"{name} = {target}" for name, target in targets.items()]
+    (about / "entry_points.txt").write_text("\n".join(["[contactverif.formulations]", *lines, ""]))
+    return str(folder)

@@ -1,0 +1,1 @@
+"""Formulations for tests: right ones (`right`), `springs` with mistakes, and mutants of the included ones."""
