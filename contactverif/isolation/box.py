@@ -180,7 +180,6 @@ def _holds_code(folder: str) -> bool:
 
 
 def _hide(path: str) -> list[str]:
-    """Return the arguments that hide what lies at a path, if there is something."""
     if os.path.isdir(path):
         return ["--tmpfs", os.path.realpath(path)]
     return ["--ro-bind", os.devnull, os.path.realpath(path)] if os.path.exists(path) else []
@@ -220,7 +219,6 @@ class ControlGroup:
 
 
 def _remove(folder: Path) -> bool:
-    """Remove a group without processes; return whether it is gone."""
     with suppress(OSError):
         folder.rmdir()
     return not folder.exists()
@@ -277,7 +275,6 @@ def remove_plugin_folder() -> None:
 
 
 def _lock(descriptor: int) -> None:
-    """Lock an open file for this process alone, or raise an OSError."""
     try:
         import fcntl
     except ImportError:

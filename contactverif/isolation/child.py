@@ -85,7 +85,6 @@ class Channel:
         return data[_LENGTH.size : end]
 
     def _gather(self, data: bytes, size: int, deadline: float) -> bytes:
-        """Return the data and what follows it, so many bytes at least."""
         parts, have = [data], len(data)
         while have < size:
             try:
@@ -107,7 +106,6 @@ class Channel:
         return data
 
     def _wait(self, event: int, deadline: float) -> None:
-        """Wait until the socket can be read or written."""
         left = None if deadline == inf else max(0, ceil(1000 * (deadline - perf_counter())))
         if not self._polls[event].poll(left):
             raise TooLateError

@@ -69,7 +69,6 @@ def main(make: Callable[[], Any]) -> None:
 
 
 def _solve(engine: Any, question: int, arrays: dict[str, Any]) -> list[Any]:
-    """Return the reply to a scene."""
     scene = SceneArrays.from_arrays({name: _unpack(*packed) for name, packed in arrays.items()})
     start = perf_counter()
     answer: EngineAnswer = engine.solve(scene)
@@ -102,7 +101,6 @@ def _words(error: BaseException) -> str:
 
 
 def _make() -> Any:
-    """Return the engine that the command line names."""
     module, _, function = sys.argv[1].partition(":")
     return getattr(importlib.import_module(module), function)(**json.loads(sys.argv[2]))
 

@@ -101,7 +101,6 @@ def _load(reader: str) -> Callable[[str], bytes]:
 
 
 def _answer(reader: str, path: str, limits: Limits, channel: Channel) -> None:
-    """Read the file in the child, and send the answer."""
     faulthandler.disable()  # A crash is told by its status, and not by a traceback.
     _discard_outputs()
     function = _load(reader)
@@ -121,7 +120,6 @@ def _answer(reader: str, path: str, limits: Limits, channel: Channel) -> None:
 
 
 def _discard_outputs() -> None:
-    """Let what a library prints vanish, wherever it prints it."""
     sink = os.open(os.devnull, os.O_RDWR)
     for descriptor in (0, 1, 2):
         os.dup2(sink, descriptor)

@@ -8,8 +8,7 @@ question.
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -41,16 +40,19 @@ from contactverif.isolation.wire import (
     SharePairing,
     Solve,
     Solved,
-    encode_one,
+    encode,
     join,
 )
 
 _MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
-_MOST_HANGS = 2  # After so many calls without an answer neither, in all of its processes.
-_AT_FIRST = (
-    10  # The number of such calls that one counts for if its method never answered: it takes five times as long.
-)
-_AT_IMPORT = 100  # The number of such calls that an import without an answer counts for.
+# The calls without an answer after which a formulation is not asked any more, in all of its processes, and why. One of
+# a method that never answered, and an import, count for as many, since they take five times as long.
+_AT_IMPORT, _AT_FIRST = 100, 10
+_MOST_HANGS = {
+    _AT_IMPORT: "no answer came while it was imported",
+    _AT_FIRST: "no answer came to the first call of a method",
+    2: "no answer came twice",
+}
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.
 _LARGE = 1 << 16  # Bytes. A pairing of the judge with more is sent anew for each question, and not kept here.
@@ -80,7 +82,7 @@ class Host:
         self.opaque: bool | None = None  # Pairings have a handle, which stays there; None until the first one is known.
         self.n_ended = 0  # Ends before it was told to.
         self.n_started = 0
-        self.code_files_there: list[Path] = []
+        self.code_files_there: list[Path] = []  # Those of its process in another process of the judge.
         self.last_question = 0.0  # By the clock of `time.monotonic`.
         self._loading: Question | None = None  # It is sent, and its answer was not waited for.
         self._load_began = 0.0  # By the same clock.
@@ -88,8 +90,9 @@ class Host:
     def begin_load(self) -> None:
         """Start the process anew and let it load the formulation, until `load` waits for that."""
         self.end()
-        if reason := self._reason_to_stop():
-            raise PluginError(reason, "not asked")
+        reason = next((words for least, words in _MOST_HANGS.items() if _hangs[self._key] >= least), "")
+        if reason or self.n_ended >= _MOST_ENDS:
+            raise PluginError(reason or f"its process ended {self.n_ended} times", "not asked")
         _make_room(self._name)
         self._process = PluginProcess(self._command, self._limits, second=self._second)
         self.n_started += 1
@@ -97,7 +100,7 @@ class Host:
             store.clear()
         request = Load(self._next_number(), self._name)
         self._loading, self._load_began = self._put("import", request), monotonic()
-        self._process.send_ahead(join([encode_one(request)]))
+        self._process.send_ahead(join([encode(request)]))
 
     def load(self) -> Reply:
         """Let the process load the formulation, after a new start unless it does so already; return what that gave."""
@@ -106,22 +109,12 @@ class Host:
         question, self._loading = self._loading, None
         assert question is not None
         self._flush_queue()
-        return raise_failure(question.result, loading=True)
-
-    def _reason_to_stop(self) -> str:
-        """Return why the formulation is not asked any more; an empty string if it is."""
-        n_hangs = _hangs[self._key]
-        if n_hangs >= _AT_IMPORT:
-            return "no answer came while it was imported"
-        if n_hangs >= _AT_FIRST:
-            return "no answer came to the first call of a method"
-        if n_hangs >= _MOST_HANGS:
-            return "no answer came twice"
-        return f"its process ended {self.n_ended} times" if self.n_ended >= _MOST_ENDS else ""
+        return raise_failure(question, loading=True)
 
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
-        if self._process is None and not wait_in_lockstep(self._is_started):
+        if self._process is None:
+            wait_in_lockstep(lambda: False)  # A call in lockstep starts no process: all begin anew, one after another.
             self._load_again()
         self._queue.append((Make(self._next_number(), penalty), None))
         return self._number, self.n_started
@@ -129,13 +122,6 @@ class Host:
     def _load_again(self) -> None:
         if not isinstance(self.load(), Loaded):
             raise PluginError("import: it loaded before, and does not any more", "channel")
-
-    def _is_started(self) -> bool:
-        """Start the process for calls in lockstep, and return whether it is there."""
-        if self._process is None:
-            with suppress(ContractError), self._without_blame():
-                self._load_again()
-        return self._process is not None
 
     def _next_number(self) -> int:
         self._number += 1
@@ -190,11 +176,11 @@ class Host:
     def solve(self, arrays: Mapping[str, Array]) -> Solved:
         """Let the engine solve a scene, after a new start where its process has ended."""
         if self._process is None:
-            raise_failure(self.load(), loading=True)
+            self.load()
         packed = {name: PackedArray.pack(array) for name, array in arrays.items()}
         question = self._put("solve", Solve(self._next_number(), packed), sum(map(np.size, arrays.values())))
         self.flush()
-        reply = raise_failure(question.result)
+        reply = raise_failure(question)
         if not isinstance(reply, Solved):
             raise PluginError("solve: another reply than a solution", "channel")
         return reply
@@ -225,16 +211,13 @@ class Host:
             self._flush_queue()
 
     def _has_answered(self) -> bool:
-        """Send what calls in lockstep have put into the queue, and return whether the process has answered it."""
-        with self._without_blame():
-            return self._flush_queue()
+        """Send what calls in lockstep have put into the queue, and return whether the process has answered it.
 
-    @contextmanager
-    def _without_blame(self) -> Iterator[None]:
-        """Open a block in which no end of the process counts: what is asked in it is asked again alone."""
+        No end of the process counts here: what is asked is asked again alone.
+        """
         n_ended, n_hangs = self.n_ended, _hangs[self._key]
         try:
-            yield
+            return self._flush_queue()
         finally:
             self.n_ended, _hangs[self._key] = n_ended, n_hangs
 
@@ -246,62 +229,60 @@ class Host:
         if len(self._forgotten) > _FORGET:
             waiting.append((Forget(self._forgotten), None))  # At the end, for a question that waits may need it.
             self._forgotten = []
-        if self._process is None:
-            verb = questions[0].verb if questions else ""
-            _answer_all(questions, PluginError(f"{verb}: its process has ended", "channel"))
-            return not questions
+        process = self._process
+        is_answered = process is None and not questions
+        lost = PluginError(f"{questions[0].verb if questions else ''}: its process has ended", "channel")
         try:
-            self._exchange(self._process, waiting, questions)
+            if process is not None:
+                self._exchange(process, waiting)
+                is_answered = True
         except PluginError as error:
-            self._note_end(error, next((question.verb for question in questions if question.answer is None), ""))
-            _answer_all(questions, error)
+            lost = error
+            self.n_ended += 1
+            if error.cause == "hang":
+                verb = next((question.verb for question in questions if question.answer is None), "")
+                answered = verb in self._first_seconds
+                _hangs[self._key] += _AT_IMPORT if verb == "import" else 1 if answered else _AT_FIRST
+            self.read_last_words()
+            self._process = None
         except BaseException:  # The process is ended, see `PluginProcess.ask`, and nobody is to blame.
-            _answer_all(questions, PluginError("the question was interrupted", "not asked"))
+            lost = PluginError("the question was interrupted", "not asked")
             self._process = None
             raise
-        return self._process is not None
+        finally:
+            for question in questions:
+                question.answer = question.answer or lost
+        return is_answered
 
-    def _note_end(self, error: PluginError, verb: str) -> None:
-        """Note that the process has ended, why, and in which method."""
-        self.n_ended += 1
-        if error.cause == "hang":
-            answered = verb in self._first_seconds
-            _hangs[self._key] += _AT_IMPORT if verb == "import" else 1 if answered else _AT_FIRST
-        self.read_last_words()
-        self._process = None
+    def _exchange(self, process: PluginProcess, waiting: list[tuple[Request | Solve, Question | None]]) -> None:
+        """Send requests and receive the answers: together what is small and quick, else one question after another.
 
-    def _exchange(
-        self, process: PluginProcess, waiting: list[tuple[Request | Solve, Question | None]], questions: list[Question]
-    ) -> None:
-        """Send requests and receive the answers: together what is small and quick, else one question after another."""
-        known = self._is_quick and all(question.verb in self._known_verbs for question in questions)
-        most = MOST_QUESTIONS if known else 1
-        frames: list[bytes] = []
-        questions_sent: list[Question] = []
+        A first call may take longer, by as much as the same one took in an earlier process.
+        """
+        verbs = {question.verb for _, question in waiting if question is not None}
+        most = MOST_QUESTIONS if self._is_quick and verbs <= self._known_verbs else 1
+        messages: list[tuple[list[bytes], list[Question]]] = [([], [])]
         size = 0
         for request, question in waiting:
-            frame = encode_one(request)
-            is_full = question is not None and len(questions_sent) >= most
+            frame = encode(request)
+            frames, questions = messages[-1]
+            is_full = question is not None and len(questions) >= most
             if frames and (is_full or size + len(frame) > _TOGETHER):
-                self._ask(process, frames, questions_sent)
-                frames, questions_sent, size = [], [], 0
+                frames, questions, size = [], [], 0
+                messages.append((frames, questions))
             frames.append(frame)
             size += len(frame)
-            questions_sent += [question] if question is not None else []
-        self._ask(process, frames, questions_sent)
-
-    def _ask(self, process: PluginProcess, frames: Sequence[bytes], questions: Sequence[Question]) -> None:
-        """Ask the process; a first call may take longer, by as much as the same one took in an earlier process."""
-        limit, start = self._limits.seconds, monotonic()
-        verb = questions[0].verb if questions else ""
-        if verb not in self._known_verbs:
-            limit = min(limit + self._first_seconds.get(verb, inf), self._limits.start_seconds)
-        process.ask(join(frames), questions, limit)
-        seconds = monotonic() - (self._load_began if verb == "import" else start)
-        if questions:
-            self._is_quick = seconds <= max(_QUICK, _QUICK_EACH * len(questions)) * self._limits.seconds
-            self._known_verbs.add(verb)
-            self._first_seconds.setdefault(verb, seconds)
+            questions += [question] if question is not None else []
+        for frames, questions in messages:
+            limit, start, verb = self._limits.seconds, monotonic(), questions[0].verb if questions else ""
+            if verb not in self._known_verbs:
+                limit = min(limit + self._first_seconds.get(verb, inf), self._limits.start_seconds)
+            process.ask(join(frames), questions, limit)
+            seconds = monotonic() - (self._load_began if verb == "import" else start)
+            if questions:
+                self._is_quick = seconds <= max(_QUICK, _QUICK_EACH * len(questions)) * self._limits.seconds
+                self._known_verbs.add(verb)
+                self._first_seconds.setdefault(verb, seconds)
 
     def read_last_words(self) -> bytes:
         """Return the end of what the process has printed, or the one before it."""
@@ -318,22 +299,22 @@ class Host:
         self._loading = None
 
 
-def _answer_all(questions: Sequence[Question], error: PluginError) -> None:
-    """Let an error be the answer of the questions that have none."""
-    for question in questions:
-        question.answer = question.answer or error
-
-
 def answer_of(question: Question) -> Answer:
     """Return the answer to a question, or raise the ContractError that came instead of it."""
-    answer = question.answer if isinstance(question.answer, Answer) else raise_failure(question.result)
+    answer = question.answer
     if not isinstance(answer, Answer):
+        raise_failure(question)
         raise PluginError(f"{question.verb}: the reply of an engine", "channel")
     return answer
 
 
-def raise_failure(reply: Reply | PluginError, *, loading: bool = False) -> Reply:
-    """Return a reply, or raise the error that it tells of. Only while it loads may a plugin blame the user."""
+def raise_failure(question: Question, *, loading: bool = False) -> Reply:
+    """Return the reply to a question, or raise the error that it tells of.
+
+    Only while it loads may a plugin blame the user.
+    """
+    reply = question.answer
+    assert reply is not None
     if isinstance(reply, PluginError):
         raise PluginError(str(reply), reply.cause, ended=reply.ended)
     if not isinstance(reply, Failure):
@@ -366,8 +347,7 @@ def host_of(command: tuple[str, ...], name: str, limits: Limits, *, second: bool
 def _make_room(name: str) -> None:
     """End the processes that were not asked for the longest time, until there is memory for another one.
 
-    Each takes some hundred megabytes, and a run may have dozens. One that is asked again starts again. Those of the
-    formulation of that name stay, since the case that is judged may hold a pairing there.
+    Those of the formulation of that name stay, since the case that is judged may hold a pairing there.
     """
     others = [host for (_, other, _, _), host in _HOSTS.items() if other != name and host.has_process]
     for host in sorted(others, key=lambda host: host.last_question):

@@ -38,6 +38,7 @@ class _Lane(threading.Thread, Generic[_Result]):
         super().__init__(daemon=True)
         self._go, self._back = SimpleQueue[None](), SimpleQueue[None]()
         self._core = -1
+        self.start()
 
     def begin(self, call: Callable[[], _Result]) -> None:
         self._call, self._cancelled = call, False
@@ -45,8 +46,6 @@ class _Lane(threading.Thread, Generic[_Result]):
         self.error: BaseException | None = None
         self.wish: Wish | None = None
         self.stands, self.ended, self.seconds = True, False, 0.0
-        if self.ident is None:
-            self.start()
 
     def run(self) -> None:
         _thread.lane = self

@@ -70,12 +70,6 @@ class Question:
         self.largest = _ANSWER + size * _ANSWER_A_NUMBER
         self.answer: Reply | PluginError | None = None
 
-    @property
-    def result(self) -> Reply | PluginError:
-        """Return the answer, which must be there."""
-        assert self.answer is not None
-        return self.answer
-
 
 class PluginProcess:
     """A process that may hold one plugin: any program that speaks the protocol.
@@ -85,24 +79,24 @@ class PluginProcess:
 
     def __init__(self, command: Sequence[str], limits: Limits, *, second: bool = False) -> None:
         _end_at_exit()
-        self._limits = limits
-        self._progress = _file_of_one_byte()
-        self.output = Output()
-        numbers = {MARK: _run, MEMORY: str(limits.memory), PROGRESS: str(self._progress.fileno())}
-        largest = min(limits.memory, _LARGEST_ANSWER) * MEGABYTE
-        settings, files = _SETTINGS | (_OTHER_SETTINGS if second else {}), [self._progress.fileno()]
-        encloses = limits.box is not None and not limits.box.by_rules
-        folder = boxes.temporary_folder() if encloses else boxes.plugin_folder()
-        numbers |= {"TMPDIR": folder} if limits.box is None else boxes.environment(limits.box, folder)
-        self._group = None
-        if limits.box is not None and encloses:
-            self._group = boxes.ControlGroup(limits.memory)
-            command = self._group.join(boxes.enclose(tuple(command), limits.box, limits.memory))
-        self._encloses = encloses
+        box = limits.box
+        self._limits, self._encloses = limits, box is not None and not box.by_rules
+        self._progress, self.output = _file_of_one_byte(), Output()
+        folder = boxes.temporary_folder() if self._encloses else boxes.plugin_folder()
+        environment = _SETTINGS | (_OTHER_SETTINGS if second else {})
+        environment |= {MARK: _run, MEMORY: str(limits.memory), PROGRESS: str(self._progress.fileno())}
+        environment |= {"TMPDIR": folder} if box is None else boxes.environment(box, folder)
+        self._group = boxes.ControlGroup(limits.memory) if self._encloses else None
+        if box is not None and self._group is not None:
+            command = self._group.join(boxes.enclose(tuple(command), box, limits.memory))
         try:
             with PINNING.on_one_core():
                 self._child = Child.start(
-                    command, largest, environment=settings | numbers, files=files, output=self.output.end
+                    command,
+                    min(limits.memory, _LARGEST_ANSWER) * MEGABYTE,
+                    environment=environment,
+                    files=[self._progress.fileno()],
+                    output=self.output.end,
                 )
         except OSError as error:
             self._progress.close()
@@ -128,38 +122,34 @@ class PluginProcess:
         if len(questions) > 1:
             with suppress(OSError):  # A plugin can let the file take data at its end alone, where there is no place.
                 os.pwrite(self._progress.fileno(), b"\0", 0)
-        self._follow()
+        PINNING.ask()
+        if PINNING.core not in (-1, self._core):
+            with suppress(OSError):
+                os.sched_setaffinity(self._worker_pid, {PINNING.core})
+            self._core = PINNING.core
         try:
-            replies = self._exchange(frame, questions, seconds or self._limits.start_seconds)
-        except TooLateError as error:
-            raise self._end_with(f"{self._last_verb(questions)}: {error}", "hang") from None
-        except ClosedError:
-            raise self._end_with(self._last_verb(questions), "") from None
-        except TooLargeError as error:
-            raise self._end_with(f"{self._last_verb(questions)}: an answer of {error}", "memory") from None
-        except MessageError as error:
-            raise self._end_with(f"{self._last_verb(questions)}: {error}", "channel") from None
+            if frame != self._sent_ahead:
+                self._send(frame)
+            self._sent_ahead = b""
+            if not questions:
+                return
+            data = self._receive(seconds or self._limits.start_seconds, sum(each.largest for each in questions))
+            replies = decode_replies(data, loading=questions[0].verb == "import")
+            if [reply.question for reply in replies] != [question.number for question in questions]:
+                raise MessageError("answers to other questions")
+        except (TooLateError, ClosedError, TooLargeError, MessageError) as error:
+            raise self._end_with(self._last_verb(questions), error) from None
         except BaseException:
             self.end()
             raise
         for question, reply in zip(questions, replies, strict=True):
             question.answer = reply
 
-    def _exchange(self, frame: bytes, questions: Sequence[Question], seconds: float) -> Sequence[Reply]:
-        """Send requests, and return the replies."""
-        if frame != self._sent_ahead:
-            try:
-                self._child.channel.send(frame, self._limits.start_seconds)
-            except TooLateError:
-                raise TooLateError("its process does not listen") from None
-        self._sent_ahead = b""
-        if not questions:
-            return []
-        data = self._receive(seconds, sum(question.largest for question in questions))
-        replies = decode_replies(data, loading=questions[0].verb == "import")
-        if [reply.question for reply in replies] != [question.number for question in questions]:
-            raise MessageError("answers to other questions")
-        return replies
+    def _send(self, frame: bytes) -> None:
+        try:
+            self._child.channel.send(frame, self._limits.start_seconds)
+        except TooLateError:
+            raise TooLateError("its process does not listen") from None
 
     def _receive(self, seconds: float, largest: int) -> bytes:
         """Return the next frame, for which the process may use some seconds, however little of it comes at a time."""
@@ -178,14 +168,6 @@ class PluginProcess:
         number = (os.pread(self._progress.fileno(), 1, 0) or b"\0")[0]
         return questions[min(number, len(questions) - 1)].verb if questions else "make"
 
-    def _follow(self) -> None:
-        """Put the process on the core of the judge."""
-        PINNING.ask()
-        if PINNING.core not in (-1, self._core):
-            with suppress(OSError):
-                os.sched_setaffinity(self._worker_pid, {PINNING.core})
-            self._core = PINNING.core
-
     @property
     def code_files(self) -> list[Path]:
         """The files whose compiled code the process has loaded."""
@@ -199,24 +181,29 @@ class PluginProcess:
             process = min(process.children(), key=psutil.Process.create_time, default=process)
         return int(process.pid)
 
-    def _end_with(self, words: str, kind: str) -> PluginError:
-        """End the process, and return the error; without a kind, the one that the end of the process tells."""
-        status = None if kind else self._child.wait()
+    def _end_with(self, verb: str, error: Exception) -> PluginError:
+        """End the process, and return the error; of one that closed its line, the end of the process tells it."""
+        if not isinstance(error, ClosedError):
+            self.end()
+            words = f"an answer of {error}" if isinstance(error, TooLargeError) else error
+            kinds = {TooLateError: "hang", TooLargeError: "memory", MessageError: "channel"}
+            return PluginError(f"{verb}: {words}", kinds[type(error)], ended=True)
+        status = self._child.wait()
         if self._encloses and status is not None and status - _SIGNALED in signal.valid_signals():
             status = _SIGNALED - status
         self.end()
-        if not kind and status is None:
-            kind, words = "channel", f"{words}: it closed its end of the line"
-        elif status is not None and status < 0:
-            kind, words = "signal", f"{words}: {name_of_signal(-status)} ended its process"
-        elif status is not None:
-            kind, words = "exit", f"{words}: its process ended with status {status}"
-        return PluginError(words, cause=kind, ended=True)
+        if status is None:
+            return PluginError(f"{verb}: it closed its end of the line", "channel", ended=True)
+        if status < 0:
+            return PluginError(f"{verb}: {name_of_signal(-status)} ended its process", "signal", ended=True)
+        return PluginError(f"{verb}: its process ended with status {status}", "exit", ended=True)
 
     def end(self) -> None:
         """End the process and all that it started, as far as they stayed in its session; see `end_marked`."""
+        first: list[psutil.Process] = []
         # A plugin can make the first process in its box forget to end with its parent. With it ends all of the box.
-        first = self._first_in_box() if self._encloses else []
+        with suppress(psutil.Error):
+            first = psutil.Process(self._child.pid).children() if self._encloses else []
         for process in first:
             with suppress(psutil.Error):
                 process.kill()
@@ -226,13 +213,6 @@ class PluginProcess:
         self._progress.close()
         if self._group is not None:
             self._group.remove()
-
-    def _first_in_box(self) -> list[psutil.Process]:
-        """Return the first process in the box, if it is there."""
-        try:
-            return list(psutil.Process(self._child.pid).children())
-        except psutil.Error:
-            return []
 
 
 class Output:
@@ -295,27 +275,25 @@ class CpuPinning:
     def ask(self) -> None:
         """Note that a question is about to be asked; let this process go if it was held long enough."""
         self._n_questions += 1
-        if self._n_questions <= _QUESTIONS_FIRST or _LIBC is None:
+        if self._n_questions <= _QUESTIONS_FIRST:
             return
-        now = perf_counter()
         if self.core < 0:
-            self._cores = os.sched_getaffinity(0)
-            self._hold(int(_LIBC.sched_getcpu()), now)
-        elif now > self._until:
+            self._hold()
+        elif perf_counter() > self._until:
             self.let_go()
 
-    def _hold(self, core: int, now: float) -> None:
-        self.core, self._until = core, now + _SECONDS_ON_A_CORE
-        with suppress(OSError):
-            os.sched_setaffinity(0, {core})
+    def _hold(self) -> None:
+        if _LIBC is not None:
+            self._cores, self.core = os.sched_getaffinity(0), int(_LIBC.sched_getcpu())
+            self._until = perf_counter() + _SECONDS_ON_A_CORE
+            with suppress(OSError):
+                os.sched_setaffinity(0, {self.core})
 
     @contextmanager
     def on_one_core(self) -> Iterator[None]:
         """Open a block in which this process is on one core, so that a process that it starts there is held on it."""
         self.let_go()
-        if _LIBC is not None:
-            self._cores = os.sched_getaffinity(0)
-            self._hold(int(_LIBC.sched_getcpu()), perf_counter())
+        self._hold()
         try:
             yield
         finally:

@@ -18,7 +18,7 @@ from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
 from stat import S_ISREG
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 import numpy as np
@@ -56,20 +56,24 @@ class Wrapper:
 
 
 @dataclass(frozen=True)
-class RemoteFactory:
-    """A factory ``make(*, penalty)`` of a formulation that a program, `command`, has loaded by its name."""
+class _Remote(Generic[_Traits]):
+    """What a program, `command`, has loaded by its name, in a process within limits. It can be pickled."""
 
     command: tuple[str, ...]
     name: str
     limits: Limits
-    traits: Traits
-    provides: frozenset[str]  # The optional methods that the plugin has.
+    traits: _Traits
+    provides: frozenset[str] = frozenset()  # The optional methods that the plugin has.
     second: bool = False
 
     @property
     def host(self) -> Host:
         """The host in this process of the judge."""
         return host_of(self.command, self.name, self.limits, second=self.second)
+
+
+class RemoteFactory(_Remote[Traits]):
+    """A factory ``make(*, penalty)`` of a formulation."""
 
     def __call__(self, *, penalty: float) -> RemoteFormulation:
         """Return the formulation with a penalty."""
@@ -93,19 +97,8 @@ class RemoteSubject(Subject):
         return RemoteSubject(replace(self.remote, second=True))
 
 
-@dataclass(frozen=True)
-class RemoteEngine:
-    """An engine that a program, `command`, has made. It can be pickled."""
-
-    command: tuple[str, ...]
-    name: str
-    limits: Limits
-    traits: EngineTraits
-
-    @property
-    def host(self) -> Host:
-        """The host in this process of the judge."""
-        return host_of(self.command, self.name, self.limits)
+class RemoteEngine(_Remote[EngineTraits]):
+    """An engine."""
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Return the answer of the engine, of which nothing is checked but its kind."""
@@ -124,40 +117,41 @@ class RemoteEngine:
 class RemoteEngineSubject(EngineSubject):
     """An engine that lives in a process of its own. It can be pickled."""
 
-    def __init__(self, name: str, engine: RemoteEngine) -> None:
-        super().__init__(name, engine)
+    def __init__(self, engine: RemoteEngine) -> None:
+        super().__init__(engine.name, engine)
         self.remote = engine
-
-    @property
-    def host(self) -> Host:
-        """The host in this process of the judge."""
-        return self.remote.host
 
     def _call(self, scene: SceneArrays) -> EngineAnswer:
         return self.remote.solve(scene)
 
 
+def _remote_of(subject: Subject) -> RemoteFactory | RemoteEngine | None:
+    return subject.remote if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None
+
+
 def count_ends(subject: Subject) -> int:
     """Return how often the process of a subject has ended before it was told to; 0 if it has none of its own."""
-    return subject.host.n_ended if isinstance(subject, RemoteSubject | RemoteEngineSubject) else 0
+    remote = _remote_of(subject)
+    return 0 if remote is None else remote.host.n_ended
 
 
 def code_files(subject: Subject) -> list[Path]:
     """Return the files whose compiled code the process of a subject has loaded; none if it has none of its own."""
-    return subject.host.code_files if isinstance(subject, RemoteSubject | RemoteEngineSubject) else []
+    remote = _remote_of(subject)
+    return [] if remote is None else remote.host.code_files
 
 
 def note_code_files(subject: Subject, files: list[Path]) -> None:
     """Keep what the process of a subject has loaded that belongs to another process of the judge."""
-    if isinstance(subject, RemoteSubject | RemoteEngineSubject):
-        subject.host.code_files_there = files
+    if (remote := _remote_of(subject)) is not None:
+        remote.host.code_files_there = files
 
 
 def places(subjects: Iterable[Subject]) -> dict[str, str]:
     """Return {attribute of the report: value}: where formulations lived, what was open to them, and their libraries."""
     facts: dict[str, set[str]] = {"isolation": set(), "opened": set(), "libraries": set()}
     for subject in subjects:
-        remote = subject.remote if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None
+        remote = _remote_of(subject)
         box = None if remote is None else remote.limits.box
         facts["libraries"] |= set(list_libraries(code_files(subject)))
         facts["isolation"].add(box.kind if box is not None else "inline" if remote is None else "process")
@@ -217,9 +211,7 @@ class RemoteFormulation(Prefetching):
         self._last = host.ask(verb, self._number, interface, of_pairing, z, timed=self.timed, counted=self.counted)
         return self._last
 
-    def _answer(
-        self, verb: str, interface: Interface, pairing: Pairing | None = None, z: Array | None = None
-    ) -> Answer:
+    def _answer(self, verb: str, interface: Interface, pairing: Pairing | None, z: Array | None) -> Answer:
         question = self._take_prefetched(verb, interface, pairing) or self._ask(verb, interface, pairing, z)
         if question.answer is None:
             self._host.flush()
@@ -228,6 +220,9 @@ class RemoteFormulation(Prefetching):
         if not (self.timed or self.counted):
             self._last = None  # It would keep the answer.
         return answer_of(question)
+
+    def _arrays(self, verb: str, interface: Interface, pairing: Pairing | None, z: Array) -> dict[str, Array]:
+        return _unpack(verb, self._answer(verb, interface, pairing, z))
 
     @contextmanager
     def prefetch(self, calls: Sequence[Call]) -> Iterator[None]:
@@ -241,7 +236,6 @@ class RemoteFormulation(Prefetching):
             self._prefetched.clear()
 
     def _take_prefetched(self, verb: str, interface: Interface, pairing: Pairing | None) -> Question | None:
-        """Return the question that was asked ahead, if this is the next one of those."""
         if not self._prefetched:
             return None
         (next_verb, of_interface, of_pairing, _), question = self._prefetched[0]
@@ -272,7 +266,7 @@ class RemoteFormulation(Prefetching):
 
     def n_multipliers(self, interface: Interface) -> int:
         """Return the number of multipliers."""
-        return self._answer("n_multipliers", interface).count
+        return self._answer("n_multipliers", interface, None, None).count
 
     def pair(self, interface: Interface, z: FloatArray) -> Pairing:
         """Return the pairing at one state z (n_unknowns,). It is asked for together with the next question."""
@@ -281,22 +275,21 @@ class RemoteFormulation(Prefetching):
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns)."""
-        arrays = _unpack("residual", self._answer("residual", interface, pairing, z))
-        return _pick(arrays, "residual", "residual")
+        return _pick(self._arrays("residual", interface, pairing, z), "residual", "residual")
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the tangent (n_unknowns, n_unknowns), an array or a matrix of scipy.sparse."""
-        return _tangent(_unpack("tangent", self._answer("tangent", interface, pairing, z)), "tangent", z.size)
+        return _tangent(self._arrays("tangent", interface, pairing, z), "tangent", z.size)
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> tuple[Any, Any]:
         """Return residual (n_unknowns,) and tangent."""
         verb = "residual_and_tangent"
-        arrays = _unpack(verb, self._answer(verb, interface, pairing, z))
+        arrays = self._arrays(verb, interface, pairing, z)
         return _pick(arrays, verb, "residual"), _tangent(arrays, verb, z.size)
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points."""
-        arrays = _unpack("contact_points", self._answer("contact_points", interface, pairing, z))
+        arrays = self._arrays("contact_points", interface, pairing, z)
         try:
             return ContactPoints(**arrays)
         except (MisuseError, TypeError) as error:
@@ -443,7 +436,7 @@ def load_remote_engine(command: tuple[str, ...], name: str, limits: Limits) -> E
         if not isinstance(reply, Loaded):
             raise PluginError(f"import: a {type(reply).__name__} where an engine was needed", "channel")
         traits = _convert_traits(reply.traits, EngineTraits)
-        return RemoteEngineSubject(name, RemoteEngine(command, name, limits, traits))
+        return RemoteEngineSubject(RemoteEngine(command, name, limits, traits))
     except ContractError as error:
         return NotLoaded(name, str(error))
 
@@ -460,7 +453,7 @@ def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> It
         try:
             process = process or PluginProcess(command, limits)
             process.ask(encode([Load(0, name, survey=True)]), [question])
-            yield _read_reply(command, name, limits, raise_failure(question.result, loading=True))
+            yield _read_reply(command, name, limits, raise_failure(question, loading=True))
         except ContractError as error:
             process = None if isinstance(error, PluginError) and error.ended else process
             yield _not_loaded(name, error)
@@ -477,7 +470,6 @@ def _not_loaded(name: str, error: ContractError) -> NotLoaded:
 
 
 def _read_reply(command: tuple[str, ...], name: str, limits: Limits, reply: Reply) -> Subject | Wrapper | NotLoaded:
-    """Return what a process says that a name is."""
     match reply:
         case Unloaded(_, reason):
             return NotLoaded(name, one_line(reason))
@@ -493,7 +485,6 @@ def _read_reply(command: tuple[str, ...], name: str, limits: Limits, reply: Repl
 
 
 def _convert_traits(words: dict[str, Any], kind: type[_Traits]) -> _Traits:
-    """Return the traits that the process of a plugin states, checked."""
     try:
         return msgspec.convert(words, kind)
     except (msgspec.ValidationError, RecursionError, ValueError) as error:

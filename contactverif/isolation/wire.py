@@ -185,34 +185,16 @@ class Wraps(msgspec.Struct, array_like=True, tag="wraps"):
 Request = Load | Make | ShareInterface | SharePairing | Forget | Ask  # An engine gets Load and Solve alone.
 Reply = Answer | Solved | Failure | Loaded | Unloaded | Wraps
 
-_encoder = msgspec.msgpack.Encoder()
-_request_decoder: msgspec.msgpack.Decoder[list[Request]] = msgspec.msgpack.Decoder(list[Request])
-_answer_decoder: msgspec.msgpack.Decoder[list[Answer | Solved | Failure]] = msgspec.msgpack.Decoder(
-    Annotated[list[Answer | Solved | Failure], msgspec.Meta(max_length=MOST_QUESTIONS)]
-)
-_load_decoder: msgspec.msgpack.Decoder[list[Reply]] = msgspec.msgpack.Decoder(
-    Annotated[list[Loaded | Unloaded | Wraps | Failure], msgspec.Meta(max_length=1)]
-)
-
-
-def encode(messages: Sequence[Request | Solve] | Sequence[Reply]) -> bytes:
-    """Return messages as the bytes of a frame."""
-    return _encoder.encode(messages)
-
-
-def encode_one(message: Request | Solve) -> bytes:
-    """Return one of the messages of a frame as bytes."""
-    return _encoder.encode(message)
+# A message, or several as a frame, as bytes; and the messages that the judge sent.
+encode = msgspec.msgpack.Encoder().encode
+decode_requests = msgspec.msgpack.Decoder(list[Request]).decode
+_answers = msgspec.msgpack.Decoder(Annotated[list[Answer | Solved | Failure], msgspec.Meta(max_length=MOST_QUESTIONS)])
+_loaded = msgspec.msgpack.Decoder(Annotated[list[Loaded | Unloaded | Wraps | Failure], msgspec.Meta(max_length=1)])
 
 
 def join(messages: Sequence[bytes]) -> bytes:
     """Return the frame of messages that are encoded."""
-    return _encoder.encode([*map(msgspec.Raw, messages)])
-
-
-def decode_requests(data: bytes) -> list[Request]:
-    """Return the messages that the judge sent."""
-    return _request_decoder.decode(data)
+    return encode([*map(msgspec.Raw, messages)])
 
 
 def decode_replies(data: bytes, *, loading: bool = False) -> Sequence[Reply]:
@@ -220,8 +202,8 @@ def decode_replies(data: bytes, *, loading: bool = False) -> Sequence[Reply]:
 
     Only while it loads may it say what it is, and then it says nothing else.
     """
-    decoder = _load_decoder if loading else _answer_decoder
     try:
-        return decoder.decode(data)
+        replies: Sequence[Reply] = (_loaded if loading else _answers).decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise MessageError(f"a message that cannot be read: {one_line(str(error), _LONGEST_REASON)}") from error
+    return replies

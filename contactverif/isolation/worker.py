@@ -121,7 +121,6 @@ class RequestHandler:
         return None
 
     def _item(self, request: Make | ShareInterface | SharePairing) -> Any:
-        """Return what the judge wants to be kept."""
         match request:
             case Make(_, penalty):
                 assert self._subject is not None
@@ -134,7 +133,6 @@ class RequestHandler:
                 return Pairing({name: array.unpack() for name, array in arrays.items()})
 
     def _get(self, number: int) -> Any:
-        """Return what is kept under a number, or raise the error that is kept instead."""
         item = self._store[number]
         if isinstance(item, BaseException):
             raise item
@@ -146,7 +144,6 @@ class RequestHandler:
         return self._describe(request)
 
     def _describe(self, request: Load) -> Reply:
-        """Load what a name refers to, and return what it is."""
         item = self._loaders[request.survey](request.name)
         if isinstance(item, NotLoaded):
             return Unloaded(request.question, item.reason)
@@ -194,7 +191,6 @@ def _residual(formulation: CheckedFormulation, interface: Interface, pairing: An
 
 
 def _plain(value: Any) -> Any:
-    """Return a value of a trait that is of a kind that does not travel as one that does."""
     return dict(value) if isinstance(value, Mapping) else value.item()
 
 
@@ -244,7 +240,6 @@ class Stopwatch:
 
 
 def _pack(method: str, answer: Any) -> dict[str, PackedArray]:
-    """Return the arrays of an answer by name."""
     try:
         return {name: PackedArray.pack(array) for name, array in _ARRAYS[method](answer).items()}
     except ValueError as error:
@@ -279,7 +274,6 @@ def _keep_compressed(verb: str, tangent: Any) -> Any:
 
 
 def _failure(question: int, error: BaseException) -> Failure:
-    """Return what the judge is told of an error."""
     match error:
         case PluginError():
             return Failure(question, "plugin", error.cause, (str(error),))
@@ -324,7 +318,6 @@ def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
 
 
 def _send_description(describe: Callable[[], Reply], question: int, channel: Channel) -> None:
-    """Call the function in the copy, and send what it returns."""
     os.close(int(os.environ[SOCKET]))  # The line of the process that was copied.
     hide_memory(hidden=False)  # A plugin may want to look at itself.
     die_with_parent()

@@ -94,7 +94,6 @@ def entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
 
 
 def _time_of_change(path: str) -> int:
-    """Return when something was last installed into a folder or removed, in nanoseconds; 0 if it is no folder."""
     try:
         return os.stat(path or ".").st_mtime_ns
     except OSError:
@@ -266,7 +265,6 @@ def _compile_once(packages: frozenset[str]) -> None:
 
 
 def _worker() -> tuple[str, ...]:
-    """Return the command that starts the process of a plugin."""
     return python_program(str(Path(__file__).with_name("plugin_worker.py")))
 
 
@@ -379,7 +377,6 @@ def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
 
 
 def _find_factory(text: str) -> Callable[..., Any] | NotLoaded:
-    """Return the factory to which the first name of a text refers."""
     name = re.split(f"[{_MARKS}]", text, maxsplit=1)[0]
     installed = entries_by_name(FORMULATIONS)
     if not name:

@@ -65,7 +65,7 @@ def audit(
         find_missing_row(run, [subject.name for subject in subjects], [question.id for question in questions]),
         *(_other_property(row, opened, bool(changes)) for row, opened in zip(run.rows, rows, strict=True)),
         *(_missing(row, opened, sampling) for row, opened in stored),
-        *map(str, recheck.differences),
+        *(f"{each.formulation} {each.property_id}: {each.words}" for each in recheck.differences),
         *(_judge_example(example, subjects, questions, not changes) for example in examples),
         *(_other_case(example, opened_of[example.row]) for example in examples if not changes),
     ]
@@ -107,7 +107,6 @@ class DerivedOutcomes(Outcomes):
 def _open_rows(
     run: Run, subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling
 ) -> list[OpenRow | Row]:
-    """Return the rows as a run of today would begin them."""
     subject_of = {subject.name: subject for subject in subjects}
     question_of = {question.id: question for question in questions}
     triples = [
@@ -182,7 +181,6 @@ def _missing(row: Row, opened: OpenRow, sampling: Sampling) -> str:
 def _judge_example(
     example: Counterexample, subjects: Sequence[Subject], questions: Sequence[Property], exact: bool
 ) -> str:
-    """Judge a counterexample again, and return in what it differs."""
     subject = next(subject for subject in subjects if subject.name == example.formulation)
     question = next(question for question in questions if question.id == example.property_id)
     if question.refusal_of(subject) or question.needs - subject.provides:

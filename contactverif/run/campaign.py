@@ -118,15 +118,13 @@ def read_shards(folder: Path, argument: str) -> tuple[Plan, tuple[Path, ...]]:
 
 
 def _list_shards(folder: Path, argument: str) -> list[Shard]:
-    """Return the shards of a campaign in order, once none is missing."""
     matches = (re.fullmatch(r"shard-([1-9][0-9]{0,8})-of-([1-9][0-9]{0,8})", path.name) for path in folder.glob("*"))
     shards = sorted(Shard(int(match[2]), int(match[1])) for match in matches if match)
     if not shards:
         raise MisuseError(argument, f"no shard in {folder}", "the folder that campaign --out made")
     count = shards[0].count
     if shards[-1].count != count:
-        names = f"{shards[0].folder} and {shards[-1].folder}"
-        raise MisuseError(argument, names, "shards of one campaign")
+        raise MisuseError(argument, f"{shards[0].folder} and {shards[-1].folder}", "shards of one campaign")
     missing = [Shard(count, number).folder for number in sorted({*range(1, count + 1)} - {s.number for s in shards})]
     if missing:
         more = f" and {len(missing) - _MOST_NAMES} more" if len(missing) > _MOST_NAMES else ""
@@ -135,7 +133,6 @@ def _list_shards(folder: Path, argument: str) -> list[Shard]:
 
 
 def _read_mark(folder: Path) -> EndMark | None:
-    """Return the mark of a shard that is done; None if there is none that can be read."""
     try:
         return read_record(folder / _MARK, EndMark)
     except OSError:

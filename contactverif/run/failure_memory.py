@@ -62,7 +62,6 @@ class FailureMemory:
         return self._folder / "failures" / f"{typeable(f'{formulation}.{property_id}')}.npz"
 
     def _read(self, formulation: str, property_id: str) -> Case | None:
-        """Return the case of a file; None without one, or if it holds something else."""
         path = self._path(formulation, property_id)
         try:
             with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
@@ -74,7 +73,6 @@ class FailureMemory:
             return None
 
     def _write(self, path: Path, case: Case, owner: str) -> None:
-        """Write the file of a failure, whole or not at all."""
         path.parent.mkdir(parents=True, exist_ok=True)
         ignore = self._folder / ".gitignore"
         if not ignore.exists():

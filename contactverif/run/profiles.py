@@ -24,11 +24,6 @@ class Profile:
     examples: int  # The number of planned cases of each property.
     seed: int | None  # The seed of all cases; None means a fresh seed in every run.
 
-    @property
-    def derandomised(self) -> bool:
-        """Return whether every run draws the same cases."""
-        return self.seed is not None
-
     def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
         """Return the profile with the numbers of the user and with a seed, which can be printed and used again.
 

@@ -42,15 +42,7 @@ class Difference(NamedTuple):
     formulation: str
     property_id: str
     number: int
-    words: str
-
-    def __str__(self) -> str:
-        return f"{self.formulation} {self.property_id}: {self.in_words}"
-
-    @property
-    def in_words(self) -> str:
-        """The case and how it differs."""
-        return f"{'the witness' if self.number == WITNESS else f'case {self.number}'}: {self.words}"
+    words: str  # The case and how it differs.
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +87,9 @@ class Recheck:
     def differences(self) -> list[Difference]:
         """The outcomes that differ; an outcome of a case that the run does not have is one of them."""
         keys = chain.from_iterable(sample.keys(sorted(sample.outcomes)) for sample in self._samples)
-        return [Difference(*key, words) for key in keys if (words := self._words.get(key, _NO_CASE))]
+        differences = ((key, self._words.get(key, _NO_CASE)) for key in keys)
+        names = ((key, "the witness" if key[2] == WITNESS else f"case {key[2]}", words) for key, words in differences)
+        return [Difference(*key, f"{name}: {words}") for key, name, words in names if words]
 
     def __iter__(self) -> Iterator[Job]:
         groups: dict[tuple[str, bool], list[Sample]] = {}
@@ -128,10 +122,9 @@ class Recheck:
             arguments = sample.question, sample.subject, pairs, self._exact
             yield Job(judge_again, arguments, partial(self._add_judged, sample, part))
 
-    def _add_judged(self, sample: Sample, numbers: Sequence[int], words: Sequence[str]) -> Iterable[Job]:
+    def _add_judged(self, sample: Sample, numbers: Sequence[int], words: Sequence[str]) -> None:
         self.n_judged += len(numbers)
         self._words |= dict(zip(sample.keys(numbers), words, strict=True))
-        return ()
 
 
 def recheck_store(
@@ -158,7 +151,7 @@ def recheck_store(
         first, *others = differences
         count, n_again = counts[formulation, property_id]
         store.n_rechecked += count - n_again
-        words = f"{1 + len(others)} of {n_again} stored outcomes that were judged again differ, {first.in_words}"
+        words = f"{1 + len(others)} of {n_again} stored outcomes that were judged again differ, {first.words}"
         store.reject(formulation, property_id, f"{formulation} {property_id}: {words}; all {count} are judged again")
 
 
@@ -195,7 +188,6 @@ def find_difference(stored: Outcome, today: Outcome, exact: bool) -> str:
 
 
 def _agree(a: object, b: object, bound: float) -> bool:
-    """Return whether two numbers agree up to roundoff."""
     if not (isinstance(a, float) and isinstance(b, float) and isfinite(a) and isfinite(b)):
         return False
     return abs(a - b) <= max(bound, ROUNDOFF * max(abs(a), abs(b)))
@@ -209,7 +201,6 @@ def _bounds_of(outcome: Outcome) -> dict[str, float]:
 
 
 def _numbers_of(outcome: Outcome) -> dict[str, object]:
-    """Return the judged numbers of an outcome, and the sizes of its case."""
     summary = outcome.summary
     entries: dict[str, object] = {
         "number of slave segments": float(summary.n_slave_segments),

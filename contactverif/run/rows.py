@@ -56,6 +56,10 @@ class RowOutcomes(Outcomes):
         failed = outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
         return number < self._n_whole or (failed and self._n_failures < FAILURES)
 
+    def may_keep_whole(self, first: int, outcomes: Iterable[Outcome]) -> bool:
+        """Return whether one of these outcomes may stay whole, if the first of them gets this number."""
+        return any(self.keeps_whole(first, outcome) for outcome in outcomes)
+
     def append(self, outcome: Outcome, case: Case | None) -> None:
         """Add an outcome with the summary of its case; the case, if there is one, stays with one that stays whole."""
         number, form_number = len(self), -1
@@ -93,8 +97,7 @@ class Shrinking:
     """The goal of a search for the smallest case."""
 
     first: int  # The number of the first case that is bad enough.
-    kind: int  # The kind of badness that the smallest case must have.
-    least: tuple[int, float]  # The least badness that it must have.
+    least: tuple[int, float]  # The badness that the smallest case must have: its kind, and the least size.
 
 
 class OpenRow:
@@ -128,10 +131,6 @@ class OpenRow:
         self._expected |= chunks
         self._all_drawn, self.planned = last, planned
 
-    def may_keep_whole(self, first: int, outcomes: Iterable[Outcome]) -> bool:
-        """Return whether one of these outcomes may stay whole, if the first of them gets this number."""
-        return any(self.outcomes.keeps_whole(first, outcome) for outcome in outcomes)
-
     def add(self, first: int, outcomes: Sequence[Outcome]) -> None:
         """Add the outcomes of a chunk; those behind a chunk that is not finished wait."""
         chunk = self._expected[first]
@@ -142,9 +141,7 @@ class OpenRow:
         while self._next in self._waiting:
             chunk, outcomes = self._expected.pop(self._next), self._waiting.pop(self._next)
             cases: Sequence[Case | None] = [None] * len(outcomes)
-            if isinstance(chunk, CaseChunk) and any(
-                self.outcomes.keeps_whole(self._next + place, outcome) for place, outcome in enumerate(outcomes)
-            ):
+            if isinstance(chunk, CaseChunk) and self.outcomes.may_keep_whole(self._next, outcomes):
                 cases = chunk.cases
             for outcome, case in zip(outcomes, cases, strict=True):
                 self.outcomes.append(outcome, case)
@@ -202,10 +199,9 @@ class OpenRow:
         kind, worst = max((badness(self.row.info, outcome) for outcome in self.outcomes), default=(0, 0.0))
         if kind == 0:
             return None
-        least = (kind, min(CLEAR_RATIO, sqrt(worst)) if kind == 1 else worst)
-        bad = ((number, badness(self.row.info, outcome)) for number, outcome in enumerate(self.outcomes))
-        first = next(number for number, (its_kind, its_worst) in bad if its_kind == kind and (kind, its_worst) >= least)
-        return Shrinking(first, kind, least)
+        least = (kind, min(CLEAR_RATIO, sqrt(worst)) if kind == 1 else worst)  # No other kind is worse than the worst.
+        bad = (badness(self.row.info, outcome) >= least for outcome in self.outcomes)
+        return Shrinking(next(number for number, is_bad in enumerate(bad) if is_bad), least)
 
 
 def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdict, str]:
@@ -216,11 +212,8 @@ def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdic
     # No formulation promises that the one scene of a user can be decided, nor each scene of a list about which it
     # states nothing: they may have no solution.
     if on_scene:
-        return (
-            (Verdict.UNDECIDED, row.outcomes[0].reason or reason)
-            if row.outcomes and not row.judged
-            else (verdict, reason)
-        )
+        undecided = len(row.outcomes) > 0 and not row.judged
+        return (Verdict.UNDECIDED, row.outcomes[0].reason or reason) if undecided else (verdict, reason)
     undecided = row.promise is None and row.undecided > 0 and opened.listed is not None
     return (Verdict.UNDECIDED if undecided else verdict), reason
 
@@ -239,7 +232,7 @@ def open_row(
         info=question.info,
         verdict=Verdict.PASS,
         promise=promise,
-        promised_by=_traits_of_promise(question, subject) if promise else "",
+        promised_by=_words_of_promise(question, subject) if promise else "",
         known=known,
     )
     if reason := question.refusal_of(subject):
@@ -249,11 +242,11 @@ def open_row(
         promise = promise if missing & STATED_PARTS else None
         return replace(row, verdict=Verdict.NOT_PROVIDED, promise=promise, reason=reason)
     if source is None:
-        lacks_bodies = question.bodies and sampling.scene is None
-        needs = "elastic bodies" if lacks_bodies else needs_of_place(question.cases)
+        needs = "elastic bodies" if question.bodies and sampling.scene is None else needs_of_place(question.cases)
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=f"{NOT_HERE}{needs}")
     # The formulation fails on some scene, not on every one, and where it reports what shows it.
-    if promise is False and (_is_on_scene(question, sampling) or question.shown_by - subject.provides):
+    on_scene = question.bodies and sampling.scene is not None
+    if promise is False and (on_scene or question.shown_by - subject.provides):
         row = replace(row, promise=None)
     opened = OpenRow(row, subject, question, source if isinstance(source, tuple) else None)
     try:
@@ -267,16 +260,12 @@ def lacks_witness(subject: Subject, question: Property, sampling: Sampling) -> b
     """Return whether a formulation states that it fails, and names no case that shows so, where it is asked for one."""
     if question.refusal_of(subject) or (question.needs | question.shown_by) - subject.provides:
         return False
-    stated = question.promise(subject.traits) is False and not _is_on_scene(question, sampling)
+    on_scene = question.bodies and sampling.scene is not None  # It is asked on the scene of the run alone.
+    stated = question.promise(subject.traits) is False and not on_scene
     return stated and subject.traits.witness(question.id) is None
 
 
-def _is_on_scene(question: Property, sampling: Sampling) -> bool:
-    """Return whether a property is asked on the scene of the run alone."""
-    return question.bodies and sampling.scene is not None
-
-
-def _traits_of_promise(question: Property, subject: Subject) -> str:
+def _words_of_promise(question: Property, subject: Subject) -> str:
     """Return the traits from which a promise to pass follows, in words; of a table, as published forces, its name."""
     traits = traits_behind(question.promise, subject.traits)
     stated = {name: value for name, value in traits.items() if value is not False}
@@ -405,7 +394,7 @@ def shrink_case(
             count(calls)
         outcome = judge.judge_case(question, case, subject)
         bad = badness(question.info, outcome)
-        if bad[0] != goal.kind or bad < goal.least:
+        if bad[0] != goal.least[0] or bad < goal.least:
             return False
         smallest = outcome
         return True
@@ -423,18 +412,17 @@ def find_missing(
     """
     names = {subject.name: subject for subject in subjects if isinstance(subject, Subject)}
     properties = {question.id: question for question in questions if isinstance(question, Property)}
-    if missing := find_missing_row(result, names, properties):
-        return missing
-    lacks = (_missing_of(row, names[row.formulation], properties[row.property_id], sampling) for row in result.rows)
-    return next(filter(None, lacks), "")
+    rows = ((row, names[row.formulation], properties[row.property_id]) for row in result.rows)
+    lacks = (_missing_of(row, subject, question, sampling) for row, subject, question in rows)
+    return find_missing_row(result, names, properties) or next(filter(None, lacks), "")
 
 
 def find_missing_row(result: Run, names: Iterable[str], property_ids: Iterable[str]) -> str:
     """Return which row is missing, or there without a plan."""
     planned = Counter(product(names, property_ids))
     rows = Counter((row.formulation, row.property_id) for row in result.rows)
-    wrong = (key for key in planned | rows if rows[key] != planned[key])
-    return next((f"{' '.join(key)}: {rows[key]} rows instead of {planned[key]}" for key in wrong), "")
+    wrong = next((key for key in planned | rows if rows[key] != planned[key]), None)
+    return "" if wrong is None else f"{' '.join(wrong)}: {rows[wrong]} rows instead of {planned[wrong]}"
 
 
 def _missing_of(row: Row, subject: Subject, question: Property, sampling: Sampling) -> str:

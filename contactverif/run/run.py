@@ -82,34 +82,10 @@ def run(
 ) -> Run:
     """Check every property of every formulation, and return a row for each of both.
 
-    Parameters
-    ----------
-    subjects, properties : Sequence
-        As the registry loads them. One that did not load is reported and fails the run.
-    profile, examples, seed : Profile | str, int | None
-        The numbers of cases and the seed, and numbers that overrule those of the profile.
-    place : Interface | Case | None
-        Check everything on this interface, with random states, instead of on random interfaces. Of a scene, check what
-        needs bodies on it alone, and all else on its interface; a pass there breaks no statement that the formulation
-        fails.
-    known : Mapping[str, str] | None
-        {property id: reason why its failure is known}.
-    shrink : Shrink
-        The failures that are shrunk: `"new"` those that neither the formulation nor `known` states, `"one"` the most
-        telling one of each formulation, `"all"` or `"none"`. One that is not shrunk shows the witness, or the first
-        case that clearly fails.
-    progress : Callable[[Progress], None] | None
-        A function that is called after every case; with an executor, after every job. It gets each row as soon as
-        its cases are judged.
-    executor : Executor | None
-        Worker processes that do the jobs, such as a `concurrent.futures.ProcessPoolExecutor`, one of loky or
-        ``dask.distributed.Client().get_executor()``; None for this process. The results are the same but for seconds.
-    store : Store | None
-        The store into which every outcome is written, and whose outcomes are not judged again.
-    keep_going : bool
-        Ask all properties of a formulation, whatever the first of them show. Else a formulation is asked nothing more
-        once its forces have the opposite sign, or it crashes, breaks the contract or is impure in the cases of
-        `purity`.
+    Subjects and properties are as the registry loads them: one that did not load is reported and fails the run.
+    `examples` and `seed` overrule those of the profile; the other options are those of `contactverif.verify`.
+    `progress` is called after every case, with an executor after every job. The executor may be any whose workers are
+    processes, such as one of loky or dask; None for this process. The results are the same but for seconds.
 
     Raises
     ------
@@ -120,8 +96,7 @@ def run(
     RunStopped
         If the user presses Ctrl-C. It is a `KeyboardInterrupt` with the rows as far as they are judged.
     """
-    known = known or {}
-    check_known(known, properties)
+    check_known(known or {}, properties)
     if shrink not in get_args(Shrink):
         raise MisuseError("shrink", repr(shrink), "one, new, all or none")
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
@@ -219,7 +194,7 @@ class Driver:
         self._groups: dict[tuple[str, bool], list[Property]] = {}
         # The property that each formulation is asked: with cases in the plane, or in space.
         self._variants: dict[tuple[str, str], Property] = {}
-        for question in sorted(questions, key=_turn):
+        for question in sorted(questions, key=attrgetter("bodies", "turn")):
             variants = {(subject.name, question.id): question.for_traits(subject.traits) for subject in subjects}
             self._variants |= variants
             for variant in dict.fromkeys(variants.values()):
@@ -230,9 +205,6 @@ class Driver:
         self._diagnoses: dict[str, str] = {}
         self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
 
-    # -----------------------------------------------------------------------------------------------------------------
-    # The run from its first call to its result
-
     def work(self) -> None:
         """Do all jobs. Before any outcome of the store counts, a share of them is judged again."""
         sampling, work = self._sampling, self._scheduler.work
@@ -242,9 +214,7 @@ class Driver:
             if not self._keep_going:
                 self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
                 pairs = product(self._subjects, self._questions)
-                lacking = [
-                    subject.name for subject, question in pairs if lacks_witness(subject, question, self._sampling)
-                ]
+                lacking = (subject.name for subject, question in pairs if lacks_witness(subject, question, sampling))
                 self._stopped |= dict.fromkeys(lacking, "the traits state a failure without a witness")
             work(self._earlier_failures())
             if not self._keep_going:
@@ -269,11 +239,10 @@ class Driver:
             self._report(before)
             yield Job(judge.call_first, (subject, needs & subject.provides), partial(self._note_first, before, subject))
 
-    def _note_first(self, before: Progress, subject: Subject, first: judge.FirstCall) -> Iterable[Job]:
+    def _note_first(self, before: Progress, subject: Subject, first: judge.FirstCall) -> None:
         subject.first_answers = subject.first_answers or first.answers  # In a second run the process is warm.
         self._opposite_signs |= {subject.name} if first.opposite_sign else set()
         self._report(replace(before, count=1, first_seconds=first.seconds))
-        return ()
 
     def _earlier_failures(self) -> Iterator[Job]:
         """Yield the jobs to judge what failed in earlier runs; none of them counts among the planned cases."""
@@ -291,13 +260,10 @@ class Driver:
             note = partial(self._note_earlier_failure, before, subject, question)
             yield Job(judge.judge_if_applicable, (question, case, subject), note)
 
-    def _note_earlier_failure(
-        self, before: Progress, subject: Subject, question: Property, outcome: Outcome
-    ) -> Iterable[Job]:
+    def _note_earlier_failure(self, before: Progress, subject: Subject, question: Property, outcome: Outcome) -> None:
         if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED):
             self._fail_again[subject.name, question.id] = outcome
             self._report(replace(before, count=1, row=row_of_case(question, subject, outcome)))
-        return ()
 
     def _stop_wrong(self) -> None:
         """Note the formulations of which the first properties have shown what may explain every failure to come."""
@@ -330,7 +296,7 @@ class Driver:
             not_loaded=not_loaded,
             provided=self.provided,
             opposite_signs=self.opposite_signs,
-            diagnoses=self._diagnoses,
+            diagnoses={name: text for name, text in self._diagnoses.items() if text},
             provenance=provenance,
         )
 
@@ -350,16 +316,12 @@ class Driver:
             error = f"{self._store.folder.name}: {self._store.write_error}"
             raise MisuseError("--out", error, "a disk with room")
 
-    # -----------------------------------------------------------------------------------------------------------------
-    # The parts
-
     def _parts(self) -> Iterator[Iterable[Job]]:
         """Yield the jobs of each part; those of a part are made when they are wanted."""
         while self._groups:
             yield from self._parts_of_next()
 
     def _parts_of_next(self) -> Iterator[Iterable[Job]]:
-        """Yield the parts of the next properties with the same cases."""
         rows = self._open_next()
         for row in rows:
             if row.witness is not None and not row.witnessed:
@@ -370,7 +332,8 @@ class Driver:
             for row in rows:
                 chunks = _in_chunks(listed, LIST_CHUNK)
                 if self._share is None:
-                    yield self._expect(row, chunks, len(listed), last=True)
+                    row.expect({chunk.first: chunk for chunk in chunks}, planned=len(listed), last=True)
+                    yield self._finish(row)
                 yield from (self._judge(row, chunk) for chunk in chunks)
         else:
             n_blocks = 1 if self._share is None else draw.number_of_blocks(self._sampling.examples)
@@ -398,21 +361,19 @@ class Driver:
 
     def _blocks(self, rows: Sequence[OpenRow], number: int) -> Iterator[Job]:
         """Yield the jobs of a block and, but for a share, of all blocks behind it: the rows have the same cases."""
-        question, examples = rows[0].question, self._sampling.examples
+        question, sampling = rows[0].question, self._sampling
         while (known := self._known_block(rows, number)) is not None:
             yield from known
             number += 1
-            if self._share is not None or number * BLOCK >= examples:
+            if self._share is not None or number * BLOCK >= sampling.examples:
                 return
-        if number > 0 and self._share is not None and not self._draws_blocks(question):
-            return  # Where a strategy runs out of cases, the first block has all of them.
-        before = Progress(rows[0].subject.name, question.id, "drawing", 0, examples)
-        yield Job(draw_chunks, (self._sampling, question, number), partial(self._add_drawn, rows, number), before)
-
-    def _draws_blocks(self, question: Property) -> bool:
-        source, sampling = self._sampling.source(question), self._sampling
-        assert source is not None
-        return draw.draws_blocks(source, seed=sampling.key(question), examples=sampling.examples)
+        if number > 0 and self._share is not None:
+            source = sampling.source(question)
+            assert source is not None
+            if not draw.draws_blocks(source, seed=sampling.key(question), examples=sampling.examples):
+                return  # Where a strategy runs out of cases, the first block has all of them.
+        before = Progress(rows[0].subject.name, question.id, "drawing", 0, sampling.examples)
+        yield Job(draw_chunks, (sampling, question, number), partial(self._add_drawn, rows, number), before)
 
     def _known_block(self, rows: Sequence[OpenRow], number: int) -> Iterable[Job] | None:
         """Return the jobs that follow from the outcomes of a block; None if it is to be drawn.
@@ -423,23 +384,22 @@ class Driver:
         if number == 0:
             return None
         first = number * BLOCK
-        count, parts = min(BLOCK, self._sampling.examples - first), []
+        examples = self._sampling.examples
+        count, parts = min(BLOCK, examples - first), []
         for row in rows:
             stored = self._store.outcomes(row.subject.name, row.question.info, first, count)
-            if len(stored) < count or (self._share is None and row.may_keep_whole(first, stored.values())):
+            if len(stored) < count or (self._share is None and row.outcomes.may_keep_whole(first, stored.values())):
                 return None
             parts.append(tuple(stored[place] for place in range(count)))
         if self._share is not None:
             return ()
         jobs: list[Job] = []
         for row, outcomes in zip(rows, parts, strict=True):
-            examples = self._sampling.examples
             row.expect({first: count}, planned=examples, last=first + count == examples)
             jobs += self._add(row, first, JudgedCases(outcomes))
         return jobs
 
     def _add_drawn(self, rows: Sequence[OpenRow], number: int, cases: DrawnCases) -> Iterable[Job]:
-        """Return the jobs to judge a block, then those of the next block."""
         if number == 0:
             for chunk in cases.chunks[: -(-WHOLE // CHUNK)]:
                 chunk.keep()
@@ -448,16 +408,10 @@ class Driver:
             return judging
         count = number * BLOCK + sum(chunk.count for chunk in cases.chunks)
         planned = count if cases.exhausted else self._sampling.examples
-        finished = [self._expect(row, cases.chunks, planned, last=cases.last) for row in rows]
-        return chain(*finished, judging, () if cases.last else self._blocks(rows, number + 1))
-
-    def _expect(self, row: OpenRow, chunks: Sequence[CaseChunk], planned: int, *, last: bool) -> Iterable[Job]:
-        """Let a row expect the outcomes of chunks; one without any case is complete."""
-        row.expect({chunk.first: chunk for chunk in chunks}, planned=planned, last=last)
-        return self._finish(row)
-
-    # -----------------------------------------------------------------------------------------------------------------
-    # A chunk, and the end of a row
+        for row in rows:
+            row.expect({chunk.first: chunk for chunk in cases.chunks}, planned=planned, last=cases.last)
+        # A row without any case is complete.
+        return chain(*map(self._finish, rows), judging, () if cases.last else self._blocks(rows, number + 1))
 
     def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
         """Yield the job to judge the cases of a chunk that are not judged yet."""
@@ -467,18 +421,16 @@ class Driver:
             yield from self._add(row, chunk.first, JudgedCases(tuple(stored[place] for place in range(chunk.count))))
             return
         arguments = question, row.subject, chunk, self._store.writer(name, question.id, chunk.first), stored
-        yield Job(judge_cases, arguments, partial(self._add_judged, row, chunk.first), self._judging(row))
+        yield Job(judge_cases, arguments, partial(self._add, row, chunk.first, is_new=True), self._judging(row))
 
     def _judging(self, row: OpenRow) -> Progress:
         of_run = self._meter.read(self._rows)
         return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned, of_run=of_run)
 
-    def _add_judged(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
-        self._meter.measure(row.question.id, judged.outcomes)
-        return self._add(row, first, judged)
-
-    def _add(self, row: OpenRow, first: int, judged: JudgedCases) -> Iterable[Job]:
+    def _add(self, row: OpenRow, first: int, judged: JudgedCases, *, is_new: bool = False) -> Iterable[Job]:
         """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""
+        if is_new:
+            self._meter.measure(row.question.id, judged.outcomes)
         self._store.write_error = self._store.write_error or judged.write_error
         if self._share is not None:
             self.check_written()
@@ -500,26 +452,23 @@ class Driver:
         if goal is None:
             return ()
         shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
-        return self._shrink_row(row, goal) if shrinks else self._add_shrunk(row, goal.first, None)
+        return self._shrink_row(row, goal, shrinks=shrinks)
 
-    def _shrink_row(self, row: OpenRow, goal: Shrinking) -> Iterable[Job]:
+    def _shrink_row(self, row: OpenRow, goal: Shrinking, *, shrinks: bool = True) -> Iterable[Job]:
         """Return the job to shrink what failed in a row; of a list of cases nothing is smaller."""
-        if row.listed is not None:
-            return self._add_shrunk(row, goal.first, None)
+        add = partial(self._add_shrunk, row, goal.first)
+        if row.listed is not None or not shrinks:
+            add(None)
+            return ()
         before = Progress(row.subject.name, row.question.id, "shrinking", 0, SHRINK_CALLS)
-        arguments = self._sampling, row.question, row.subject, goal
-        return (Job(shrink_case, arguments, partial(self._add_shrunk, row, goal.first), before),)
+        return (Job(shrink_case, (self._sampling, row.question, row.subject, goal), add, before),)
 
-    def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> Iterable[Job]:
+    def _add_shrunk(self, row: OpenRow, first: int, smallest: Outcome | None) -> None:
         """Add the smallest case. Without one the witness shows the failure, or the first case that clearly fails."""
         row.row = replace(row.row, shrunk=smallest, first=None)
         if counterexample_of(row.row) is None:
             case = draw.with_case(self._sampling, row.question, first, row.outcomes[first])
             row.row = replace(row.row, first=case)
-        return ()
-
-    # -----------------------------------------------------------------------------------------------------------------
-    # What explains the failures
 
     def _explain_first_failure(self) -> Iterator[Job]:
         """Yield the jobs to diagnose, and to shrink, the failure of each formulation with the lowest rank."""
@@ -534,15 +483,10 @@ class Driver:
             others = [wrong.property_id for wrong in wrong_rows(each.row for each in rows.values())]
             self._report(Progress(subject.name, failure.property_id, "diagnosis", 0, 1))
             if subject.traits.abilities.in_plane:  # The rules look at plane states.
-                note = partial(self._add_diagnosis, subject.name)
+                note = partial(self._diagnoses.__setitem__, subject.name)
                 yield Job(diagnose, (subject, failure.property_id, others), note)
             if self._shrink == "one" and (goal := row.goal()) is not None:
                 yield from self._shrink_row(row, goal)
-
-    def _add_diagnosis(self, name: str, text: str) -> Iterable[Job]:
-        if text:
-            self._diagnoses[name] = text
-        return ()
 
     def _measure_forces(self) -> Iterator[Job]:
         """Yield the jobs to ask for the forces on each counterexample in space, which no text can show."""
@@ -552,21 +496,14 @@ class Driver:
                 arguments = row.question, outcome.case, row.subject
                 yield Job(judge.forces_to_draw, arguments, partial(self._add_forces, row))
 
-    def _add_forces(self, row: OpenRow, forces: NodalForces | None) -> Iterable[Job]:
+    def _add_forces(self, row: OpenRow, forces: NodalForces | None) -> None:
         row.row = replace(row.row, forces=forces)
-        return ()
 
     def _open_rows(self) -> list[OpenRow]:
         return [row for row in self._rows.values() if isinstance(row, OpenRow)]
 
 
-def _turn(question: Property) -> tuple[bool, int]:
-    """Return the key by which properties are asked: those that solve bodies last, since they take long."""
-    return question.bodies, question.turn
-
-
 def _check_place(subject: Subject, interface: Interface | None) -> None:
-    """Refuse the interface of a user if a formulation does not take such faces."""
     if interface is None or isinstance(subject, EngineSubject):
         return
     abilities = subject.traits.abilities
@@ -578,7 +515,6 @@ def _check_place(subject: Subject, interface: Interface | None) -> None:
 
 
 def _check_once(argument: str, names: Iterable[str]) -> None:
-    """Check that no name stands there twice."""
     for name, times in Counter(names).items():
         if times > 1:
             raise MisuseError(argument, f"{name} {times} times", "each of them once")
@@ -601,7 +537,6 @@ def draw_chunks(
 
 
 def _in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
-    """Return cases, of which the first has a number in its row, in chunks of a size."""
     return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
 
 
@@ -655,7 +590,6 @@ class RunMeter:
         return RunProgress(finished, planned, self._guess(left) if finished > _SHARE * planned else None)
 
     def _guess(self, left: Mapping[tuple[bool, bool], int]) -> float | None:
-        """Return the seconds that cases take, if they go on as fast as those before."""
         measured = sum(self._seconds.values())
         if not measured or self._started is None:
             return None

@@ -336,7 +336,6 @@ def group_names(name: str) -> list[str]:
 
 @cache
 def _settings() -> dict[str, str]:
-    """Return {name of a setting: field of `RunOptions`}."""
     return {option.setting: name for name, (_, option) in declared_options(RunOptions).items() if option.setting}
 
 
@@ -355,7 +354,6 @@ def read_settings() -> RunOptions:
 
 
 def _convert(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields that a table of settings gives, each of the right kind."""
     import msgspec
 
     from contactverif.contract.errors import unknown_name_error
@@ -399,7 +397,6 @@ def _strongest(wanted: Isolation | None, opened: tuple[str, ...], argument: str)
 
 
 def _absolute(opened: Iterable[str]) -> tuple[str, ...]:
-    """Return what is open by absolute paths, each of which must exist."""
     from contactverif.isolation.confine import NETWORK
 
     paths = tuple(path if path == NETWORK else os.path.abspath(path) for path in opened)

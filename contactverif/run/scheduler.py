@@ -44,6 +44,12 @@ _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers t
 class WorkerError(ContactverifError):
     """A worker process ended before it had done its job."""
 
+    def __init__(self) -> None:
+        super().__init__(
+            "a worker process died, so the run is not complete; a plugin may have crashed or ended it. "
+            "Run again with --jobs 1 to see where"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class RunProgress:
@@ -73,11 +79,11 @@ class Progress:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Job:
-    """A call of a function, and what the parent does with the result: `then` returns the jobs that follow."""
+    """A call of a function, and what the parent does with the result: `then` returns the jobs that follow, if any."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    then: Callable[[Any], Iterable[Job]]
+    then: Callable[[Any], Iterable[Job] | None]
     progress: Progress | None = None  # At its start. In the parent, the function gets `count` to report each case.
 
 
@@ -102,13 +108,12 @@ class Scheduler:
                 elif (future := _submit(self._executor, job.function, *job.arguments)) is not None:
                     running[future] = job
                 else:
-                    waiting.appendleft(iter(job.then(self._do_here(job))))
+                    waiting.appendleft(iter(job.then(self._do_here(job)) or ()))
             for future in self._wait(running):
                 job = running.pop(future)
-                waiting.appendleft(iter(job.then(_fetch(future, partial(self._do_here, job)))))
+                waiting.appendleft(iter(job.then(_fetch(future, partial(self._do_here, job))) or ()))
 
     def _wait(self, running: Iterable[Future[bytes]]) -> Iterable[Future[bytes]]:
-        """Wait until some of the jobs that run are done, and return them."""
         while running:
             if ended := wait(running, _SILENCE, FIRST_COMPLETED).done:
                 return ended
@@ -123,7 +128,6 @@ class Scheduler:
             self._report(step)
 
     def _do_here(self, job: Job) -> Any:
-        """Return the result of a job that the parent does."""
         start = job.progress
         if start is None:
             return job.function(*job.arguments)
@@ -145,7 +149,7 @@ def _submit(executor: Executor | None, function: Callable[..., Any], *arguments:
     try:
         return executor.submit(_do, encoded)
     except BrokenExecutor as error:
-        raise _worker_error() from error
+        raise WorkerError from error
 
 
 def _fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
@@ -153,7 +157,7 @@ def _fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
     try:
         answer = future.result()
     except BrokenExecutor as error:
-        raise _worker_error() from error
+        raise WorkerError from error
     if answer == _NOT_HERE:
         return here()
     result, words, known_hangs = decode(answer)
@@ -215,13 +219,6 @@ def _do(encoded: bytes) -> bytes:
     return encode((function(*arguments), last_words(), hangs()))
 
 
-def _worker_error() -> WorkerError:
-    return WorkerError(
-        "a worker process died, so the run is not complete; a plugin may have crashed or ended it. "
-        "Run again with --jobs 1 to see where"
-    )
-
-
 class CaseChunk:
     """A few cases of a row that are judged in one job. They are encoded once, and decoded when they are wanted.
 
@@ -232,16 +229,13 @@ class CaseChunk:
 
     def __init__(self, cases: Sequence[Case], first: int) -> None:
         self._cases: tuple[Case, ...] | None = tuple(cases)
-        self._encoded: bytes | None = None
+        self._encoded = b""
         self.first, self.count = first, len(cases)
 
     @property
     def cases(self) -> tuple[Case, ...]:
         """The cases; of a chunk that came from another process they are made anew at every call."""
-        if self._cases is not None:
-            return self._cases
-        assert self._encoded is not None
-        cases: tuple[Case, ...] = decode(self._encoded)
+        cases: tuple[Case, ...] = decode(self._encoded) if self._cases is None else self._cases
         return cases
 
     def keep(self) -> None:
@@ -249,7 +243,7 @@ class CaseChunk:
         self._cases = self.cases
 
     def __getstate__(self) -> tuple[bytes, int, int]:
-        return encode(self._cases) if self._encoded is None else self._encoded, self.first, self.count
+        return self._encoded or encode(self._cases), self.first, self.count
 
     def __setstate__(self, state: tuple[bytes, int, int]) -> None:
         self._cases = None
@@ -289,7 +283,6 @@ def _read_only(data: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray[An
 
 @cache
 def _find_registered(property_id: str) -> Any:
-    """Return the installed property of that id, or None."""
     installed = _read_installed()
     return load_property(property_id, installed) if property_id in installed else None
 

@@ -105,18 +105,15 @@ class _OutcomeFile(RecordFile):
         if form not in self._forms:
             if len(self._forms) >= _MOST_FORMS:
                 self._forms.clear()
-            place = self.append(_encode_form(form))
+            try:
+                message = _ENCODER.encode(("form", form))
+            except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
+                message = _ENCODER.encode(("form", _spell_out(form)))
+            place = self.append(message)
             if place is None:
                 return
             self._forms[form] = place
         self.append(_ENCODER.encode(OutcomeRecord(row, number, self._forms[form], array("d", numbers).tobytes())))
-
-
-def _encode_form(form: records.Form) -> bytes:
-    try:
-        return _ENCODER.encode(("form", form))
-    except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
-        return _ENCODER.encode(("form", _spell_out(form)))
 
 
 def _spell_out(item: Any) -> Any:
@@ -172,7 +169,7 @@ class Store:
         self._room = max(_LEAST_ROOM, 2 * plan.examples) + 1  # A case with a larger number is not believed.
         self._paths = [path for source in sources for path in record_files(source)]
         self.same_machine = all(_machine_of(source) == machine() for source in sources)
-        self._decoders: dict[tuple[int, int], Callable[[Any], Outcome] | None] = {}  # {(file, place of a form): …}
+        self._decoders: dict[tuple[int, int], Callable[[Any], Outcome]] = {}  # {(file, place of a form): …}
         self._keys, self._places = self._read_places()
 
     def _read_places(self) -> tuple[Any, Any]:
@@ -210,7 +207,6 @@ class Store:
         return Writer(str(self.folder), self._session, self._rows[formulation, property_id], first)
 
     def _range(self, formulation: str, property_id: str, first: int, count: int) -> slice:
-        """Return where the outcomes of some cases of a row stand among all."""
         row = self._rows.get((formulation, property_id))
         if row is None:
             return slice(0)
@@ -240,16 +236,16 @@ class Store:
         if not isinstance(record, OutcomeRecord) or not 0 <= record.form < place:
             return None
         key = file, record.form
-        if key not in self._decoders:
-            if len(self._decoders) >= _MOST_FORMS:
-                self._decoders.clear()
-            self._decoders[key] = _decoder_at(stream, record.form)
-        decoder = self._decoders[key]
-        if decoder is None or len(record.numbers) % 8:
-            return None
         try:
-            outcome = judge_stored(info, decoder(array("d", record.numbers)))
-        except ValueError:  # They do not belong together, or are of another property.
+            if key not in self._decoders:
+                if len(self._decoders) >= _MOST_FORMS:
+                    self._decoders.clear()
+                stored = _read_record(stream, record.form)
+                if not isinstance(stored, FormRecord):
+                    return None
+                self._decoders[key] = records.decoder(Outcome, stored.form)
+            outcome = judge_stored(info, self._decoders[key](array("d", record.numbers)))
+        except ValueError:  # They are damaged, do not belong together, or are of another property.
             return None
         return None if outcome.measurement is None and outcome.verdict is Verdict.PASS else outcome
 
@@ -279,15 +275,6 @@ class Store:
 def _read_record(stream: IO[bytes], place: int) -> Any:
     message = read_message(stream, place)
     return None if message is None else decode(message, _DECODER)
-
-
-def _decoder_at(stream: IO[bytes], place: int) -> Callable[[Any], Outcome] | None:
-    """Return what makes outcomes of the form at a place; None if it is damaged, or none."""
-    stored = _read_record(stream, place)
-    try:
-        return records.decoder(Outcome, stored.form) if isinstance(stored, FormRecord) else None
-    except ValueError:
-        return None
 
 
 def _machine_of(source: Path) -> dict[str, str]:

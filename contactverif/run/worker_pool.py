@@ -90,19 +90,13 @@ def _context() -> Any:
 
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOAD)
-    with _interrupts_wait(), one_thread_for_children():  # The server inherits both, and hears no Ctrl-C.
-        forkserver.ensure_running()  # It imports while the parent goes on.
-    return context
-
-
-@contextmanager
-def _interrupts_wait() -> Iterator[None]:
-    """Open a block behind which Ctrl-C is heard at the latest."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with one_thread_for_children():  # The server inherits both, and hears no Ctrl-C.
+            forkserver.ensure_running()  # It imports while the parent goes on.
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return context
 
 
 def _begin_worker() -> None:
