@@ -21,9 +21,8 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.interface import Interface
-from contactverif_paper.paper_columns import WORDS, Column
 from contactverif_paper.paper_formulations import VTS_PPT, subject_of
-from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, Progress, Statement
+from contactverif_paper.paper_item import WORDS, Agreement, Cell, Column, Item, PageTable, Statement
 from contactverif_reports.html.pages import number
 
 PENALTY = 16.0
@@ -45,13 +44,13 @@ class Geometry:
     def __init__(self, x: np.ndarray) -> None:
         self.x = x
         self.x_m = (x[A] + x[B]) / 2
-        self.l_12 = _length(x[NODE_2] - x[NODE_1])
+        self.l_12 = np.sqrt((x[NODE_2] - x[NODE_1]) @ (x[NODE_2] - x[NODE_1]))
         self.t = (x[NODE_2] - x[NODE_1]) / self.l_12
         self.n = np.array([self.t[1], -self.t[0]])
         x_v = (1 - C) / 2 * x[A] + (1 + C) / 2 * x[B]
         self.g = (x_v - x[NODE_1]) @ self.n
         self.xi = (x_v - x[NODE_1]) @ self.t / self.l_12
-        self.l_ab = _length(x[B] - x[A])
+        self.l_ab = np.sqrt((x[B] - x[A]) @ (x[B] - x[A]))
         self.l_first = (x[NODE_1] - x[NODE_F]) @ self.t
         self.l_between = (x[NODE_2] - x[NODE_1]) @ self.t
         self.l_last = (x[NODE_L] - x[NODE_2]) @ self.t
@@ -172,8 +171,7 @@ class _Checks:
     check: Annotated[tuple[str, ...], Column("formula", WORDS, "what it is compared with")] = _CHECKS
 
 
-def _compute(report_progress: Progress) -> _Checks:
-    report_progress("Appendix A")
+def _compute() -> _Checks:
     return _Checks(errors(Increment))
 
 
@@ -208,8 +206,8 @@ def _integrals(geometry: Geometry) -> dict[str, Vector]:
     last_f, last_n = both(0.0, geometry.xi_a, geometry.l_last)
     between, _ = both(0.0, 1.0, geometry.l_between)
     f_v = -geometry.unit(geometry.l_ab) * float(_GAUSS.size) / 4  # Half of the slave segment.
-    first, last = {"first_f": first_f, "first_n": first_n}, {"last_f": last_f, "last_n": last_n}
-    return first | {"between": between} | last | {"f_v": f_v}
+    forces = {"first_f": first_f, "first_n": first_n, "between": between, "last_f": last_f, "last_n": last_n}
+    return forces | {"f_v": f_v}
 
 
 def _work_errors(directions: FloatArray, increment: Callable[[Geometry, np.ndarray], Increment]) -> dict[str, float]:
@@ -234,10 +232,6 @@ def _relative(value: Any, exact: Any) -> float:
     return float(np.abs(value - exact).max() / np.abs(exact).max())
 
 
-def _length(vector: Vector) -> Any:
-    return np.sqrt(vector @ vector)
-
-
 def _statements(checks: _Checks) -> Iterator[Statement]:
     wrong = [checks.formula[row] for row in np.flatnonzero(~(checks.difference <= TOLERANCE))]
     text = f"each agrees with its check, within {number(float(checks.difference.max()), 2)}"
@@ -252,13 +246,13 @@ def _statements(checks: _Checks) -> Iterator[Statement]:
 def _tables(checks: _Checks) -> Iterator[PageTable]:
     marks = [f"{'✓' if error <= TOLERANCE else '✗'} {number(error, 2)}" for error in checks.difference.tolist()]
     rows = zip(checks.formula, checks.text, checks.check, marks, strict=True)
-    yield PageTable(
+    yield PageTable.of_cells(
         "Appendix A, formula by formula",
         ("No.", "Formula", "Compared with", "Difference"),
-        tuple(
-            (Cell((name,)), Cell((text,)), Cell((check,), tone="soft"), Cell((mark,), tone="n"))
+        [
+            (name, (Cell((text,)), Cell((check,), tone="soft"), Cell((mark,), tone="n")))
             for name, text, check, mark in rows
-        ),
+        ],
     )
 
 

@@ -1,8 +1,7 @@
-"""Computes the force tables of the paper in exact rationals: what each formulation makes of a uniform pressure p = 1.
+"""The force tables of the paper in exact rationals: what each formulation makes of a uniform pressure p = 1.
 
 Formulations compute in floats. On these states (lengths are small integers, the penetration is 1/16, ε̂ |g| = 1) their
 forces are rationals with small denominators up to a few roundings. So the rational is recovered and the rest checked.
-Items `case_a1`, `case_b` and `case_c` use this file.
 
 Source: Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
 """
@@ -22,7 +21,6 @@ from contactverif.contract.case import Case
 from contactverif.contract.schema import Group
 from contactverif.oracle import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
-from contactverif_paper.paper_columns import Column, name_columns, variables_of
 from contactverif_paper.paper_formulations import (
     BALANCED,
     MORTAR,
@@ -33,25 +31,34 @@ from contactverif_paper.paper_formulations import (
     VTS_ME,
     VTS_PPT,
     PaperFormulation,
+    name_columns,
     subject_of,
 )
-from contactverif_paper.paper_item import Agreement, Cell, PageTable, Statement
+from contactverif_paper.paper_item import Agreement, Cell, Column, PageTable, Statement, variables_of
 
 FORMULATIONS = (NTS, NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
-EXACT = PaperFormulation("exact", "")
 _LARGEST_DENOMINATOR = 60
-Fractions = tuple[Fraction, ...]
 _ROUNDINGS = 256  # A force is the sum of a few dozen terms.
+Fractions = tuple[Fraction, ...]
 
 
-def _fraction_columns(name: str, dim: str, meaning: str) -> tuple[Column, Column]:
-    comment = "0 over 0: nothing there"
-    parts = (("numerator", schema.LENGTH), ("denominator", "1"))
-    numerator, denominator = (
-        Column(dim, unit, f"force {meaning}: {part}", comment, part=part, name=f"{name}_{part}", pad=0)
-        for part, unit in parts
+def _fraction_columns(name: str, dim: str, meaning: str) -> tuple[Column, ...]:
+    return tuple(
+        Column(
+            dim, unit, f"force {meaning}: {part}", "0 over 0: nothing there", part=part, name=f"{name}_{part}", pad=0
+        )
+        for part, unit in (("numerator", schema.LENGTH), ("denominator", "1"))
     )
-    return numerator, denominator
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedForces:
+    """The forces on the master that a figure of the paper prints, from left to right: "3/2 3 7/2 3 1"."""
+
+    figure: str
+    claim: str
+    exact: str
+    transmitted: Mapping[PaperFormulation, str]  # By each formulation that the paper shows.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +83,7 @@ class ForceTable:
 
     case: str
     title: str
+    source: PrintedForces
     slave_length: Annotated[tuple[float, ...], Column("slave_segment", schema.LENGTH, "length of the slave's segments")]
     master_length: Annotated[
         tuple[float, ...], Column("master_segment", schema.LENGTH, "length of the master's segments")
@@ -83,42 +91,64 @@ class ForceTable:
     exact: Forces
     rows: tuple[Forces, ...]
 
+    @classmethod
+    def compute(cls, name: str, title: str, source: PrintedForces) -> ForceTable:
+        """Compute the table of one case."""
+        case = named_case(name)
+        n_slave, along = case.interface.n_slave_nodes, case.parameters["along"]
+        weights = uniform_pressure_weights_exact(case.interface, along)
+        from_left = np.argsort(along[:n_slave]), n_slave + np.argsort(along[n_slave:])
+        on_slave, on_master = (tuple(weights[node] for node in side.tolist()) for side in from_left)
+        exact = Forces(PaperFormulation("exact", ""), on_slave, on_master, printed=_fractions(source.exact))
+        rows = tuple(
+            _forces(case, row, *from_left, _fractions(source.transmitted.get(row, ""))) for row in FORMULATIONS
+        )
+        slave, master = (tuple(np.diff(np.sort(part)).tolist()) for part in (along[:n_slave], along[n_slave:]))
+        return cls(name, title, source, slave, master, exact, rows)
+
     @property
     def all_rows(self) -> tuple[Forces, ...]:
         """The exact forces, and the rows behind them."""
         return (self.exact, *self.rows)
 
-    @property
-    def rounding(self) -> float:
-        """The largest rounding of all rows."""
-        return max(row.rounding for row in self.rows)
+    def statement(self) -> Statement:
+        """Compare all printed fractions with the computed ones."""
+        wrong = [row.formulation.legend for row in self.all_rows if row.printed and row.printed != row.master]
+        result = "the consistent forces are the printed ones"
+        if n_fractions := sum(len(row.printed) for row in self.rows):
+            result += f", and so are all {n_fractions} fractions of the formulations on the master"
+        if wrong:
+            result = f"other fractions: {', '.join(wrong)}"
+        claim = f"{self.title}: {self.source.claim}"
+        return Statement(self.source.figure, claim, result, Agreement.decide(not wrong))
 
+    def page_table(self) -> PageTable:
+        """Return the table of the page; consistent forces are bold."""
+        slave, master = (", ".join(f"{each:g}" for each in side) for side in (self.slave_length, self.master_length))
+        rounding = max(row.rounding for row in self.all_rows)
+        return PageTable.of_cells(
+            f"{self.title}: nodal forces over p from left to right; slave segments {slave}; master segments {master}. "
+            f"Bold: the consistent forces. Largest rounding: {rounding:.1e}",
+            ("Formulation", "Slave nodes", "Virtual slave nodes", "Master nodes", "Printed for the master"),
+            [
+                (
+                    row.formulation.legend,
+                    (
+                        _cell(row.slave, self.exact.slave),
+                        _cell(row.points, ()),
+                        _cell(row.master, self.exact.master),
+                        _printed_cell(row),
+                    ),
+                )
+                for row in self.all_rows
+            ],
+        )
 
-def force_table(name: str, title: str, exact: str, printed: Mapping[PaperFormulation, str]) -> ForceTable:
-    """Compute the table of one case."""
-    case = named_case(name)
-    interface, n_slave = case.interface, case.interface.n_slave_nodes
-    along = case.parameters["along"]
-    weights = uniform_pressure_weights_exact(interface, along)
-    from_left = np.argsort(along[:n_slave]), n_slave + np.argsort(along[n_slave:])
-    exact_slave, exact_master = (tuple(weights[node] for node in side.tolist()) for side in from_left)
-    rows = [_forces(case, row, *from_left, _fractions(printed.get(row, ""))) for row in FORMULATIONS]
-    slave, master = (tuple(np.diff(np.sort(part)).tolist()) for part in (along[:n_slave], along[n_slave:]))
-    consistent = Forces(EXACT, exact_slave, exact_master, printed=_fractions(exact))
-    return ForceTable(name, title, slave, master, consistent, tuple(rows))
-
-
-def force_statement(table: ForceTable, place: str, claim: str) -> Statement:
-    """Compare all printed fractions of a table with the computed ones."""
-    printed = [row for row in table.rows if row.printed]
-    wrong = [row.formulation.legend for row in table.all_rows if row.printed and row.printed != row.master]
-    result = "the consistent forces are the printed ones"
-    if printed:
-        n_fractions = sum(len(row.printed) for row in printed)
-        result += f", and so are all {n_fractions} fractions of the formulations on the master"
-    if wrong:
-        result = f"other fractions: {', '.join(wrong)}"
-    return Statement(place, f"{table.title}: {claim}", result, Agreement.decide(not wrong))
+    def group(self) -> Group:
+        """Return the fractions as numerators and denominators (formulation, node)."""
+        comment = "forces of a uniform pressure p = 1, over p, in rationals; the first row is exact; from left to right"
+        variables = variables_of(self.all_rows, "formulation") | variables_of(self)
+        return Group(variables, {"figure": self.source.figure, "comment": comment})
 
 
 def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[Fractions, float]:
@@ -131,51 +161,21 @@ def rationals(values: Iterable[float] | FloatArray, scale: float) -> tuple[Fract
     return nearest, error
 
 
-def force_page_table(table: ForceTable) -> PageTable:
-    """Return the table of the page; consistent forces are bold."""
-    slave, master = (", ".join(f"{length:g}" for length in side) for side in (table.slave_length, table.master_length))
-    return PageTable(
-        f"{table.title}: nodal forces over p from left to right; slave segments {slave}; master segments {master}. "
-        f"Bold: the consistent forces. Largest rounding: {table.rounding:.1e}",
-        ("Formulation", "Slave nodes", "Virtual slave nodes", "Master nodes", "Printed for the master"),
-        tuple(
-            (
-                Cell((row.formulation.legend,)),
-                _cell(row.slave, table.exact.slave),
-                _cell(row.points, ()),
-                _cell(row.master, table.exact.master),
-                _printed_cell(row),
-            )
-            for row in table.all_rows
-        ),
-    )
-
-
-def force_dataset(table: ForceTable, figure: str) -> Group:
-    """Return the fractions as numerators and denominators (formulation, node)."""
-    comment = "forces of a uniform pressure p = 1, over p, in rationals; the first row is exact; from left to right"
-    variables = variables_of(table.all_rows, "formulation") | variables_of(table)
-    return Group(variables, {"figure": figure, "comment": comment})
-
-
 def _forces(case: Case, formulation: PaperFormulation, slave: IntArray, master: IntArray, printed: Fractions) -> Forces:
     plugin = subject_of(formulation).with_penalty(case.penalty)  # NTS gets it too: ε |g| = 1 at each node.
     pairing = plugin.pair(case.interface, case.z)
     forces = -plugin.residual(case.interface, pairing, case.z).reshape(-1, 2)  # They push the slave upwards.
-    scale = float(np.abs(forces).sum())
-    on_slave, slave_rounding = rationals(forces[slave, 1], scale)
-    on_master, master_rounding = rationals(-forces[master, 1], scale)
     at_points = np.zeros(0)
     if formulation in VIRTUAL:
         points = plugin.contact_points(case.interface, pairing, case.z)
         at_points = (points.pressure * points.weight)[np.argsort(points.position[:, 0])]
-    on_points, point_rounding = rationals(at_points, scale)
-    rounding = max(slave_rounding, master_rounding, point_rounding)
-    return Forces(formulation, on_slave, on_master, on_points, rounding, printed)
+    scale, sides = float(np.abs(forces).sum()), (forces[slave, 1], -forces[master, 1], at_points)
+    (on_slave, on_master, on_points), roundings = zip(*(rationals(side, scale) for side in sides), strict=True)
+    return Forces(formulation, on_slave, on_master, on_points, max(roundings), printed)
 
 
 def _fractions(text: str) -> Fractions:
-    return tuple(Fraction(word) for word in text.split())
+    return tuple(map(Fraction, text.split()))
 
 
 def _cell(values: Sequence[Fraction], exact: Sequence[Fraction]) -> Cell:

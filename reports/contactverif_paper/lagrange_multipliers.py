@@ -9,29 +9,25 @@ Source: Zavarise & De Lorenzis (2009), Sections 2, 5.1.3, 6, 6.3 and 7.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.schema import Group
 from contactverif.mechanics import newton
 from contactverif.mechanics.bodies import Rectangle
-from contactverif.mechanics.scene import Scene
 from contactverif.oracle import uniform_pressure_weights
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 from contactverif_paper.figure_style import add_legend, line_style, new_panels, use_decades
-from contactverif_paper.paper_columns import WORDS, Column, Formulations, variables_of
-from contactverif_paper.paper_formulations import PaperFormulation, measure, subject_of
-from contactverif_paper.paper_item import Agreement, Cell, Item, PageTable, PaperFigure, Progress, Statement
+from contactverif_paper.paper_formulations import Formulations, PaperFormulation, measure, subject_of
+from contactverif_paper.paper_item import WORDS, Agreement, Cell, Column, Item, PageTable, PaperFigure, Statement
 from contactverif_paper.patch_tests import PRINTED_COLUMN
 from contactverif_reports.html.pages import number
 
@@ -65,8 +61,7 @@ class Constants:
         return bool((self.zeros[row] == 0).all() and (self.slope[row] <= STABLE_SLOPE).all())
 
 
-def _compute_constants(report_progress: Progress) -> Constants:
-    report_progress("Section 6.3, inf-sup constants")
+def _compute_constants() -> Constants:
     table = np.array(
         [[_series(case, formulation) for case in refinement_cases()] for formulation in INF_SUP_FORMULATIONS]
     )  # (n_formulations, n_families, 4, n_meshes)
@@ -119,39 +114,32 @@ def _plot_constants(constants: Constants) -> Figure:
         axes.set_xscale("log", base=2)
         axes.set(xlabel="h (length)", title=name)
         use_decades(axes)
-        _label_left_out(axes, constants, column)
+        lines = [
+            f"{zeros:.0%} of {row.legend}"
+            for row, zeros in zip(INF_SUP_FORMULATIONS, constants.zeros[:, column], strict=True)
+            if zeros
+        ]
+        top = 0.36 if constants.zeros[INF_SUP_FORMULATIONS.index(VTS_PPT), column] else 0.52  # Above its low curve.
+        text = "\n".join(["move nothing:", *lines])
+        axes.text(0.04, top, text, transform=axes.transAxes, va="top", color="0.25", fontsize=9, linespacing=1.4)
     panels[0].set_ylabel("inf-sup constant β (–)")
     add_legend(figure, INF_SUP_FORMULATIONS, columns=3)
     return figure
 
 
-def _label_left_out(axes: Axes, constants: Constants, column: int) -> None:
-    """Say which share of the pressures of whom moves nothing."""
-    lines = [
-        f"{constants.zeros[row, column]:.0%} of {formulation.legend}"
-        for row, formulation in enumerate(INF_SUP_FORMULATIONS)
-        if constants.zeros[row, column]
-    ]
-    words_ = "\n".join(["move nothing:", *lines])
-    top = (
-        0.36 if constants.zeros[INF_SUP_FORMULATIONS.index(VTS_PPT), column] else 0.52
-    )  # Above the low curve of VTS-PPT.
-    axes.text(0.04, top, words_, transform=axes.transAxes, va="top", color="0.25", fontsize=9, linespacing=1.4)
-
-
 def _inf_sup_tables(constants: Constants) -> Iterator[PageTable]:
     rows = []
     for row, formulation in enumerate(INF_SUP_FORMULATIONS):
-        cells = [Cell((formulation.legend,))]
+        cells = []
         for column in range(len(FAMILIES)):
             zeros, slope = constants.zeros[row, column], constants.slope[row, column]
             tone = "n good" if zeros == 0 and slope <= STABLE_SLOPE else "n bad"
             slope = 0.0 if abs(slope) < 0.005 else slope  # No −0.00.
             details = (f"slope {slope:.2f}", f"{zeros:.0%} move nothing")
             cells.append(Cell((number(constants.beta[row, column, -1], 2),), details, tone))
-        rows.append(tuple(cells))
+        rows.append((formulation.legend, cells))
     caption = "Inf-sup constant β on the finest of five meshes; below, its slope against h, and how many pressures move"
-    yield PageTable(f"{caption} nothing", ("Formulation", *FAMILIES), tuple(rows))
+    yield PageTable.of_cells(f"{caption} nothing", ("Formulation", *FAMILIES), rows)
 
 
 INF_SUP = Item(
@@ -222,29 +210,43 @@ class _MultiplierTest:
         return f"{self.formulation.legend} on {SCENES[self.scene]}"
 
 
-def _compute_tests(report_progress: Progress) -> tuple[_MultiplierTest, ...]:
-    tests = []
-    for formulation in TEST_FORMULATIONS:
-        report_progress(f"patch tests of {formulation.name}")
-        tests += [_test(formulation, name, _scene_of(name)) for name in SCENES]
-    return tuple(tests)
+def _compute_tests() -> tuple[_MultiplierTest, ...]:
+    return tuple(_test(formulation, name) for formulation in TEST_FORMULATIONS for name in SCENES)
 
 
-def _scene_of(name: str) -> Scene:
-    """Return a scene of this item: a scene of the catalogue, case C on a finer mesh, or eight segments on two."""
-    if name != EIGHT_ON_TWO:
-        return catalogue.make_scene("c", refine=2) if name == REFINED else catalogue.make_scene(name)
-    # VTS-PPT's constraints depend on one another there.
-    layers = np.linspace(0.0, 4.0, 3)
-    return two_blocks(
-        Rectangle(np.linspace(0.0, 8.0, 9), layers, young=1e4, poisson=0.3),
-        Rectangle(np.linspace(0.0, 8.0, 3), layers - 4.0, young=1e4, poisson=0.3),
-        penalty=1e5,
-        pressure=100.0,
+def _test(formulation: PaperFormulation, name: str) -> _MultiplierTest:
+    if name == EIGHT_ON_TWO:  # VTS-PPT's constraints depend on one another there.
+        layers = np.linspace(0.0, 4.0, 3)
+        scene = two_blocks(
+            Rectangle(np.linspace(0.0, 8.0, 9), layers, young=1e4, poisson=0.3),
+            Rectangle(np.linspace(0.0, 8.0, 3), layers - 4.0, young=1e4, poisson=0.3),
+            penalty=1e5,
+            pressure=100.0,
+        )
+    else:
+        scene = catalogue.make_scene("c", refine=2) if name == REFINED else catalogue.make_scene(name)
+    subject, tolerance = subject_of(formulation), condition_tolerance(scene, scene.penalty)
+    trace = newton.solve(scene, subject.for_case(scene.case()))
+    pressures = trace.multipliers / float(scene.facts["pressure"])
+    if subject.traits.rules.penalty == "nodal":  # The slave's nodes, in a second pass the master's too.
+        lengths = uniform_pressure_weights(scene.interface, scene.facts["along"])[: len(pressures)]
+        pressures = pressures[lengths > 0] / lengths[lengths > 0]
+    ends = pressures.min(initial=np.inf), pressures.max(initial=-np.inf)
+    low, high = (0.0 if abs(value) <= tolerance else float(value) for value in ends)  # Without roundoff of 0.
+    return _MultiplierTest(
+        formulation=formulation,
+        scene=name,
+        end=trace.end.label,
+        error=stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan,
+        tolerance=tolerance,
+        low=low,
+        high=high,
+        deficiency=trace.deficiency,
+        printed=PRINTED.get(formulation, {}).get(name, -1),
     )
 
 
-def _test_statements(tests: Sequence[_MultiplierTest]) -> Iterator[Statement]:
+def _test_statements(tests: tuple[_MultiplierTest, ...]) -> Iterator[Statement]:
     spoken = [test for test in tests if test.printed >= 0]
     wrong = [test.title for test in spoken if test.passes != (test.printed == 1)]
     result = f"{len(spoken) - len(wrong)} of {len(spoken)} verdicts on the stress are the same"
@@ -263,7 +265,8 @@ def _test_statements(tests: Sequence[_MultiplierTest]) -> Iterator[Statement]:
         f"some are not, over the exact pressure: {ranges}" if uneven else "all are",
         Agreement.SILENT,
     )
-    one_pass, two_passes = (_largest_deficiency(tests, formulation) for formulation in (NTS, TWO_PASS))
+    deficiency = {row: max(test.deficiency for test in tests if test.formulation == row) for row in TEST_FORMULATIONS}
+    one_pass, two_passes, mortar = deficiency[NTS], deficiency[TWO_PASS], deficiency[MORTAR]
     yield Statement(
         "Section 2",
         "of NTS with multipliers one pass is stable and two passes are not (after El-Abbasi and Bathe)",
@@ -273,28 +276,20 @@ def _test_statements(tests: Sequence[_MultiplierTest]) -> Iterator[Statement]:
     deficient = [test for test in tests if test.deficiency and test.formulation == VTS_PPT]
     counts = ", ".join(f"{test.deficiency} on {SCENES[test.scene]}" for test in deficient)
     refined = next(test.end for test in tests if test.formulation == VTS_PPT and test.scene == REFINED)
-    mortar = _largest_deficiency(tests, MORTAR)
     yield Statement(
         "Section 6.3",
         "there is no proof of the inf-sup condition, but VTS-PPT might behave as the mortar method does",
         f"with multipliers it does not: of VTS-PPT's {counts} are not unique, of the mortar method's "
         f"{mortar or 'none'}. On C with halved cells Newton's method ends: {refined}",
-        Agreement.decide(not _largest_deficiency(tests, VTS_PPT) > mortar),
+        Agreement.decide(deficiency[VTS_PPT] <= mortar),
     )
 
 
-def _largest_deficiency(tests: Sequence[_MultiplierTest], formulation: PaperFormulation) -> int:
-    return max(test.deficiency for test in tests if test.formulation == formulation)
-
-
-def _test_tables(tests: Sequence[_MultiplierTest]) -> Iterator[PageTable]:
-    rows = {
-        formulation: [test for test in tests if test.formulation == formulation] for formulation in TEST_FORMULATIONS
-    }
-    yield PageTable(
+def _test_tables(tests: tuple[_MultiplierTest, ...]) -> Iterator[PageTable]:
+    yield PageTable.of_cells(
         "Patch tests with multipliers instead of a penalty: the stress, and the range of the multipliers",
         ("Formulation", *(title.removeprefix("case ") for title in SCENES.values())),
-        tuple((Cell((formulation.legend,)), *(_test_cell(test) for test in row)) for formulation, row in rows.items()),
+        [(row.legend, [_test_cell(test) for test in tests if test.formulation == row]) for row in TEST_FORMULATIONS],
     )
 
 
@@ -307,44 +302,15 @@ def _test_cell(test: _MultiplierTest) -> Cell:
     return Cell((text,), tuple(details), f"row {'good' if test.passes else 'bad'}")
 
 
-def _test_datasets(tests: Sequence[_MultiplierTest]) -> dict[str, Group]:
-    return {"": Group(variables_of(tests, "row"), {"comment": "patch tests with Lagrange multipliers"})}
-
-
-def _test(formulation: PaperFormulation, name: str, scene: Scene) -> _MultiplierTest:
-    subject, tolerance = subject_of(formulation), condition_tolerance(scene, scene.penalty)
-    trace = newton.solve(scene, subject.for_case(scene.case()))
-    pressures = trace.multipliers / float(scene.facts["pressure"])
-    if subject.traits.rules.penalty == "nodal":  # The slave's nodes, in a second pass the master's too.
-        lengths = uniform_pressure_weights(scene.interface, scene.facts["along"])[: len(pressures)]
-        pressures = pressures[lengths > 0] / lengths[lengths > 0]
-    return _MultiplierTest(
-        formulation=formulation,
-        scene=name,
-        end=trace.end.label,
-        error=stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan,
-        tolerance=tolerance,
-        low=_without_roundoff(pressures.min(initial=np.inf), tolerance),
-        high=_without_roundoff(pressures.max(initial=-np.inf), tolerance),
-        deficiency=trace.deficiency,
-        printed=PRINTED.get(formulation, {}).get(name, -1),
-    )
-
-
-def _without_roundoff(value: float, tolerance: float) -> float:
-    """Return 0 for a number that is 0 up to roundoff."""
-    return 0.0 if abs(value) <= tolerance else float(value)
-
-
 LAGRANGE_MULTIPLIERS = Item(
     name="lagrange_multipliers",
     title="Lagrange multipliers",
     compute=_compute_tests,
     statements=_test_statements,
-    datasets=_test_datasets,
+    dims="row",
+    attributes={"comment": "patch tests with Lagrange multipliers"},
     tables=_test_tables,
     text="Multipliers are pressures over the exact one (a nodal method: over the length that the node stands for). Two "
     "passes share the pressure between them, so theirs need not be 1. Not unique: so many constraints depend on "
     "others. “Eight on two” is a flat interface of eight slave segments on two master segments.",
-    n_steps=len(TEST_FORMULATIONS),
 )

@@ -1,28 +1,26 @@
-"""The formulations that the paper compares, under the paper's names, and some of ours beside them.
-
-A formulation has two names here: `legend`, which the paper's figures use, and `name`, which the command line uses. Its
-`pen` is the number of its line style; it is the same in every figure.
-"""
+"""The formulations that the paper compares, under the paper's names, and some of ours beside them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Annotated
 
 from contactverif.contract.case import Case
 from contactverif.contract.measurement import Measurement
 from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import the_formulation, the_property
 from contactverif.run.judge import judge_case
+from contactverif_paper.paper_item import WORDS, Column
 
 
 @dataclass(frozen=True, slots=True)
 class PaperFormulation:
-    """A formulation with its legend, its name on the command line, and the number of its pen."""
+    """A formulation under two names, with the same pen in every figure."""
 
-    legend: str
-    name: str
-    pen: int = 0
+    legend: str  # The name that the paper's figures use.
+    name: str  # The name on the command line.
+    pen: int = 0  # The number of its line style.
 
 
 NTS = PaperFormulation("NTS", "nts", 3)
@@ -41,6 +39,17 @@ REFERENCE_AREAS = PaperFormulation("VTS-ME, reference areas", "vts-me:area=refer
 
 # The formulations with virtual slave nodes; a figure shows their pressures at these nodes.
 VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)
+
+
+def name_columns(dims: str) -> tuple[Column, Column]:
+    """Return both names of the formulations of a field."""
+    return (
+        Column(dims, WORDS, "formulation, as on the command line", part="name", name="formulation"),
+        Column(dims, WORDS, "its name in the paper's legends", part="legend", name="legend"),
+    )
+
+
+Formulations = Annotated[tuple[PaperFormulation, ...], name_columns("formulation")]
 
 
 def measure(property_id: str, case: Case, formulation: PaperFormulation) -> Measurement | None:

@@ -1,25 +1,101 @@
 """The contract of an item: one table, figure, group of figures or section of the paper.
 
-An item computes its data, draws its figures, declares its numbers for `paper.nc`, states its claims and fills its
-tables. `items.py` registers it; `paper_columns`, `paper_page` and the template name no item. A statement sets side by
-side what the paper says and what was computed; its verdict follows from numbers, never from the author's hand.
+An item computes its data, draws its figures, states its claims and fills its tables; the annotations of its data
+declare the variables of `paper.nc`. `items.py` registers it, and nothing on the page or in the template names one.
+The verdict on a statement follows from numbers, never from the author's hand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from contactverif.contract.schema import Group
-from contactverif_paper.paper_columns import WORDS, Column, to_group
+from contactverif.contract.schema import Group, Variable, codes, numbers, words
 
 Progress = Callable[[str], None]  # The callback that reports what comes next, in a few words.
 OURS = "ours"  # The source of a figure that the paper does not have.
+WORDS = "words"  # Stands in place of a unit where a field holds words.
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """The words of `paper.nc` about a field or property of an item's data; an annotation holds one, or a tuple."""
+
+    dims: str  # The names of its dimensions, with blanks between them; empty for one number.
+    units: str
+    meaning: str
+    comment: str = ""
+    fill: float | None = None  # Marks what is not there.
+    meanings: Mapping[str, int] | None = None  # {meaning: code} of a field that holds codes.
+    part: str = ""  # The attribute of the field, or of each of its entries, that is stored; empty: all of it.
+    name: str = ""  # The name of the variable; empty: that of the field.
+    pad: float = np.nan  # Stands behind the end of a row that is shorter than others.
+
+    def variable(self, values: Sequence[Any], dims: str = "", shape: tuple[int, ...] = ()) -> Variable:
+        """Return the variable of the field's values in all cells of a table of that shape; None is a missing cell."""
+        axes = [*dims.split(), *self.dims.split()]
+        if self.part:
+            values = [None if value is None else _part(value, self.part) for value in values]
+        if shape and self.dims and self.units != WORDS:
+            rows = [np.zeros(0) if value is None else np.atleast_1d(value) for value in values]
+            entries: Any = np.array(list(itertools.zip_longest(*rows, fillvalue=self.pad))).T.reshape(*shape, -1)
+        else:
+            missing = "" if self.units == WORDS else np.nan if self.meanings is None else self.fill
+            filled = [missing if value is None else value for value in values]
+            entries = np.array(filled, dtype=object).reshape(shape).tolist() if shape else values[0]
+        if self.units == WORDS:
+            return words(axes, entries, self.meaning, self.comment)
+        if self.meanings is not None:
+            fill = None if self.fill is None else int(self.fill)
+            return codes(axes, entries, self.meanings, self.meaning, self.comment, fill=fill)
+        array = np.asarray(entries)
+        array = array.astype(np.int32) if array.dtype.kind == "i" else array
+        return numbers(axes, array, self.meaning, self.units, self.comment, fill=self.fill)
+
+
+def sparse_column(dims: str, units: str, meaning: str, name: str = "") -> Column:
+    """Return the column of numbers that are not there in all cells."""
+    return Column(dims, units, meaning, "NaN: nothing there", np.nan, name=name)
+
+
+def _part(value: Any, part: str) -> Any:
+    return [getattr(entry, part) for entry in value] if isinstance(value, tuple) else getattr(value, part)
+
+
+def variables_of(rows: Any, dims: str = "", *, kind: type | None = None) -> dict[str, Variable]:
+    """Return the columns of an object, or of nested sequences of objects along `dims`, as variables.
+
+    None stands for a missing object. `kind` is needed where there may be no object at all.
+    """
+    shape: tuple[int, ...] = ()
+    cells = [rows]
+    for _ in dims.split():
+        shape = (*shape, len(cells[0]))
+        cells = [cell for row in cells for cell in row]
+    kind = kind or type(next(cell for cell in cells if cell is not None))
+    variables = {}
+    for name, column in _columns(kind):
+        values = [None if cell is None else getattr(cell, name) for cell in cells]
+        variables[column.name or name] = column.variable(values, dims, shape)
+    return variables
+
+
+def _columns(kind: type) -> Iterator[tuple[str, Column]]:
+    """Yield (name, column) of the fields and properties of a class whose annotations hold columns."""
+    hints = get_type_hints(kind, include_extras=True)
+    for name, member in vars(kind).items():
+        if isinstance(member, property):
+            hints[name] = get_type_hints(member.fget, include_extras=True).get("return")
+    for name, hint in hints.items():
+        for mark in getattr(hint, "__metadata__", ()):
+            yield from ((name, column) for column in (mark if isinstance(mark, tuple) else (mark,)))
 
 
 class Agreement(IntEnum):
@@ -80,15 +156,18 @@ class PageTable:
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
-    def __post_init__(self) -> None:
-        if any(len(row) != len(self.columns) for row in self.rows):
-            raise ValueError(f"table {self.caption!r}: each row needs {len(self.columns)} cells")
+    @classmethod
+    def of_cells(cls, caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Iterable[Cell]]]) -> PageTable:
+        """Return a table of rows (head, cells)."""
+        table = cls(caption, tuple(columns), tuple((Cell((head,)), *cells) for head, cells in rows))
+        if any(len(row) != len(columns) for row in table.rows):
+            raise ValueError(f"table {caption!r}: each row needs {len(columns)} cells")
+        return table
 
     @classmethod
     def of_numbers(cls, caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> PageTable:
         """Return a table whose rows have a head and, to its right, numbers."""
-        cells = tuple((Cell((head,)), *(Cell((text,), tone="n") for text in texts)) for head, *texts in rows)
-        return cls(caption, tuple(columns), cells)
+        return cls.of_cells(caption, columns, [(head, [Cell((t,), tone="n") for t in texts]) for head, *texts in rows])
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,23 +197,23 @@ class Item:
 
     name: str  # Its group in `paper.nc`.
     title: str  # The heading of its section on the page.
-    compute: Callable[[Progress], Any]  # Computes its data and calls `Progress` `n_steps` times.
+    compute: Callable[[], Any]  # Computes its data.
     statements: Callable[[Any], Iterable[Statement]]  # Compares the data with what the paper says.
     # Returns its numbers: {name below its own: group}, with "" for its own group. The default is the columns of its
-    # data, with `attributes`.
+    # data, which has one row or several along `dims`, with `attributes`.
     datasets: Callable[[Any], Mapping[str, Group]] | None = None
+    dims: str = ""
     attributes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     figures: tuple[PaperFigure, ...] = ()  # Its figures, in order.
     tables: Callable[[Any], Iterable[PageTable]] = lambda _: ()  # Fills its tables.
     text: str = ""  # A paragraph under the heading.
     # {subject: what was chosen where the paper is silent}.
     choices: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    n_steps: int = 1  # The number of times that `compute` reports progress.
     slow: bool = False  # True if it takes long enough for the tests to skip it.
 
     def groups(self, data: Any) -> Mapping[str, Group]:
         """Return its numbers by group."""
-        return self.datasets(data) if self.datasets else {"": to_group(data, **self.attributes)}
+        return self.datasets(data) if self.datasets else {"": Group(variables_of(data, self.dims), {**self.attributes})}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,6 +253,6 @@ class Paper:
         return {result.item.name: result.data for result in self.results}[name]
 
 
-def sentence(words: str) -> str:
+def sentence(words_: str) -> str:
     """Return the words with a capital at their beginning."""
-    return words[:1].upper() + words[1:]
+    return words_[:1].upper() + words_[1:]

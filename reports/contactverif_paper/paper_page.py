@@ -18,8 +18,16 @@ from matplotlib.figure import Figure
 from contactverif.contract import schema
 from contactverif.contract.schema import Group
 from contactverif_paper.figure_style import render_figure
-from contactverif_paper.paper_columns import variables_of
-from contactverif_paper.paper_item import OURS, Agreement, Paper, PaperFigure, Progress, Statement, sentence
+from contactverif_paper.paper_item import (
+    OURS,
+    Agreement,
+    Paper,
+    PaperFigure,
+    Progress,
+    Statement,
+    sentence,
+    variables_of,
+)
 from contactverif_reports.files import check_writable, made_folder, whole
 from contactverif_reports.html.pages import render, svg_inline, write_page
 from contactverif_reports.netcdf.file_groups import write_tree
@@ -74,16 +82,19 @@ def tree_of(paper: Paper) -> dict[str, Group]:
         "/figures": Group(variables_of(paper.figures, "figure", kind=PaperFigure), {"comment": figures}),
     }
     for result in paper.results:
-        for name, dataset in result.item.groups(result.data).items():
+        for name, group in result.item.groups(result.data).items():
             path = f"/{result.item.name}/{name}".rstrip("/")
-            if path in groups:
+            if groups.setdefault(path, group) is not group:
                 raise ValueError(f"{path}: two items have this group")
-            groups[path] = dataset
     return groups
 
 
 def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
     """Return the page."""
+
+    def numbers(statements: tuple[Statement, ...], names: set[str], *, shown: bool) -> list[int]:
+        return [number for number, statement in enumerate(statements) if (statement.figure in names) is shown]
+
     return render(
         "paper.html.j2",
         package="contactverif_paper",
@@ -92,9 +103,9 @@ def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
         agreements=Agreement,
         look_of=LOOKS,
         counts=Counter(statement.agreement for statement in paper.statements),
-        statements_of={figure.name: _numbers(paper.statements, {figure.name}) for figure in paper.figures},
+        statements_of={figure.name: numbers(paper.statements, {figure.name}, shown=True) for figure in paper.figures},
         lone_statements_of={
-            result.item.name: _numbers(result.statements, {figure.name for figure in result.item.figures}, shown=False)
+            result.item.name: numbers(result.statements, {figure.name for figure in result.item.figures}, shown=False)
             for result in paper.results
         },
         reference=REFERENCE,
@@ -102,20 +113,14 @@ def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
     )
 
 
-def _numbers(statements: tuple[Statement, ...], figures: set[str], *, shown: bool = True) -> list[int]:
-    """Return the numbers of the statements that one of the figures shows, or that none of them does."""
-    return [number for number, statement in enumerate(statements) if (statement.figure in figures) is shown]
-
-
 def summary(paper: Paper) -> str:
     """Return every statement that does not merely note a silence, a line each."""
-    lines = []
-    for statement in paper.statements:
-        if statement.agreement is not Agreement.SILENT:
-            verdict = f"{LOOKS[statement.agreement][0]:3} {statement.agreement.words:17}"
-            condition = f". It holds if: {statement.condition}" if statement.condition else ""
-            lines.append(f"  {verdict} {statement.place}: {statement.result}{condition}")
-    return "\n".join(lines)
+    return "\n".join(
+        f"  {LOOKS[one.agreement][0]:3} {one.agreement.words:17} {one.place}: {one.result}"
+        + (f". It holds if: {one.condition}" if one.condition else "")
+        for one in paper.statements
+        if one.agreement is not Agreement.SILENT
+    )
 
 
 def svg(figure: Figure) -> str:

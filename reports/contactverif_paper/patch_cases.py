@@ -16,9 +16,18 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.newton import End
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance
-from contactverif_paper.paper_columns import WORDS, Column, name_columns
-from contactverif_paper.paper_formulations import NTS, NTS_AR, TWO_PASS, VTS_ME, VTS_PPT, PaperFormulation, subject_of
-from contactverif_paper.paper_item import Agreement, Item, Progress, Statement
+from contactverif_paper.force_transmission import PrintedForces
+from contactverif_paper.paper_formulations import (
+    NTS,
+    NTS_AR,
+    TWO_PASS,
+    VTS_ME,
+    VTS_PPT,
+    PaperFormulation,
+    name_columns,
+    subject_of,
+)
+from contactverif_paper.paper_item import WORDS, Agreement, Column, Item, Statement
 from contactverif_paper.patch_tests import (
     FIVE,
     FOUR,
@@ -26,7 +35,6 @@ from contactverif_paper.patch_tests import (
     YOUNG,
     PatchSetup,
     PatchTests,
-    PrintedForces,
     Study,
     moderate_error,
     patch_item,
@@ -100,19 +108,13 @@ class _TwoPasses:
     limit: Annotated[float, Column("", "m-1", "penalty over E up to which two passes are no better")]
 
 
-def _compute_passes(report_progress: Progress) -> _TwoPasses:
-    report_progress("Section 5.1.3, over the penalty")
-    patch = patch_solution(_PATCH_B)
-    passes = (NTS_AR, TWO_PASS)
-    single, double = (patch.curve(row).departure for row in passes)
-    moderate_one, moderate_two = (moderate_error(row, "b") for row in passes)
-    limit = stiffness_limit(_PATCH_B, _two_passes_are_no_better)
-    return _TwoPasses((single, double), (moderate_one, moderate_two), limit)
-
-
-def _two_passes_are_no_better(departure: dict[PaperFormulation, float]) -> bool:
-    """Return whether the pressures of two passes depart at least as far as those of one."""
-    return departure[TWO_PASS] >= departure[NTS_AR]
+def _compute_passes() -> _TwoPasses:
+    departures = patch_solution(_PATCH_B).departures
+    return _TwoPasses(
+        (departures[NTS_AR], departures[TWO_PASS]),
+        (moderate_error(NTS_AR, "b"), moderate_error(TWO_PASS, "b")),
+        stiffness_limit(_PATCH_B, lambda departure: departure[TWO_PASS] >= departure[NTS_AR]),
+    )
 
 
 def _pass_statements(errors: _TwoPasses) -> Iterator[Statement]:
@@ -161,8 +163,8 @@ def _compute_ends() -> _Ends:
 
 
 def _convergence_statement(tests: PatchTests) -> Statement:
-    curve = tests.patches[0].curve(VTS_ME)
-    printed, beside = tests.study.end == End.CONVERGED
+    curve = tests.patches[0].curves[VTS_ME]
+    printed, beside = tests.numbers.end == End.CONVERGED
     result = f"at ε̂ = {PATCH_C.stiffness:g} × E Newton’s method ends: {curve.end}"
     if not printed.all():
         share = "at all" if beside.all() else f"at {int(beside.sum())} of"
@@ -260,21 +262,15 @@ class _Section71:
     formulations: Annotated[tuple[PaperFormulation, ...], name_columns("formulation")[0]] = _COMPARED
 
 
-def _compute_examples(report_progress: Progress) -> _Section71:
-    report_progress("Section 7.1, over the penalty")
-    patches = [patch_solution(setup) for setup in _SETUPS]
+def _compute_examples() -> _Section71:
+    departures = [patch_solution(setup).departures for setup in _SETUPS]
     scene = catalogue.make_scene("example-1bis", ratio=UNEQUAL)
     return _Section71(
-        tuple(tuple(patch.curve(formulation).departure for formulation in _COMPARED) for patch in patches),
-        tuple(stiffness_limit(setup, _areas_are_best) for setup in _SETUPS),
+        tuple(tuple(row[formulation] for formulation in _COMPARED) for row in departures),
+        tuple(stiffness_limit(setup, lambda row: row[NTS_AR] <= min(row[NTS], row[TWO_PASS])) for setup in _SETUPS),
         (moderate_error(NTS_AR, "example-1"), moderate_error(TWO_PASS, "example-1")),
         (moderate_error(VTS_PPT, "example-1bis", UNEQUAL), condition_tolerance(scene, scene.penalty)),
     )
-
-
-def _areas_are_best(departure: dict[PaperFormulation, float]) -> bool:
-    """Return whether NTS-AR departs least of NTS, NTS-AR and two passes."""
-    return departure[NTS_AR] <= min(departure[NTS], departure[TWO_PASS])
 
 
 def _example_statements(section: _Section71) -> Iterator[Statement]:

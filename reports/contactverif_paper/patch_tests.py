@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Annotated, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -39,14 +38,7 @@ from contactverif_paper.figure_style import (
     new_panels,
     use_round_ticks,
 )
-from contactverif_paper.force_transmission import (
-    ForceTable,
-    force_dataset,
-    force_page_table,
-    force_statement,
-    force_table,
-)
-from contactverif_paper.paper_columns import WORDS, Column, name_columns, sparse_column, to_group, variables_of
+from contactverif_paper.force_transmission import ForceTable, PrintedForces
 from contactverif_paper.paper_formulations import (
     NTS,
     NTS_AR,
@@ -55,14 +47,23 @@ from contactverif_paper.paper_formulations import (
     VTS_ME,
     VTS_PPT,
     PaperFormulation,
+    name_columns,
     subject_of,
 )
-from contactverif_paper.paper_item import Agreement, Item, PaperFigure, Progress, Statement
+from contactverif_paper.paper_item import (
+    WORDS,
+    Agreement,
+    Column,
+    Item,
+    PaperFigure,
+    Statement,
+    sparse_column,
+    variables_of,
+)
 from contactverif_reports.plot.scene_figures import colour_scale, magnifications, plot_bodies
 from contactverif_reports.plot.solved_scene import Solution, SolvedScene
 
 YOUNG = 1e4  # The modulus of the catalogue's scenes.
-FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
 STRESS_ERROR = "largest error of a stress at a Gauss point over the pressure"
 _TALLEST = 2.6  # Inches: the height of a panel with a deformed mesh.
 _SHORT_AXIS = 4.0  # An x axis of this length has a tick at each unit.
@@ -73,7 +74,6 @@ _STIFFNESS_RANGE = 1e-2, 1e2  # ε̂ over E, per unit of length: where `stiffnes
 TWO = (NTS, NTS_AR)
 FOUR = (*TWO, TWO_PASS, VTS_ME)
 FIVE = (*FOUR, VTS_PPT)
-
 
 PASSES, FAILURE, SILENT = 1, 0, -1  # What the paper says of a patch test.
 PRINTED_COLUMN = Column(
@@ -107,7 +107,6 @@ class PatchSetup:
 class _Curve:
     """The pressure that one formulation leaves on a scene."""
 
-    formulation: PaperFormulation
     x: Annotated[FloatArray, sparse_column("point", schema.LENGTH, "reference coordinate on the paper's axis")]
     pressure: Annotated[FloatArray, sparse_column("point", "1", "contact pressure over the exact one")]
     # True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
@@ -115,11 +114,6 @@ class _Curve:
         bool, Column("", "1", "where pressures are taken", "missing: not shown", -1, {"at_nodes": 0, "at_points": 1})
     ]
     solution: Solution
-
-    @property
-    def departure(self) -> float:
-        """The largest |p/p_exact − 1|."""
-        return float(abs(self.pressure - 1).max())
 
     @property
     def stress_error(self) -> Annotated[float, Column("", "1", STRESS_ERROR, fill=np.nan)]:
@@ -134,13 +128,16 @@ class _Curve:
         return self.solution.end
 
     @property
+    def remark(self) -> str:
+        """The end of Newton's method, in brackets; empty for a solution."""
+        return "" if self.solution.converged else f" ({self.end})"
+
+    @property
     def displacement_x(self) -> Annotated[FloatArray, sparse_column("node", schema.LENGTH, "displacement along x")]:
-        """The displacements of all nodes along x."""
         return np.vstack(self.solution.displacements)[:, 0]
 
     @property
     def displacement_y(self) -> Annotated[FloatArray, sparse_column("node", schema.LENGTH, "displacement along y")]:
-        """The displacements of all nodes along y."""
         return np.vstack(self.solution.displacements)[:, 1]
 
 
@@ -151,16 +148,17 @@ class _PatchSolution:
     setup: PatchSetup
     exact_pressure: Annotated[float, Column("", schema.STRESS, "exact contact pressure")]
     solved: SolvedScene  # The scene with all solutions, ready to be drawn.
-    curves: tuple[_Curve, ...]  # A curve for each formulation.
-
-    def curve(self, formulation: PaperFormulation) -> _Curve:
-        return next(curve for curve in self.curves if curve.formulation == formulation)
+    curves: Mapping[PaperFormulation, _Curve]
 
     @property
-    def pressure_range(self) -> tuple[float, float]:
-        """The least and the largest pressure of all curves that are solutions, over the exact one."""
-        values = np.concatenate([curve.pressure for curve in self.curves if curve.solution.converged])
-        return float(values.min()), float(values.max())
+    def departures(self) -> dict[PaperFormulation, float]:
+        """The largest |p/p_exact − 1| of each formulation."""
+        return {row: float(abs(curve.pressure - 1).max()) for row, curve in self.curves.items()}
+
+    @property
+    def nodes(self) -> FloatArray:
+        """The reference positions (n_nodes, 2) of the nodes of both bodies."""
+        return np.vstack([body.nodes for body in self.solved.bodies])
 
     @property
     def penalty(self) -> Annotated[float, Column("", schema.PENALTY, "penalty")]:
@@ -172,24 +170,29 @@ class _PatchSolution:
 
     @property
     def node_x(self) -> Annotated[FloatArray, Column("node", schema.LENGTH, "reference x", fill=np.nan)]:
-        return np.vstack([body.nodes for body in self.solved.bodies])[:, 0]
+        return self.nodes[:, 0]
 
     @property
     def node_y(self) -> Annotated[FloatArray, Column("node", schema.LENGTH, "reference y", fill=np.nan)]:
-        return np.vstack([body.nodes for body in self.solved.bodies])[:, 1]
+        return self.nodes[:, 1]
 
 
 @cache
-def patch_solution(setup: PatchSetup) -> _PatchSolution:
-    """Solve a patch test at the penalty of its figures."""
-    return _solution(setup, setup.stiffness)
+def patch_solution(setup: PatchSetup, stiffness: float | None = None) -> _PatchSolution:
+    """Solve a patch test, at the penalty of its figures by default."""
+    penalty = (setup.stiffness if stiffness is None else stiffness) * YOUNG
+    case = catalogue.make_scene(setup.scene, penalty=penalty).case()
+    solved = solved_scenes.solve_scene(case, [subject_of(formulation) for formulation in setup.formulations])
+    pairs = zip(setup.formulations, solved.solutions, strict=True)
+    curves = {formulation: _curve(formulation, solved, solution, setup.origin) for formulation, solution in pairs}
+    return _PatchSolution(setup, solved.solutions[0].pressure, solved, curves)
 
 
 def stiffness_limit(setup: PatchSetup, holds: Callable[[dict[PaperFormulation, float]], bool]) -> float:
     """Return the ε̂/E below which a relation between departures holds, by bisection to 1 %; NaN if there is none."""
 
     def holds_at(stiffness: float) -> bool:
-        return holds({curve.formulation: curve.departure for curve in _solution(setup, stiffness).curves})
+        return holds(patch_solution(setup, stiffness).departures)
 
     low, high = _STIFFNESS_RANGE
     if not holds_at(low) or holds_at(high):
@@ -208,16 +211,6 @@ def moderate_error(formulation: PaperFormulation, scene_name: str, ratio: float 
     return stress_error(scene, scene.stresses(trace.solution)) if trace.converged else np.nan
 
 
-def _solution(setup: PatchSetup, stiffness: float) -> _PatchSolution:
-    case = catalogue.make_scene(setup.scene, penalty=stiffness * YOUNG).case()
-    solved = solved_scenes.solve_scene(case, [subject_of(formulation) for formulation in setup.formulations])
-    curves = tuple(
-        _curve(formulation, solved, solution, setup.origin)
-        for formulation, solution in zip(setup.formulations, solved.solutions, strict=True)
-    )
-    return _PatchSolution(setup, solved.solutions[0].pressure, solved, curves)
-
-
 def _curve(formulation: PaperFormulation, solved: SolvedScene, solution: Solution, origin: float) -> _Curve:
     """Take pressures at the virtual slave nodes if there are any, else nodal forces over the nodes' shares (Eq. 3)."""
     at_points = solution.points is not None and formulation in VIRTUAL
@@ -230,17 +223,7 @@ def _curve(formulation: PaperFormulation, solved: SolvedScene, solution: Solutio
         covered = np.isfinite(pressure)
         x, pressure = x[covered], pressure[covered]
     order = np.argsort(x, kind="stable")
-    return _Curve(formulation, x[order] - origin, pressure[order] / solution.pressure, at_points, solution)
-
-
-@dataclass(frozen=True, slots=True)
-class PrintedForces:
-    """The forces on the master that a figure of the paper prints, from left to right: "3/2 3 7/2 3 1"."""
-
-    figure: str
-    claim: str
-    exact: str
-    transmitted: Mapping[PaperFormulation, str]  # By each formulation that the paper shows.
+    return _Curve(x[order] - origin, pressure[order] / solution.pressure, at_points, solution)
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,52 +238,49 @@ class Study:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchTests:
-    """The solved patch tests of an item, the forces of a uniform pressure, and the data of a study."""
+    """The solved patch tests of an item, the forces of a uniform pressure, and the numbers of a study."""
 
     patches: tuple[_PatchSolution, ...]
     forces: ForceTable | None
-    study: Any
+    study: Study | None
+    numbers: Any
+
+    @classmethod
+    def compute(cls, setups: tuple[PatchSetup, ...], printed: PrintedForces | None, study: Study | None) -> PatchTests:
+        """Solve the patch tests, and compute forces and numbers beside them."""
+        forces = ForceTable.compute(setups[0].scene, setups[0].title, printed) if printed else None
+        return cls(tuple(map(patch_solution, setups)), forces, study, study.compute() if study else None)
 
     @property
     def formulations(self) -> list[PaperFormulation]:
         """The formulations that the figures show, each once."""
-        return list(dict.fromkeys(curve.formulation for patch in self.patches for curve in patch.curves))
+        return list(dict.fromkeys(formulation for patch in self.patches for formulation in patch.curves))
 
-
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """The parts of an item of patch tests: it computes, declares and states what they say."""
-
-    setups: tuple[PatchSetup, ...]
-    printed: PrintedForces | None
-    study: Study | None
-
-    def compute(self, report_progress: Progress) -> PatchTests:
-        """Solve the patch tests, and compute forces and numbers beside them."""
-        patches = []
-        for setup in self.setups:
-            report_progress(setup.title)
-            patches.append(patch_solution(setup))
-        first, printed = self.setups[0], self.printed
-        forces = force_table(first.scene, first.title, printed.exact, printed.transmitted) if printed else None
-        return PatchTests(tuple(patches), forces, self.study.compute() if self.study else None)
-
-    def statements(self, tests: PatchTests) -> Iterator[Statement]:
+    def statements(self) -> Iterator[Statement]:
         """Compare the printed forces and axes, and what the study finds."""
-        if self.printed and tests.forces:
-            yield force_statement(tests.forces, self.printed.figure, self.printed.claim)
-        yield from map(_range_statement, tests.patches)
+        if self.forces:
+            yield self.forces.statement()
+        yield from map(_range_statement, self.patches)
         if self.study:
-            yield self.study.statement(tests)
+            yield self.study.statement(self)
 
-    def datasets(self, tests: PatchTests) -> dict[str, Group]:
-        """Return patch tests, forces and numbers beside them, a group each."""
-        datasets = {"patch": _patch_dataset(tests)}
-        if self.printed and tests.forces:
-            datasets["forces"] = force_dataset(tests.forces, self.printed.figure)
+    def groups(self) -> dict[str, Group]:
+        """Return patch tests, forces and numbers beside them, a group each.
+
+        Nothing stands where a figure does not show a formulation.
+        """
+        patches, rows = self.patches, tuple(self.formulations)
+        cells = [[patch.curves.get(row) for row in rows] for patch in patches]
+        comment = "pressures at virtual slave nodes where at_points, else nodal forces over the nodes' shares"
+        variables = {column.name: column.variable([rows]) for column in name_columns("formulation")}
+        variables |= variables_of([patch.setup for patch in patches], "scene")
+        variables |= variables_of(patches, "scene") | variables_of(cells, "scene formulation")
+        groups = {"patch": Group(variables, {"comment": comment})}
+        if self.forces:
+            groups["forces"] = self.forces.group()
         if self.study:
-            datasets[self.study.name] = to_group(tests.study, **self.study.attributes)
-        return datasets
+            groups[self.study.name] = Group(variables_of(self.numbers), self.study.attributes)
+        return groups
 
 
 def patch_item(
@@ -314,35 +294,20 @@ def patch_item(
     choices: Mapping[str, str] | None = None,
 ) -> Item:
     """Return the item of some patch tests; the last two figures show penetrations and pressures, one before meshes."""
-    plots, plan = (_plot_meshes, _plot_penetrations, _plot_pressures)[-len(captions) :], _Plan(setups, printed, study)
+    plots = (_plot_meshes, _plot_penetrations, _plot_pressures)[-len(captions) :]
     return Item(
         name=name,
         title=title,
-        compute=plan.compute,
-        statements=plan.statements,
-        datasets=plan.datasets,
+        compute=partial(PatchTests.compute, setups, printed, study),
+        statements=PatchTests.statements,
+        datasets=PatchTests.groups,
         figures=tuple(
             PaperFigure(f"fig{number:02}", caption, plot)
             for (number, caption), plot in zip(captions.items(), plots, strict=True)
         ),
-        tables=lambda tests: [force_page_table(tests.forces)] if tests.forces else [],
+        tables=lambda tests: [tests.forces.page_table()] if tests.forces else [],
         text=text,
         choices=choices or {},
-        n_steps=len(setups),
-    )
-
-
-def _patch_dataset(tests: PatchTests) -> Group:
-    """Return pressures, stress errors and displacements; nothing stands where a figure does not show a formulation."""
-    patches, rows = tests.patches, tuple(tests.formulations)
-    cells = [[{curve.formulation: curve for curve in patch.curves}.get(row) for row in rows] for patch in patches]
-    comment = "pressures at virtual slave nodes where at_points, else nodal forces over the nodes' shares"
-    return Group(
-        {column.name: column.variable([rows], "", ()) for column in name_columns("formulation")}
-        | variables_of([patch.setup for patch in patches], "scene")
-        | variables_of(patches, "scene")
-        | variables_of(cells, "scene formulation"),
-        attrs={"comment": comment},
     )
 
 
@@ -350,7 +315,8 @@ def _range_statement(patch: _PatchSolution) -> Statement:
     """Say what the printed pressure axis and our curves have in common; the paper prints no penalty."""
     setup = patch.setup
     low, high = setup.axis
-    least, largest = patch.pressure_range
+    values = np.concatenate([curve.pressure for curve in patch.curves.values() if curve.solution.converged])
+    least, largest = float(values.min()), float(values.max())
     inside = low <= least and largest <= high
     share = (largest - least) / (high - low)
     result = f"at ε̂ = {setup.stiffness:g} × E, which we chose, curves run from {least:.3f} to {largest:.3f}: "
@@ -370,33 +336,28 @@ def _plot_pressures(tests: PatchTests) -> Figure:
     views += [(patch, patch.setup.close_up) for patch in tests.patches if patch.setup.close_up]
     figure, panels = new_panels(3.6 if len(views) > 1 else 3.4, len(views))
     for axes, (patch, limits) in zip(panels, views, strict=True):
-        _draw_pressures(axes, patch, limits)
-    remarks = {curve.formulation: _end_remark(curve) for patch in tests.patches for curve in patch.curves}
+        low, high = limits
+        axes.axhline(1.0, **REFERENCE_LINE)
+        for formulation, curve in patch.curves.items():
+            inside = low <= curve.pressure.min() and curve.pressure.max() <= high
+            axes.plot(curve.x, curve.pressure, clip_on=not inside, **line_style(formulation, len(curve.x)))
+        axes.set(xlabel="x coordinate (length)", ylabel="contact pressure / p (–)")
+        use_round_ticks(axes, 6)
+        left, right = patch.setup.x_axis
+        step = 1.0 if right - left <= _SHORT_AXIS else 2.0  # The paper's axes have a tick at every second unit.
+        axes.set_xticks(np.arange(left, right + 0.5, step))
+        axes.set_xlim(left, right)
+        axes.set_ylim(low, high)
+    remarks = {row: curve.remark for patch in tests.patches for row, curve in patch.curves.items()}
     add_legend(figure, tests.formulations, reference="exact", remarks=remarks)
     return figure
-
-
-def _draw_pressures(axes: Axes, patch: _PatchSolution, limits: tuple[float, float]) -> None:
-    low, high = limits
-    axes.axhline(1.0, **REFERENCE_LINE)
-    for curve in patch.curves:
-        inside = low <= curve.pressure.min() and curve.pressure.max() <= high
-        axes.plot(curve.x, curve.pressure, clip_on=not inside, **line_style(curve.formulation, len(curve.x)))
-    axes.set(xlabel="x coordinate (length)", ylabel="contact pressure / p (–)")
-    use_round_ticks(axes, 6)
-    left, right = patch.setup.x_axis
-    step = 1.0 if right - left <= _SHORT_AXIS else 2.0  # The paper's axes have a tick at every second unit.
-    axes.set_xticks(np.arange(left, right + 0.5, step))
-    axes.set_xlim(left, right)
-    axes.set_ylim(low, high)
 
 
 def _plot_penetrations(tests: PatchTests) -> Figure:
     """Draw one panel for each formulation and scene, the penetration magnified alike in all of a scene."""
     patches, across = tests.patches, 2
-    panels = [curve for patch in patches for curve in patch.curves]
-    down = -(-len(panels) // across)
-    wide, high = np.ptp(np.vstack([body.nodes for body in patches[0].solved.bodies]), axis=0)
+    down = -(-sum(len(patch.curves) for patch in patches) // across)
+    wide, high = np.ptp(patches[0].nodes, axis=0)
     panel = min((WIDTH - 1.6) / across, _TALLEST * wide / high)
     figure = new_figure(down * (panel * high / wide + 0.35) + 0.7)
     grid = figure.subplots(down, across, squeeze=False)
@@ -408,9 +369,9 @@ def _plot_penetrations(tests: PatchTests) -> Figure:
         scale, magnified = colour_scale(patch.solved), magnifications(patch.solved)
         remarks |= dict.fromkeys(magnification.words for magnification in magnified.values())
         panels_of_scene = [next(remaining) for _ in patch.curves]
-        for axes, curve in zip(panels_of_scene, patch.curves, strict=True):
+        for axes, (formulation, curve) in zip(panels_of_scene, patch.curves.items(), strict=True):
             plot_bodies(axes, patch.solved, curve.solution, magnified[curve.solution.formulation], scale)
-            axes.set_title(f"({next(letters)}) {curve.formulation.legend}{_end_remark(curve)}", loc="left")
+            axes.set_title(f"({next(letters)}) {formulation.legend}{curve.remark}", loc="left")
         rows = -(-len(panels_of_scene) // across)
         bar = figure.colorbar(scale, ax=panels_of_scene, shrink=0.8, aspect=_BAR * rows, pad=0.01)
         bar.locator = MaxNLocator(5, steps=[1, 2, 5, 10])
@@ -418,19 +379,16 @@ def _plot_penetrations(tests: PatchTests) -> Figure:
     lines = list(remarks)
     if len(lines) == 2:
         lines = [f"above: {lines[0]}", f"below: {lines[1]}"]
-    title = "\n".join(["colour: −σₙ (force / length)", *lines])
-    figure.legend(handles=_surface_handles(), loc="outside lower center", ncols=3, title=title, title_fontsize=LETTERS)
-    return figure
-
-
-def _surface_handles() -> list[Line2D | Patch]:
-    """Return the legend of both surfaces and of the penetration, as `plot_bodies` draws them."""
+    # Both surfaces and the penetration, as `plot_bodies` draws them.
     pen: dict[str, Any] = {"color": "black", "linewidth": 1.3, "markersize": 3.6, "markeredgecolor": "black"}
-    return [
+    handles = [
         Line2D([], [], label="slave", marker="o", **pen),
         Line2D([], [], label="master", marker="s", linestyle=(0, (4, 1.5)), markerfacecolor="white", **pen),
         Patch(facecolor="white", edgecolor="0.35", linewidth=0, hatch="xxxxxx", label="penetration"),
     ]
+    title = "\n".join(["colour: −σₙ (force / length)", *lines])
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, title=title, title_fontsize=LETTERS)
+    return figure
 
 
 def _plot_meshes(tests: PatchTests) -> Figure:
@@ -453,11 +411,6 @@ def _plot_meshes(tests: PatchTests) -> Figure:
     axes.autoscale_view()
     figure.supxlabel("filled: slave nodes; open: master nodes; arrows: p = 1", fontsize=LETTERS)
     return figure
-
-
-def _end_remark(curve: _Curve) -> str:
-    """Return how Newton's method ended, in brackets; empty for a solution."""
-    return "" if curve.solution.converged else f" ({curve.end})"
 
 
 def edges_of(cells: IntArray) -> IntArray:

@@ -38,6 +38,7 @@ SLOPES = {"order": 1e-3, "rate": 1e-3, "basic_rate": 1e-3}  # Slopes of numbers 
 HISTORIES = {"residual", "energy", "beyond"}  # Their ends are rounding errors.
 NOT_COMPARED = {"result", "condition", "rounding", "commit"}  # Words with numbers in them; rounding errors; origin.
 LARGEST_FIGURE = 70_000  # bytes
+QUICK = tuple(item for item in ITEMS if not item.slow)
 SLOW = {item.name for item in ITEMS if item.slow}
 STUDY_FIGURES = {figure.name for item in ITEMS if item.slow for figure in item.figures}
 
@@ -49,7 +50,7 @@ def reported_steps() -> list[str]:
 
 @pytest.fixture(scope="module")
 def paper(reported_steps: list[str]) -> Paper:
-    return compute(reported_steps.append, with_study=False)
+    return compute(reported_steps.append, items=QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +164,7 @@ def test_another_number_is_noticed(
 
 
 def test_every_step_is_reported(paper: Paper, reported_steps: list[str]) -> None:
-    assert len(reported_steps) == steps(with_study=False) - len(paper.figures)
+    assert len(reported_steps) == steps(QUICK) - len(paper.figures)
 
 
 def test_every_item_has_its_own_name_and_every_figure(paper: Paper) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from contactverif.contract.arrays import IntArray
-from contactverif_paper.fig30_convergence import PRINTED_ITERATIONS, RULES
 from contactverif_paper.items import ITEMS
+from contactverif_paper.tangents import PRINTED_ITERATIONS, RULES
 
 FOLDER = Path(__file__).parents[2] / "reports" / "paper"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")

@@ -22,7 +22,7 @@ from contactverif.mechanics.accuracy import Field, Solution, shape_integrals, so
 from contactverif.problems.catalogue import make_scene
 from contactverif.problems.disk import DiskProblem, disk_mesh, disk_on_foundation, grade
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Errors, ProblemInstance
-from contactverif_paper.disk_solutions import DiskSolution, difference, flatter, solve_disk
+from contactverif_paper.example_2 import Difference, DiskSolution, flatter, solve_disk
 from contactverif_paper.paper_formulations import REFERENCE_AREAS, VTS_ME, PaperFormulation
 
 PAPER = DiskProblem()
@@ -158,8 +158,8 @@ def test_the_papers_numbers(name: str, solutions: dict[str, DiskSolution]) -> No
 
 def test_what_transfer_to_the_master_changes(solutions: dict[str, DiskSolution]) -> None:
     """Fig. 39."""
-    x, differences = difference(solutions["vts-ppt"], solutions["vts-me"])
-    assert len(x) == 68
+    differences = Difference.between(solutions["vts-ppt"], solutions["vts-me"]).values
+    assert len(differences) == 68
     assert 0 < np.abs(differences).max() <= 2.5e3
     assert differences.min() < 0 < differences.max()
 
