@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,7 +13,7 @@ from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
-from contactverif.contract.subject import Call, CheckedFormulation, Subject
+from contactverif.contract.subject import Call, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
@@ -108,7 +108,7 @@ def moment_balance(case: Case, subject: Subject) -> Measurement:
 
 
 def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState, traits: Traits) -> Measurement:
-    """Return what remains of the forces, or of their moment, over Σ|R| of the slave times the arm."""
+    """Judge what remains of the forces, or of their moment, over Σ|R| of the slave times the arm."""
     case, forces = state.case, state.forces
     tolerance = roundoff.gap_tolerance(
         case, roundoff.mean_penetration(case, forces), roundoff.rounding_distance(case, traits)
@@ -165,7 +165,7 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
 def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[float, float, str]:
     """Return the work in closed loops, its tolerance, and why work that is left decides nothing.
 
-    The distance Z, a length, is that at which positions are rounded. Loops become smaller until none is left.
+    Positions are rounded at the distance Z, a length. Loops become smaller until no work is left.
     """
     # A barrier begins with a jump in the curvature of its forces, which a loop may cross on a frozen pairing, too.
     is_barrier = subject.traits.rules.enforcement == "barrier"
@@ -173,7 +173,7 @@ def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[f
     work, tolerance, undecided = 0.0, 0.0, ""
     for share in RADII[:1] if steady else RADII:
         radius = share * state.case.resolution
-        work, tolerance, undecided = largest_work(state, radius), 64 * UNIT_ROUNDOFF * distance / radius, ""
+        work, tolerance, undecided = _largest_work(state, radius), 64 * UNIT_ROUNDOFF * distance / radius, ""
         if work <= tolerance or steady:
             break
         directions = random_directions(state.case.seed, 2 * N_LOOPS, state.case.z.size)
@@ -189,11 +189,8 @@ def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[f
     return work, tolerance, undecided
 
 
-def largest_work(state: FrozenState, radius: float) -> float:
-    """Return the largest work in a closed loop around a state, over the sum of the works on its parts.
-
-    The loops are circles (`radius` is a length) on a frozen pairing.
-    """
+def _largest_work(state: FrozenState, radius: float) -> float:
+    """Return the largest work in a circle on a frozen pairing over the sum of the works on its parts."""
     case = state.case
     planes = random_directions(case.seed, 2 * N_LOOPS, case.z.size).reshape(N_LOOPS, 2, 1, -1)
     angles = 2 * np.pi * np.arange(N_POINTS)[:, None] / N_POINTS
@@ -207,6 +204,7 @@ def largest_work(state: FrozenState, radius: float) -> float:
 
 
 N_STEPS = 12  # The steps of the way that are looked at first.
+PLACES = np.linspace(0.0, 1.0, N_STEPS + 1)
 MOST_JUMPS = 3  # So many jumps are looked for, from the largest on.
 HALVINGS, HALVINGS_OF_SLOPE = 20, 16
 FIRST = 3  # So many halvings of each of the largest steps, before one is chosen.
@@ -225,7 +223,7 @@ SLOPE = Quantity(
 Function = Callable[[FloatArray], FloatArray]
 
 
-def refuse_unstated_continuity(traits: Traits) -> str:
+def _refuse_unstated_continuity(traits: Traits) -> str:
     """Return why the question makes no sense for a formulation, or an empty string if it does."""
     if traits.rules.enforcement == "multiplier":
         return "multipliers would change on the way, and here nothing is solved"
@@ -239,7 +237,7 @@ def refuse_unstated_continuity(traits: Traits) -> str:
     quantities=(FORCE, SLOPE),
     cases=Cases.random(sliding_cases),
     promise=lambda traits: None if traits.promises.continuity is None else traits.promises.continuity != "jumps",
-    applicable=refuse_unstated_continuity,
+    applicable=_refuse_unstated_continuity,
 )
 def continuity(case: Case, subject: Subject) -> Measurement:
     """Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.
@@ -265,17 +263,32 @@ def continuity(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never. The slave stays far from the free ends of the master.
     """
-    forces, slope = _functions(subject.for_case(case), case)
-    samples = forces(_places())
+    formulation, interface, way = subject.for_case(case), case.interface, case.parameters["path"]
+
+    def forces(places: FloatArray) -> FloatArray:  # (k, n_unknowns) at k places on the way.
+        # Without a pairing the formulation takes one of each state, all in one question.
+        return formulation.residual(interface, None, case.z + np.multiply.outer(places, way))
+
+    def slope(places: FloatArray) -> FloatArray:
+        states = [case.z + place * way for place in places]
+        pairings = [formulation.pair(interface, z) for z in states]
+        around = [np.array([z - DIFFERENCE * way, z + DIFFERENCE * way]) for z in states]
+        calls: list[Call] = [
+            ("residual", interface, pairing, pair) for pairing, pair in zip(pairings, around, strict=True)
+        ]
+        both = np.array(formulation.answers(calls))  # (k, 2, n_unknowns)
+        slope: FloatArray = (both[:, 1] - both[:, 0]) / (2 * DIFFERENCE)
+        return slope
+
+    samples = forces(PLACES)
     size = max(sum_larger_forces(case, sample) for sample in samples)
-    rounding = segment_tolerance(
-        case, samples[int(np.abs(samples).sum(axis=1).argmax())], rounding_distance(case, subject.traits)
-    )
+    largest = samples[int(np.abs(samples).sum(axis=1).argmax())]
+    rounding = segment_tolerance(case, largest, rounding_distance(case, subject.traits))
     jumps = find_jumps(forces, samples, HALVINGS, ALLOWED)
     values = {FORCE: ratio(jumps[0][1], size)}
     tolerances = {FORCE: ALLOWED * ratio(_largest_step(samples), size) + rounding}
     if subject.traits.promises.continuity == "C1" and not case.parameters.get("opens", 0.0):
-        samples = slope(_places())
+        samples = slope(PLACES)
         steepest = float(np.abs(samples).max())
         values[SLOPE] = ratio(find_jumps(slope, samples, HALVINGS_OF_SLOPE, ALLOWED_OF_SLOPE)[0][1], steepest)
         tolerances[SLOPE] = ALLOWED_OF_SLOPE * ratio(_largest_step(samples), steepest) + rounding / DIFFERENCE
@@ -294,31 +307,26 @@ def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: 
     padded = np.vstack([changes[1], changes, changes[-2]])
     trends = (padded[:-2] + padded[2:]) / 2  # The change of each step if it were like its neighbours.
     steps = [
-        Bracket(step / N_STEPS, (step + 1) / N_STEPS, samples[step], samples[step + 1], trends[step])
+        _Bracket(step / N_STEPS, (step + 1) / N_STEPS, samples[step], samples[step + 1], trends[step])
         for step in range(N_STEPS)
     ]
+    selected: list[int] = []  # The neighbours of a step with a large excess have a part of it, and are left out.
+    for number in sorted(range(N_STEPS), key=lambda number: -steps[number].excess):
+        if all(abs(number - other) > 1 for other in selected):
+            selected.append(number)
     # A few halvings tell a jump from a bend of the way, which differs from its neighbours too.
-    worst = sorted(halve(_select_worst(steps), function, FIRST), key=lambda bracket: -bracket.excess)
+    few = _halve([steps[number] for number in selected[:MOST_JUMPS]], function, FIRST)
     jumps: list[tuple[float, float]] = []
-    for bracket in worst:
-        (last,) = halve([bracket], function, halvings - FIRST)
+    for bracket in sorted(few, key=lambda bracket: -bracket.excess):
+        (last,) = _halve([bracket], function, halvings - FIRST)
         jumps.append((last.left, last.change))
         if last.change <= allowed * float(np.abs(changes).max()):
             break
     return sorted(jumps, key=lambda jump: -jump[1])
 
 
-def _select_worst(steps: list[Bracket]) -> list[Bracket]:
-    """Return the steps with the largest excess; the neighbours of one have a part of its excess, and are left out."""
-    selected: list[int] = []
-    for number in sorted(range(len(steps)), key=lambda number: -steps[number].excess):
-        if all(abs(number - other) > 1 for other in selected):
-            selected.append(number)
-    return [steps[number] for number in selected[:MOST_JUMPS]]
-
-
 @dataclass(frozen=True, slots=True)
-class Bracket:
+class _Bracket:
     """A part of the way."""
 
     left: float  # Its ends, from 0 to 1.
@@ -329,7 +337,6 @@ class Bracket:
 
     @property
     def change(self) -> float:
-        """The largest change of a value."""
         return float(np.abs(self.behind - self.before).max())
 
     @property
@@ -339,65 +346,35 @@ class Bracket:
 
     @property
     def middle(self) -> float:
-        """The place half-way."""
         return (self.left + self.right) / 2
 
-    def half(self, value: FloatArray) -> Bracket:
+    def half(self, value: FloatArray) -> _Bracket:
         """Return the half with the larger excess, where the function has a value (n,) half-way."""
         trend = self.trend / 2
-        first = Bracket(self.left, self.middle, self.before, value, trend)
-        second = Bracket(self.middle, self.right, value, self.behind, trend)
+        first = _Bracket(self.left, self.middle, self.before, value, trend)
+        second = _Bracket(self.middle, self.right, value, self.behind, trend)
         return first if first.excess >= second.excess else second
 
 
-def halve(brackets: Sequence[Bracket], function: Function, times: int) -> list[Bracket]:
+def _halve(brackets: list[_Bracket], function: Function, times: int) -> list[_Bracket]:
     """Return the parts to which halving leads, always towards the larger excess.
 
     The function is asked for three places of each bracket at once, so that two halvings take one question.
     """
-    while times > 1:
+    while times > 0:
         middles = [bracket.middle for bracket in brackets]
+        if times == 1:
+            return [bracket.half(value) for bracket, value in zip(brackets, function(np.array(middles)), strict=True)]
         beside = [(bracket.left + bracket.middle) / 2 for bracket in brackets]
         behind = [(bracket.middle + bracket.right) / 2 for bracket in brackets]
         values = function(np.array([middles, beside, behind]).reshape(-1)).reshape(3, len(brackets), -1)
-        brackets = [_quarter(bracket, *values[:, number]) for number, bracket in enumerate(brackets)]
-        times -= 2
-    if times:
-        values = function(np.array([bracket.middle for bracket in brackets]))
-        brackets = [bracket.half(value) for bracket, value in zip(brackets, values, strict=True)]
-    return list(brackets)
-
-
-def _quarter(bracket: Bracket, middle: FloatArray, first: FloatArray, second: FloatArray) -> Bracket:
-    """Return what two halvings leave of a bracket, with the values (n,) in the middle and in those of its halves."""
-    half = bracket.half(middle)
-    return half.half(first if half.left == bracket.left else second)
-
-
-def _functions(formulation: CheckedFormulation, case: Case) -> tuple[Function, Function]:
-    """Return the forces (k, n_unknowns) as a function of k places on the way, and their slope."""
-    interface, way = case.interface, case.parameters["path"]
-
-    def forces(places: FloatArray) -> FloatArray:
-        # Without a pairing the formulation takes one of each state, all in one question.
-        return formulation.residual(interface, None, case.z + np.multiply.outer(places, way))
-
-    def slope(places: FloatArray) -> FloatArray:
-        states = [case.z + place * way for place in places]
-        pairings = [formulation.pair(interface, z) for z in states]
-        around = [np.array([z - DIFFERENCE * way, z + DIFFERENCE * way]) for z in states]
-        calls: list[Call] = [
-            ("residual", interface, pairing, pair) for pairing, pair in zip(pairings, around, strict=True)
+        halves = [bracket.half(value) for bracket, value in zip(brackets, values[0], strict=True)]
+        sides = [int(half.left != bracket.left) for half, bracket in zip(halves, brackets, strict=True)]
+        brackets = [
+            half.half(values[1 + side, number]) for number, (half, side) in enumerate(zip(halves, sides, strict=True))
         ]
-        both = np.array(formulation.answers(calls))  # (k, 2, n_unknowns)
-        slope: FloatArray = (both[:, 1] - both[:, 0]) / (2 * DIFFERENCE)
-        return slope
-
-    return forces, slope
-
-
-def _places() -> FloatArray:
-    return np.linspace(0.0, 1.0, N_STEPS + 1)
+        times -= 2
+    return brackets
 
 
 def _largest_step(samples: FloatArray) -> float:

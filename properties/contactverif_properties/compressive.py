@@ -11,15 +11,14 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import ACTIVATION, Case, Cases, random_source
 from contactverif.contract.errors import ContractError
-from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE, TRIANGLE, Interface, Surface, turns_of
 from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property
@@ -40,9 +39,9 @@ N_MOVES = 64  # The number of moves by roundoff that are tried where a point may
 MOVED = 32.0  # Such a move of both surfaces changes a gap by 181 uX, which is 23 tolerances.
 
 
-@dataclass(frozen=True, eq=False)
-class Constraints:
-    """The multipliers of a formulation on a flat interface whose gap is the same everywhere."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Constraints:
+    """The constraint rows of a flat interface with a uniform gap, as the contract states them."""
 
     rules: Rules
     scale: float  # The scale c of the decision λ − c gap ≥ 0.
@@ -51,29 +50,22 @@ class Constraints:
     spreads: FloatArray
     tolerance: float  # The relative rounding of a gap or an area.
 
-    @property
-    def sees(self) -> BoolArray:
-        """Return which multipliers (n_multipliers,) have something opposite."""
-        return self.areas > 0
+    def active(self, multipliers: FloatArray, gap: float) -> BoolArray:
+        return (self.areas > 0) & (multipliers - self.scale * gap >= 0)
+
+    def right(self, multipliers: FloatArray, gap: float) -> FloatArray:
+        areas = np.ones_like(self.areas) if self.rules.penalty == "nodal" else self.areas
+        return np.where(self.active(multipliers, gap), -areas * gap, areas * multipliers)
 
     def errors(self, rows: FloatArray, multipliers: FloatArray, gap: float) -> FloatArray:
         """Return the errors of constraint rows (n_multipliers,) over their tolerance; infinite for a wrong sign."""
         active = self.active(multipliers, gap)
         sizes = self.tolerance * self.spreads * np.where(active, abs(gap), np.abs(multipliers))
         # The area of an inactive constraint may be unknown: a second pass may be covered in part.
-        known = active | (self.rules.penalty == "nodal") | (self.rules.area is not None) & self.sees
+        known = active | (self.rules.penalty == "nodal") | (self.rules.area is not None) & (self.areas > 0)
         signs = np.where(rows * multipliers > 0, 0.0, np.inf)  # The area of an inactive constraint is positive.
         errors: FloatArray = np.where(known, np.abs(rows - self.right(multipliers, gap)) / sizes, signs)
         return errors
-
-    def active(self, multipliers: FloatArray, gap: float) -> BoolArray:
-        """Return which constraints (n_multipliers,) are active."""
-        return self.sees & (multipliers - self.scale * gap >= 0)
-
-    def right(self, multipliers: FloatArray, gap: float) -> FloatArray:
-        """Return the constraint rows (n_multipliers,) that the contract states."""
-        areas = np.ones_like(self.areas) if self.rules.penalty == "nodal" else self.areas
-        return np.where(self.active(multipliers, gap), -areas * gap, areas * multipliers)
 
 
 def check_constraint_rows(
@@ -93,14 +85,19 @@ def check_constraint_rows(
     tolerance = UNIT_ROUNDOFF * (8 * largest / reach + 4 * closed.n_segments)
     pressing = scale * depth * random.uniform(0.5, 1.0, count)
     areas, spreads = _areas(FrozenState.at(formulation, closed.with_multipliers(pressing)), rules)
-    constraints = Constraints(rules, scale, areas, spreads, tolerance)
+    constraints = _Constraints(rules, scale, areas, spreads, tolerance)
     worst = 0.0
+
+    def rows_at(case: Case, multipliers: FloatArray) -> FloatArray:
+        state = FrozenState.at(formulation, case.with_multipliers(multipliers))
+        return state.residual[case.interface.n_unknowns :]
+
     for case, gap in ((closed, -depth), (lifted, depth)):
         for multipliers in _choose_multipliers(random, constraints, gap):
-            rows = _rows(formulation, case, multipliers)
+            rows = rows_at(case, multipliers)
             errors = constraints.errors(rows, multipliers, gap)
             if not (errors <= 1).all():
-                moves = (_rows(formulation, moved, multipliers) for moved in _move_by_roundoff(case))
+                moves = (rows_at(moved, multipliers) for moved in _move_by_roundoff(case))
                 if any((constraints.errors(moved, multipliers, gap) <= MOVED).all() for moved in moves):
                     return worst
                 raise ContractError(_describe(constraints, rows, multipliers, gap, int(errors.argmax())))
@@ -108,7 +105,7 @@ def check_constraint_rows(
     return worst
 
 
-def _choose_multipliers(random: np.random.Generator, constraints: Constraints, gap: float) -> Iterator[FloatArray]:
+def _choose_multipliers(random: np.random.Generator, constraints: _Constraints, gap: float) -> Iterator[FloatArray]:
     """Yield multipliers for a gap: such that λ − c gap > 0 everywhere, then twice with both signs just beside 0."""
     size, count = constraints.scale * abs(gap), len(constraints.areas)
     yield constraints.scale * gap + size * random.uniform(1.25, 2.0, count)
@@ -118,13 +115,6 @@ def _choose_multipliers(random: np.random.Generator, constraints: Constraints, g
         distances *= np.where(random.random(count) < 0.5, 1.0, -1.0)
         yield constraints.scale * gap + distances
         yield constraints.scale * gap - distances
-
-
-def _rows(formulation: CheckedFormulation, case: Case, multipliers: FloatArray) -> FloatArray:
-    rows: FloatArray = FrozenState.at(formulation, case.with_multipliers(multipliers)).residual[
-        case.interface.n_unknowns :
-    ]
-    return rows
 
 
 def _areas(state: FrozenState, rules: Rules) -> tuple[FloatArray, FloatArray]:
@@ -137,8 +127,7 @@ def _areas(state: FrozenState, rules: Rules) -> tuple[FloatArray, FloatArray]:
     slave, master = np.split(pushes, [case.interface.n_slave_nodes], axis=1)
     areas: FloatArray = np.maximum(slave.sum(axis=1), -master.sum(axis=1))
     if rules.penalty == "nodal":
-        areas = (areas > 0).astype(np.float64)
-        return areas, np.ones_like(areas)
+        return (areas > 0).astype(np.float64), np.ones_like(areas)
     return areas, np.maximum(np.abs(pushes).sum(axis=1) / 2, areas.max(initial=0.0))
 
 
@@ -149,13 +138,13 @@ def _move_by_roundoff(case: Case) -> Iterator[Case]:
         yield replace(case, z=case.z + reach * direction)
 
 
-def _describe(constraints: Constraints, rows: FloatArray, multipliers: FloatArray, gap: float, row: int) -> str:
+def _describe(constraints: _Constraints, rows: FloatArray, multipliers: FloatArray, gap: float, row: int) -> str:
     """Return in words which constraint row is wrong, beside what is right."""
     multiplier, scale = float(multipliers[row]), constraints.scale
     area = "1, since it is a nodal force" if constraints.rules.penalty == "nodal" else f"{constraints.areas[row]:.6g}"
     state = f"at a gap of {gap:.6g}, λ = {multiplier:.6g} and c = {scale:.6g}"
     answer = f"residual: constraint row {row} is {rows[row]:.6g} {state}"
-    if not constraints.sees[row]:
+    if not constraints.areas[row] > 0:
         return f"{answer}, where its multiplier sees nothing; needed area · λ with an area > 0"
     difference = multiplier - scale * gap
     form = "−area · gap" if difference >= 0 else "area · λ"
@@ -186,14 +175,14 @@ Direction = tuple[float, ...]  # A unit vector, which a set holds once.
 
 
 @random_source("contactverif_properties.shared.openings.pushing_cases")
-def pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]]:
+def _pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]]:
     """Return flat cases with a uniform penetration, and states of any shape, each half of all cases."""
     flat = flat_cases(interface)
     return ({} if flat is None else {FLAT: flat}) | {ANY_SHAPE: general_cases(interface)}
 
 
 @random_source("contactverif_properties.pushes.pushing_surfaces")
-def pushing_surfaces(
+def _pushing_surfaces(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> dict[str, SearchStrategy[Case]]:
     """Return flat cases in space with a uniform penetration, and tilted and warped ones, each half of all cases."""
@@ -208,44 +197,35 @@ def lift_slave(case: Case, height: float) -> Case:
     return replace(case, z=positions.reshape(-1))
 
 
-def open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
+def _open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
     """Return a flat case with its slave lifted so that the gap grows along it, and only its first part is closed.
 
     The gap grows linearly, and nodes move only across the interface, so that every slave stays straight. `closed` is
     the share of the slave's length that is closed.
     """
-    interface, positions = case.interface, case.positions.copy()
-    depth, places = case.parameter("penetration"), _slave_places(case)
+    depth, positions = case.parameter("penetration"), case.positions.copy()
     shallow = min(depth, SHALLOW * case.slave_length)
-    positions[: interface.n_slave_nodes] += (depth + shallow * (places / closed - 1))[:, None] * normal_of(case)
+    heights = depth + shallow * (_slave_places(case) / closed - 1)
+    positions[: case.interface.n_slave_nodes] += heights[:, None] * normal_of(case)
     return replace(case, z=positions.reshape(-1))
 
 
-def nodes_far_from_contact(case: Case) -> BoolArray:
-    """Return which slave nodes (n_slave_nodes,) are then FAR or more segments from the closed end."""
-    interface, along = case.interface, _places_along(case)
-    slave = along[: interface.n_slave_nodes]
-    longest = max(float(np.ptp(along[side.faces], axis=1).max()) for side in (interface.slave, interface.master))
-    return (_slave_places(case) - CLOSED) * np.ptp(slave) > FAR * longest
-
-
 def _slave_places(case: Case) -> FloatArray:
-    """Return where the slave's nodes lie along the interface (n_slave_nodes,), from 0 to 1."""
+    """Return where the slave's nodes lie along a flat interface (n_slave_nodes,), from 0 to 1; in space along x."""
     slave = _places_along(case)[: case.interface.n_slave_nodes]
     places: FloatArray = (slave - slave.min()) / np.ptp(slave)
     return places
 
 
 def _places_along(case: Case) -> FloatArray:
-    """Return where the nodes of a flat case lie along the interface (n_nodes,), in space along its first axis."""
     return case.parameters["along"] if case.interface.dim == PLANE else case.parameters["plane"][:, 0]
 
 
 _define = partial(
     Property.define,
     family="invariants",
-    cases=Cases.by_kind(pushing_cases),
-    cases_in_space=Cases.by_kind(pushing_surfaces),
+    cases=Cases.by_kind(_pushing_cases),
+    cases_in_space=Cases.by_kind(_pushing_surfaces),
     kinds=(FLAT, ANY_SHAPE),
 )
 
@@ -293,53 +273,53 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
     and not another: a node that faces a free end exactly is over the master or not, as roundoff decides. Where contact
     begins whichever way the nodes move, the case fails.
     """
-    if subject.traits.rules.enforcement == "barrier" and "penetration" in case.parameters:
-        return measure_barrier(case, subject)
     if "penetration" in case.parameters:
-        measurement = measure_flat_contact(case, subject)
+        if subject.traits.rules.enforcement == "barrier":
+            return _measure_barrier(case, subject)
+        measurement = _measure_flat_contact(case, subject)
         if measurement.broken or measurement.undecided or subject.traits.rules.enforcement != "multiplier":
             return measurement
         lifted = lift_slave(case, 2 * case.parameter("penetration"))
         error = check_constraint_rows(subject.for_case(case), case, lifted, subject.traits.rules, subject.penalty(case))
         return replace(measurement, details={"error of a constraint row over its tolerance": error})
     state = freeze_state(case, subject)
-    values, tolerances = _pull_of_points(state)
-    return Measurement(check_all(values, tolerances), idle=not state.forces.any())
+    pull = _pull_of_points(state)
+    return Measurement([] if pull is None else [PULL_OF_POINT.check(*pull)], idle=not state.forces.any())
 
 
-def measure_flat_contact(case: Case, subject: Subject) -> Measurement:
+def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     """Lift a flat interface until all gaps are as wide as the penetration was deep, and until all but an end is open.
 
     The force far from the contact zone is missing where no node is that far, and with multipliers, since
     `complementarity` judges those that pull. The pull of a contact point is that of the flat state and of the one with
     a closed end. The measurement is broken if nothing begins where the surfaces penetrate, or if the slave is pulled.
     """
-    formulation = subject.for_case(case)
-    depth = case.parameter("penetration")
+    formulation, interface, depth = subject.for_case(case), case.interface, case.parameter("penetration")
     size = case.penalty * depth * case.slave_measure
     raised = FrozenState.with_multiplier(formulation, lift_slave(case, 2 * depth), 0.0)
     values = {OPEN: float(np.abs(raised.forces).max()) / size}
-    distant, one_end = nodes_far_from_contact(case), open_all_but_one_end(case)
+    one_end, along = _open_all_but_one_end(case), _places_along(case)
+    longest = max(float(np.ptp(along[side.faces], axis=1).max()) for side in (interface.slave, interface.master))
+    distant = (_slave_places(case) - CLOSED) * np.ptp(along[: interface.n_slave_nodes]) > FAR * longest
     if not raised.case.n_multipliers and distant.any():
         forces = np.linalg.norm(FrozenState.at(formulation, one_end).forces[: len(distant)], axis=1)
         values[DISTANT] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
     tolerances = dict.fromkeys(values, 0.0)
-    pulls = [
-        _pull_of_points(FrozenState.at(formulation, prepare_state(state, subject)[1])) for state in (case, one_end)
-    ]
-    pull, tolerance = max(pulls, key=lambda each: each[0].get(PULL_OF_POINT, 0.0) / each[1].get(PULL_OF_POINT, 1.0))
-    pushes = _contact_forces(formulation, case)
-    broken = "" if pushes.any() else "nothing begins where the surfaces penetrate"
-    undecided = ""
-    if broken:
+    states = (FrozenState.at(formulation, prepare_state(state, subject)[1]) for state in (case, one_end))
+    pulls = [pull for pull in map(_pull_of_points, states) if pull is not None]
+    if pulls:
+        values[PULL_OF_POINT], tolerances[PULL_OF_POINT] = max(pulls, key=lambda pull: pull[0] / pull[1])
+    pushes, broken, undecided = _contact_forces(formulation, case), "", ""
+    if not pushes.any():
+        broken = "nothing begins where the surfaces penetrate"
         begins = {bool(_contact_forces(formulation, moved).any()) for moved in _move_by_roundoff(case)}
         undecided = "a kink: moved by roundoff, it begins one way and not another" if len(begins) == 2 else ""
     elif _push_of_slave(pushes, case) < 0:
         broken = OPPOSITE_SIGN
-    return Measurement(check_all(values | pull, tolerances | tolerance), undecided, broken, idle=bool(undecided))
+    return Measurement(check_all(values, tolerances), undecided, broken, idle=bool(undecided))
 
 
-def measure_barrier(case: Case, subject: Subject) -> Measurement:
+def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     """Open the uniform gap of a flat interface beyond the activation distance, and halve it again and again."""
     formulation, gap, activation = subject.for_case(case), case.parameter("penetration"), case.parameter(ACTIVATION)
 
@@ -373,15 +353,14 @@ def _push_of_slave(forces: FloatArray, case: Case) -> float:
     return -float((forces[: case.interface.n_slave_nodes] @ normal_of(case)).sum())
 
 
-def _pull_of_points(state: FrozenState) -> tuple[dict[Quantity, float], dict[Quantity, float]]:
-    """Return the largest negative pressure over the largest of all, and its tolerance; nothing without points."""
+def _pull_of_points(state: FrozenState) -> tuple[float, float] | None:
+    """Return the largest negative pressure over the largest of all, and its tolerance; None without points."""
     if not state.has_points:
-        return {}, {}
+        return None
     pressure = state.points.pressure[np.isfinite(state.points.pressure)]
     largest, pull = (float(np.max(sign * pressure, initial=0.0)) for sign in (1, -1))
-    value = pull / max(largest, pull) if pull else 0.0
     tolerance = roundoff.segment_tolerance(state.case, state.residual, state.case.largest_coordinate)
-    return {PULL_OF_POINT: value}, {PULL_OF_POINT: tolerance}
+    return pull / max(largest, pull) if pull else 0.0, tolerance
 
 
 @_define(
@@ -421,10 +400,11 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Eq. 6.
     """
-    opened = open_all_but_one_end(case, HALF) if "penetration" in case.parameters else case
+    opened = _open_all_but_one_end(case, HALF) if "penetration" in case.parameters else case
     formulation, case = prepare_state(opened, subject)
-    if case.n_multipliers:
-        case = case.with_multipliers(release_some(case))
+    if case.n_multipliers:  # About half of them are 0: any that are not negative may occur.
+        pressing = np.random.default_rng([case.seed, 2]).integers(0, 2, case.n_multipliers)
+        case = case.with_multipliers(case.multipliers * (pressing if pressing.any() else 1))
     state = FrozenState.at(formulation, case)
     size = roundoff.sum_larger_forces(case, state.forces)
     if not size:
@@ -464,34 +444,28 @@ def _nodes_round_corners(state: FrozenState) -> set[int]:
     return nodes
 
 
-def release_some(state: Case) -> FloatArray:
-    """Return the multipliers (n_multipliers,) of a state, about half of them 0: any that are not negative may occur."""
-    random = np.random.default_rng([state.seed, 2])
-    pressing = random.integers(0, 2, state.n_multipliers)
-    return state.multipliers * (pressing if pressing.any() else 1)
-
-
 def allowed_pushes(state: FrozenState) -> tuple[dict[int, set[Direction]], FloatArray]:
     """Return the directions in which each node may be pushed, and the force (n_nodes,) by which it may be pulled."""
     interface, positions = state.case.interface, state.case.positions
     normals: dict[int, set[Direction]] = defaultdict(set)
     allowance = np.zeros(interface.n_nodes)
-    for side in (interface.slave, interface.master):
-        for node, normal in _inward_normals(side, positions):
-            normals[node].add(normal)
-    if not state.has_points:
-        _allow_everything(state.case, normals)
+    sides = [_inward_normals(side, positions) for side in (interface.slave, interface.master)]
+    for node, normal in chain(*sides):
+        normals[node].add(normal)
+    if state.has_points:
+        for each in state.passes:
+            _allow_points(each, normals, allowance)
         return normals, allowance
-    for each in state.passes:
-        _allow_points(each, normals, allowance)
+    # Without points each node is allowed all normals of both surfaces that push it out of the other one.
+    on_slave, on_master = ({normal for _, normal in side} for side in sides)
+    out_of_master, out_of_slave = on_slave | _turn_round(on_master), on_master | _turn_round(on_slave)
+    for node in range(interface.n_nodes):
+        normals[node] |= out_of_master if node < interface.n_slave_nodes else out_of_slave
     return normals, allowance
 
 
 def _inward_normals(side: Surface, positions: FloatArray) -> list[tuple[int, Direction]]:
-    """Return (node, unit normal into its own body) of all corners of every segment or face.
-
-    The body is on the left of a segment; a face lists its corners counter-clockwise, seen from outside.
-    """
+    """Return (node, unit normal into its own body) of all corners of every segment or face."""
     if positions.shape[1] == PLANE:
         along = positions[side.segments[:, 1]] - positions[side.segments[:, 0]]
         inward = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
@@ -506,67 +480,35 @@ def _turn_round(directions: Iterable[Direction]) -> set[Direction]:
     return {tuple(-component for component in direction) for direction in directions}
 
 
-def _allow_everything(state: Case, normals: dict[int, set[Direction]]) -> None:
-    """Allow each node all normals of both surfaces that push it out of the other one."""
-    on_slave, on_master = (
-        {normal for _, normal in _inward_normals(side, state.positions)}
-        for side in (state.interface.slave, state.interface.master)
-    )
-    out_of_master, out_of_slave = on_slave | _turn_round(on_master), on_master | _turn_round(on_slave)
-    for node in range(state.interface.n_nodes):
-        normals[node] |= out_of_master if node < state.interface.n_slave_nodes else out_of_slave
-
-
 def _allow_points(each: Pass, normals: dict[int, set[Direction]], allowance: FloatArray) -> None:
-    """Add what the points of a pass allow to the nodes that carry them and to the nodes opposite."""
-    directed: BoolArray = np.asarray(np.isfinite(each.points.normal).all(axis=1))
-    points = each.points.select(directed)
-    slave, master = each.interface.slave.faces, each.interface.master.faces
-    node_of = _nodes_of_points(each.interface, points)
-    directions = map(tuple, points.normal.tolist())
-    for segment, number, normal in zip(points.slave_segment.tolist(), node_of.tolist(), directions, strict=True):
-        for node in _carriers(slave, segment, number):
-            normals[int(each.numbers[node])].add(normal)
-    carriers = slave[points.slave_segment[points.slave_segment >= 0]].reshape(-1)
-    pushing = _turn_round(normal for node in np.unique(each.numbers[carriers]) for normal in normals[int(node)])
-    for node in np.unique(each.numbers[master]):
-        normals[int(node)] |= pushing
-    for segment, pull in zip(points.master_segment.tolist(), _pull_past_ends(points), strict=True):
-        if segment >= 0:
-            allowance[each.numbers[master[segment]]] += pull
+    """Add what the points of a pass allow to the nodes that carry them and to the nodes opposite.
 
-
-def _carriers(slave: IntArray, segment: int, node: int) -> IntArray:
-    """Return the nodes of the segment or face of a point; of all that meet in a node, if the point is one."""
-    if segment < 0:
-        return slave[:0].reshape(-1)
-    return np.unique(slave[(slave == node).any(axis=1)] if node >= 0 else slave[segment])
-
-
-def _nodes_of_points(interface: Interface, points: ContactPoints) -> IntArray:
-    """Return the slave node that each point is (n_points,); −1 for a point inside a segment or a face."""
-    shape = points.slave_shape
-    if interface.dim == PLANE:
-        shape = np.stack([1 - points.c, 1 + points.c], axis=1) / 2
-    corner = (shape == 1).argmax(axis=1)
-    return np.where((shape == 1).any(axis=1), interface.slave.faces[points.slave_segment, corner], -1)
-
-
-def _master_shape(points: ContactPoints) -> FloatArray:
-    """Return the shape functions (n_points, n_corners) of the master's corners at the feet."""
-    if points.master_shape.shape[1]:
-        return points.master_shape
-    return np.stack([1 - points.xi, points.xi], axis=1)
-
-
-def _pull_past_ends(points: ContactPoints) -> FloatArray:
-    """Return max(−ξ, ξ − 1, 0) |F| of each point (n_points,); 0 for weighted nodes, which have no foot.
-
-    In space the most negative shape function takes the place of −ξ and ξ − 1, which are those of a segment.
+    A master node may be pulled by max(−ξ, ξ − 1, 0) |F|, in space by the most negative shape function times |F|.
     """
-    past = np.maximum(0.0, -_master_shape(points).min(axis=1))
-    counted = ~points.weighted & np.isfinite(past)
-    return np.where(counted, past * np.abs(points.pressure * points.weight), 0.0)
+    directed: BoolArray = np.asarray(np.isfinite(each.points.normal).all(axis=1))
+    points, numbers = each.points.select(directed), each.numbers
+    slave, master = each.interface.slave.faces, each.interface.master.faces
+    on_slave, on_master = points.slave_shape, points.master_shape
+    if each.interface.dim == PLANE:
+        on_slave = np.stack([1 - points.c, 1 + points.c], axis=1) / 2
+    if not on_master.shape[1]:
+        on_master = np.stack([1 - points.xi, points.xi], axis=1)
+    for segment, shape, normal in zip(points.slave_segment.tolist(), on_slave, points.normal.tolist(), strict=True):
+        if segment >= 0:  # A point that is a node lies on all segments that meet there.
+            node = slave[segment, (shape == 1).argmax()]
+            carriers = slave[(slave == node).any(axis=1)] if (shape == 1).any() else slave[segment]
+            for carrier in np.unique(carriers):
+                normals[int(numbers[carrier])].add(tuple(normal))
+    carriers = slave[points.slave_segment[points.slave_segment >= 0]].reshape(-1)
+    pushing = _turn_round(normal for node in np.unique(numbers[carriers]) for normal in normals[int(node)])
+    for node in np.unique(numbers[master]):
+        normals[int(node)] |= pushing
+    past = np.maximum(0.0, -on_master.min(axis=1))
+    counted = ~points.weighted & np.isfinite(past)  # A weighted node has no foot.
+    pulls = np.where(counted, past * np.abs(points.pressure * points.weight), 0.0)
+    for segment, pull in zip(points.master_segment.tolist(), pulls, strict=True):
+        if segment >= 0:
+            allowance[numbers[master[segment]]] += pull
 
 
 def _distance_from_cone(normals: set[Direction], force: FloatArray) -> float:

@@ -46,7 +46,7 @@ FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reported:
+class _Reported:
     """The answers of a formulation in a state."""
 
     state: Case  # With multipliers, if the formulation has any.
@@ -55,34 +55,44 @@ class Reported:
     traits: Traits
 
     @classmethod
-    def from_case(cls, case: Case, subject: Subject) -> Reported:
+    def from_case(cls, case: Case, subject: Subject) -> _Reported:
         """Ask a formulation about a case without multipliers."""
         frozen = freeze_state(case, subject)
         forces, points = frozen.formulation.answers([frozen.call("residual"), frozen.call("contact_points")])
-        return cls(
-            frozen.case, forces[: case.interface.n_unknowns].reshape(case.positions.shape), points, subject.traits
-        )
+        forces = forces[: case.interface.n_unknowns].reshape(case.positions.shape)
+        return cls(frozen.case, forces, points, subject.traits)
 
     @property
     def passes(self) -> Iterator[Pass]:
-        """The points by pass."""
         return split_passes(self.state, self.points)
+
+    @property
+    def in_plane(self) -> bool:
+        return self.state.interface.dim == PLANE
+
+    @property
+    def rule(self) -> str | None:
+        """The trait `gap`."""
+        return self.traits.rules.gap
 
     @property
     def distant(self) -> float:
         """The length Z at which a point may be rounded."""
         return rounding_distance(self.state, self.traits)
 
+    @property
+    def idle(self) -> bool:
+        return not self.points.active.any()
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Places:
+class _Places:
     """The points of a pass that name a place on a slave segment and a master segment.
 
     A scale is the length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over
     the cosine; infinite where the rule sees nothing of the segment.
     """
 
-    interface: Interface  # In the roles of the pass.
     lattice: exact_points.Lattice
     reported: ContactPoints
     exact: exact_points.ExactPoints
@@ -92,29 +102,26 @@ class Places:
     # Rounding its ends at D turns the segment of length ℓ whose normal is taken by uD/ℓ, which moves the foot by
     # |gap| uD/ℓ. So |gap| D/ℓ is added too.
     foot_scale: FloatArray
-    facing: BoolArray  # True where the slave segment and the master segment run against each other.
 
     @classmethod
-    def from_pass(cls, each: Pass, rule: str | None, distant: float) -> Places:
-        """Return the places of a pass; `rule` is the trait `gap`, `distant` where points may be rounded, a length."""
-        points = each.points.select(name_places(each.points) & (each.points.master_segment >= 0))
+    def from_pass(cls, each: Pass, reported: _Reported) -> _Places:
+        points = each.points.select(_name_places(each.points) & (each.points.master_segment >= 0))
         lattice = exact_points.Lattice.from_state(each.interface, each.z)
         exact = exact_points.ExactPoints.at(lattice, points.slave_segment, points.c)
-        look = exact_points.closest_view if rule == CLOSEST else exact_points.slave_normal_view
+        closest, distant = reported.rule == CLOSEST, reported.distant
+        look = exact_points.closest_view if closest else exact_points.slave_normal_view
         view = look(lattice, exact, points.master_segment)
         with np.errstate(divide="ignore"):
             over, xi = np.where(view.cosine > 0, 1 / np.abs(view.cosine), np.inf), view.xi.floats()
-        carrier = view.master_length if rule == CLOSEST else view.slave_length
         size = view.lengths + distant
         gap_size = size + distant * np.maximum(0, np.maximum(-xi, xi - 1))
-        foot_size = gap_size + distant * np.abs(view.gap.floats()) / carrier
-        scales = (size * over, gap_size * over, foot_size * over)
-        facing = exact_points.run_against(lattice, exact, points.master_segment)
-        return cls(each.interface, lattice, points, exact, view, *scales, facing)
+        foot_size = gap_size + distant * np.abs(view.gap.floats()) / (
+            view.master_length if closest else view.slave_length
+        )
+        return cls(lattice, points, exact, view, size * over, gap_size * over, foot_size * over)
 
 
-def name_places(points: ContactPoints) -> BoolArray:
-    """Return which points (n_points,) name a place on their surface."""
+def _name_places(points: ContactPoints) -> BoolArray:
     placed = np.isfinite(points.slave_shape).all(axis=1) if points.slave_shape.shape[1] else np.isfinite(points.c)
     return np.asarray((points.slave_segment >= 0) & placed)
 
@@ -127,7 +134,7 @@ def projected_cases(interface: Interface | None = None) -> dict[str, SearchStrat
     return projections_by_kind() | dict(zip(LARGER_MESHES, (general_cases(), tie_cases()), strict=True))
 
 
-def largest(values: FloatArray) -> float:
+def _largest(values: FloatArray) -> float:
     """Return the largest of some values ≥ 0; NaN if one is NaN, 0 if there are none."""
     return float(np.max(values, initial=0.0))
 
@@ -145,7 +152,7 @@ FLAT, TILTED = "flat faces", "tilted and warped faces"
 
 
 @random_source("contactverif_properties.shared.face_places.projected_faces")
-def projected_faces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+def _projected_faces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return flat cases in space, and tilted and warped ones."""
     cases = {FLAT: flat_surface_cases(interface), TILTED: surface_cases(interface)}
     if interface is not None and interface.slave.faces.shape[1] + interface.master.faces.shape[1] > 2 * TRIANGLE:
@@ -153,11 +160,11 @@ def projected_faces(interface: Interface | None = None) -> dict[str, SearchStrat
     return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
 
 
-ON_FACES = Cases.by_kind(projected_faces)
+ON_FACES = Cases.by_kind(_projected_faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FacePlaces:
+class _FacePlaces:
     """The points of a pass that name a place on a slave face and a master face, and what is exact there."""
 
     interface: Interface  # In the roles of the pass.
@@ -176,20 +183,19 @@ class FacePlaces:
     share: FloatArray
 
     @classmethod
-    def from_pass(cls, each: Pass, rule: str | None, distant: float) -> FacePlaces:
-        """Return the places of a pass; `rule` is the trait `gap`, `distant` where points may be rounded, a length."""
-        named = name_places(each.points) & (each.points.master_segment >= 0)
-        points = each.points.select(named & ~each.points.weighted)
+    def from_pass(cls, each: Pass, reported: _Reported) -> _FacePlaces:
+        named = _name_places(each.points) & (each.points.master_segment >= 0)
+        points, slave = each.points.select(named & ~each.points.weighted), each.interface.slave
         lattice = FaceLattice.from_state(each.interface, each.z)
         exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
-        view = FaceView.of_faces(lattice, exact, points.master_segment, closest=rule == CLOSEST)
-        carriers = each.positions[each.interface.slave.faces[points.slave_segment]]
-        slave_height = each.interface.slave.heights(each.positions)[points.slave_segment]
-        carrier = view.heights if rule == CLOSEST else slave_height
-        edges, gap = _longest_edges(view.corners), np.abs(view.gap.floats())
-        slave_edges = _longest_edges(carriers)
+        closest = reported.rule == CLOSEST
+        view = FaceView.of_faces(lattice, exact, points.master_segment, closest=closest)
+        slave_height = slave.heights(each.positions)[points.slave_segment]
+        carrier = view.heights if closest else slave_height
+        edges = _longest_edges(view.corners)
+        slave_edges = _longest_edges(each.positions[slave.faces[points.slave_segment]])
         size = edges + slave_edges + np.linalg.norm(view.corners, axis=2).max(axis=1, initial=0.0)
-        size += distant * (1 + gap / carrier)
+        size += reported.distant * (1 + np.abs(view.gap.floats()) / carrier)
         with np.errstate(divide="ignore"):
             slender = edges / view.heights * slave_edges / slave_height
             scale = 2 * size * slender / np.maximum(view.cosine, 0.0)
@@ -228,104 +234,7 @@ def _longest_edges(corners: FloatArray) -> FloatArray:
     return longest
 
 
-def place_errors(case: Case, subject: Subject) -> tuple[list[float], bool]:
-    """Return the largest errors of gap, foot, normal and position, and whether no point is active."""
-    reported = Reported.from_case(case, subject)
-    values = np.zeros(4)
-    for each in reported.passes:
-        places = FacePlaces.from_pass(each, subject.traits.rules.gap, reported.distant)
-        points, view, facing = places.reported, places.view, np.isfinite(places.scale)
-        edges = _longest_edges(view.corners)
-        turned = 1 + reported.distant / places.carrier_height
-        foot = np.abs(view.shape.errors(points.master_shape)).max(axis=1, initial=0.0) * edges
-        normal = np.linalg.norm(view.normal.errors(points.normal), axis=1)
-        errors = np.abs(view.gap.errors(points.gap)) / places.scale, foot / places.scale, normal / turned
-        on_faces = [largest(_size(error, points.active)[facing]) for error in errors]
-        values = np.maximum(
-            values, [*on_faces, largest(_face_position_errors(each) / reported.state.largest_coordinate)]
-        )
-    return values.tolist(), not reported.points.active.any()
-
-
-def _face_position_errors(each: Pass) -> FloatArray:
-    """Return the errors of the reported positions (n_points,) of all points that name a place, a length."""
-    points = each.points.select(name_places(each.points))
-    lattice = FaceLattice.from_state(each.interface, each.z)
-    exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
-    place = replace(exact.positions, below=exact.positions.below * lattice.scale)
-    return _size(np.abs(place.errors(points.position)).max(axis=1, initial=0.0), points.active)
-
-
-def face_errors(case: Case, subject: Subject) -> tuple[float, str, bool]:
-    """Return the largest excess of a distance over its scale, how the contract is broken, and whether all is idle."""
-    reported = Reported.from_case(case, subject)
-    rule, value, broken = subject.traits.rules.gap, 0.0, ""
-    for each in reported.passes:
-        places = FacePlaces.from_pass(each, rule, reported.distant)
-        counted = places.view.faces_it
-        if rule == CLOSEST:
-            excess = places.closest_excess()
-        else:
-            excess = np.where(places.beside_border, 0.0, np.maximum(-places.depth_inside, 0.0)) * places.share
-        value = max(value, largest((excess / places.scale)[counted]))
-        if (places.reported.active & ~counted & (places.share > 4 * UNIT_ROUNDOFF)).any():
-            broken = "a master face does not face the slave face of its point"
-    return value, broken, not reported.points.active.any()
-
-
-def count_decisions(reported: Reported) -> tuple[int, int]:
-    """Return how many decisions for contact are wrong in a state, and how many points are decided."""
-    wrong = decided = 0
-    for each in reported.passes:
-        places = FacePlaces.from_pass(each, reported.traits.rules.gap, reported.distant)
-        points, gap = places.reported, places.view.gap.floats()
-        certain = places.view.faces_it & (points.weight != 0) & (np.abs(gap) > 4 * UNIT_ROUNDOFF * places.scale)
-        certain &= places.depth_inside > 4 * UNIT_ROUNDOFF * places.scale
-        weighted = each.points.select(each.points.weighted)
-        sure = np.abs(weighted.gap) > 4 * UNIT_ROUNDOFF * (reported.state.diameter + reported.distant)
-        wrong += int((certain & (points.active != (gap < 0))).sum())
-        wrong += int((sure & (weighted.active != (weighted.gap < 0))).sum())
-        decided += int(certain.sum()) + int(sure.sum())
-    return wrong, decided
-
-
-def area_error(each: Pass, rule: str | None, areas: FloatArray, distant: float) -> float:
-    """Return the error of the sums of weights over the scale of areas, face by face where points lie on one.
-
-    The slave faces have the areas (n_faces,) in the configuration of the trait `area`. An area is a product of lengths
-    of which each is rounded at D, so its scale is L D; on needles the longest edge is more than √A.
-    """
-    points, whole = each.points.select(name_places(each.points)), float(areas.sum())
-    length = max(sqrt(whole), float(_longest_edges(each.positions[each.interface.slave.faces]).max()))
-    scale = len(areas) * length * (length + distant)
-    if rule is None:
-        return (float(points.weight.sum()) - whole) / scale
-    if rule == CLOSEST:
-        return _missing_or_excess(points, whole, covered=_are_all_nodes(each, points)) / scale
-    shares = np.array([float(share) for share in covered_shares(FaceLattice.from_state(each.interface, each.z))])
-    if (shares > 1).any():  # Master faces lie behind one another.
-        return 0.0
-    if rule not in CELLS:
-        return _missing_or_excess(points, whole, covered=bool((shares == 1).all())) / scale
-    expected, sums = shares * areas, np.bincount(points.slave_segment, points.weight, len(areas))
-    errors = sums - expected
-    return abs(float(errors.sum())) / scale if points.weighted.any() else float(np.abs(errors).max()) / scale
-
-
-def _missing_or_excess(points: ContactPoints, area: float, *, covered: bool) -> float:
-    """Return how much weights (n_points,) are more than an area, or also less where all of it is covered."""
-    excess = float(points.weight.sum()) - area
-    return abs(excess) if covered else max(excess, 0.0)
-
-
-def _are_all_nodes(each: Pass, points: ContactPoints) -> bool:
-    """Return whether the points are the slave nodes, all of them."""
-    corners = each.interface.slave.faces[points.slave_segment, points.slave_shape.argmax(axis=1)]
-    whole = (points.slave_shape == 1).any(axis=1).all()
-    return bool(whole) and len(np.unique(corners)) == each.interface.n_slave_nodes
-
-
-def refuse_without_rule(traits: Traits) -> str:
+def _refuse_without_rule(traits: Traits) -> str:
     """Return why places cannot be judged, or an empty string where the trait `gap` states a rule."""
     return "" if traits.rules.gap is not None else "the trait `gap` states no rule of projection"
 
@@ -340,7 +249,7 @@ FARTHER = Quantity(
 
 
 @define_projection(
-    id="projection.segment", rank=320, quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=refuse_without_rule
+    id="projection.segment", rank=320, quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=_refuse_without_rule
 )
 def projection_segment(case: Case, subject: Subject) -> Measurement:
     """Each contact point is measured against the master segment that the stated rule names.
@@ -364,31 +273,40 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never. The number of exact ties is a detail. A point that names no segment is not judged here.
     """
-    if case.interface.dim != PLANE:
-        value, broken, idle = face_errors(case, subject)
-        return Measurement([FARTHER.check(value, TIED)], broken=broken, idle=idle)
-    reported = Reported.from_case(case, subject)
-    rule, value, ties, broken = subject.traits.rules.gap, 0.0, 0, ""
+    reported = _Reported.from_case(case, subject)
+    value, ties, broken = 0.0, 0, ""
     for each in reported.passes:
-        places = Places.from_pass(each, rule, reported.distant)
-        segments = places.reported.master_segment
-        if rule == CLOSEST:
-            excess, tied = closest_excess(places.lattice, places.exact, segments)
-            ties += int((tied > 1).sum())
-        else:
-            carrier = places.reported.slave_segment
-            excess = seen_excess(places.lattice, places.exact, carrier, segments, cells=rule in CELLS)
-        facing = places.view.cosine > 0
-        value = max(value, largest(excess[facing] / places.scale[facing]))
-        rounded = places.reported.weight <= OVERLAP_ROUNDOFF * (places.view.lengths + reported.distant)
-        if not (facing | rounded).all():
-            broken = "a master segment does not face the slave segment of its point"
-    return Measurement(
-        [FARTHER.check(value, TIED)],
-        broken=broken,
-        details={"tied points": ties},
-        idle=not reported.points.active.any(),
-    )
+        excess, tied, breach = (_find_farther if reported.in_plane else _find_farther_face)(each, reported)
+        value, ties, broken = max(value, _largest(excess)), ties + tied, breach or broken
+    details = {"tied points": ties} if reported.in_plane else {}
+    return Measurement([FARTHER.check(value, TIED)], broken=broken, details=details, idle=reported.idle)
+
+
+def _find_farther(each: Pass, reported: _Reported) -> tuple[FloatArray, int, str]:
+    """Return how much farther segments are than the right ones over the scale, the number of ties, and a breach."""
+    places, ties = _Places.from_pass(each, reported), 0
+    segments, facing = places.reported.master_segment, places.view.cosine > 0
+    if reported.rule == CLOSEST:
+        excess, tied = closest_excess(places.lattice, places.exact, segments)
+        ties = int((tied > 1).sum())
+    else:
+        carrier = places.reported.slave_segment
+        excess = seen_excess(places.lattice, places.exact, carrier, segments, cells=reported.rule in CELLS)
+    rounded = places.reported.weight <= OVERLAP_ROUNDOFF * (places.view.lengths + reported.distant)
+    breach = "" if (facing | rounded).all() else "a master segment does not face the slave segment of its point"
+    return excess[facing] / places.scale[facing], ties, breach
+
+
+def _find_farther_face(each: Pass, reported: _Reported) -> tuple[FloatArray, int, str]:
+    places = _FacePlaces.from_pass(each, reported)
+    counted = places.view.faces_it
+    if reported.rule == CLOSEST:
+        excess = places.closest_excess()
+    else:
+        excess = np.where(places.beside_border, 0.0, np.maximum(-places.depth_inside, 0.0)) * places.share
+    wrong = (places.reported.active & ~counted & (places.share > 4 * UNIT_ROUNDOFF)).any()
+    breach = "a master face does not face the slave face of its point" if wrong else ""
+    return (excess / places.scale)[counted], 0, breach
 
 
 GAP = Quantity("error of the gap", "4u", LOCAL_REASON)
@@ -407,7 +325,7 @@ _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
     rank=70,
     quantities=(GAP, XI, NORMAL, POSITION),
     cases_in_space=ON_FACES,
-    applicable=refuse_without_rule,
+    applicable=_refuse_without_rule,
 )
 def projection_place(case: Case, subject: Subject) -> Measurement:
     """Position, ξ, normal and gap of each contact point are those of its place.
@@ -435,39 +353,45 @@ def projection_place(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never. NaN fails at an active point and is "nothing to say" at an idle one. The gap of a weighted
     node is a mean, and is not judged here.
     """
-    tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
-    if case.interface.dim != PLANE:
-        on_faces, idle = place_errors(case, subject)
-        return Measurement(check_all(dict(zip(_ROUNDINGS, on_faces, strict=True)), tolerances), idle=idle)
-    reported = Reported.from_case(case, subject)
-    values, far = dict.fromkeys(_ROUNDINGS, 0.0), reported.state.largest_coordinate
+    reported = _Reported.from_case(case, subject)
+    find_errors = _find_errors if reported.in_plane else _find_errors_on_faces
+    values = np.zeros(len(_ROUNDINGS))
     for each in reported.passes:
-        places = Places.from_pass(each, subject.traits.rules.gap, reported.distant)
-        for name, errors in (*_errors(places, reported.distant), (POSITION, _position_errors(each, far))):
-            values[name] = float(np.maximum(values[name], largest(errors)))
-    return Measurement(check_all(values, tolerances), idle=not reported.points.active.any())
+        values = np.maximum(values, list(map(_largest, find_errors(each, reported))))
+    tolerances = {name: count * UNIT_ROUNDOFF for name, count in _ROUNDINGS.items()}
+    return Measurement(check_all(dict(zip(_ROUNDINGS, values.tolist(), strict=True)), tolerances), idle=reported.idle)
 
 
-def _errors(places: Places, distant: float) -> Iterator[tuple[Quantity, FloatArray]]:
-    """Yield the name of each quantity with its errors, NaN only where an active point has NaN."""
-    points, view = places.reported, places.view
-    facing = np.isfinite(places.scale)
-    counted = facing & ~points.weighted
-    yield GAP, _size(view.gap.errors(points.gap) / places.gap_scale, points.active)[counted]
+def _find_errors(each: Pass, reported: _Reported) -> Iterator[FloatArray]:
+    """Yield the errors of gap, ξ, normal and position, each over its scale; NaN only where an active point has NaN."""
+    places = _Places.from_pass(each, reported)
+    points, view, facing = places.reported, places.view, np.isfinite(places.scale)
+    yield _size(view.gap.errors(points.gap) / places.gap_scale, points.active)[facing & ~points.weighted]
     length = view.master_length / places.foot_scale
-    yield XI, _size(view.xi.errors(points.xi) * length, points.active)[facing]
+    yield _size(view.xi.errors(points.xi) * length, points.active)[facing]
     carrier = np.minimum(view.master_length, view.slave_length)  # Rounding the ends of a segment turns it.
     turns = view.normal.errors(points.normal)
-    yield NORMAL, _size(np.hypot(turns[:, 0], turns[:, 1]) / (1 + distant / carrier), points.active)[facing]
+    yield _size(np.hypot(turns[:, 0], turns[:, 1]) / (1 + reported.distant / carrier), points.active)[facing]
+    # A position counts for all points that name a place, whether they see a master or not.
+    points = each.points.select(_name_places(each.points))
+    exact = exact_points.ExactPoints.at(places.lattice, points.slave_segment, points.c)
+    shifts = exact_points.positions(places.lattice, exact).errors(points.position) / reported.state.largest_coordinate
+    yield _size(np.abs(shifts).max(axis=1, initial=0.0), points.active)
 
 
-def _position_errors(each: Pass, far: float) -> FloatArray:
-    """Return the errors of positions over X, of all points that name a place, whether they see a master or not."""
-    points = each.points.select(name_places(each.points))
-    lattice = exact_points.Lattice.from_state(each.interface, each.z)
-    exact = exact_points.ExactPoints.at(lattice, points.slave_segment, points.c)
-    shifts = exact_points.positions(lattice, exact).errors(points.position) / far
-    return _size(np.abs(shifts).max(axis=1, initial=0.0), points.active)
+def _find_errors_on_faces(each: Pass, reported: _Reported) -> Iterator[FloatArray]:
+    """Yield the same of points on faces, with the shape functions of the foot in place of ξ."""
+    places = _FacePlaces.from_pass(each, reported)
+    points, view, scale, facing = places.reported, places.view, places.scale, np.isfinite(places.scale)
+    yield _size(np.abs(view.gap.errors(points.gap)) / scale, points.active)[facing]
+    foot = np.abs(view.shape.errors(points.master_shape)).max(axis=1, initial=0.0) * _longest_edges(view.corners)
+    yield _size(foot / scale, points.active)[facing]
+    turned = 1 + reported.distant / places.carrier_height
+    yield _size(np.linalg.norm(view.normal.errors(points.normal), axis=1) / turned, points.active)[facing]
+    points = each.points.select(_name_places(each.points))
+    exact = ExactFacePoints.at(places.lattice, points.slave_segment, points.slave_shape).positions
+    shifts = replace(exact, below=exact.below * places.lattice.scale).errors(points.position)
+    yield _size(np.abs(shifts).max(axis=1, initial=0.0), points.active) / reported.state.largest_coordinate
 
 
 def _size(errors: FloatArray, active: BoolArray) -> FloatArray:
@@ -479,17 +403,17 @@ LARGE_UNIT = 2.0**-32
 WRONG = Quantity("wrong decisions", "0", "A decision is right or wrong; what roundoff or a rule decides is left out.")
 
 
-def refuse_other_decisions(traits: Traits) -> str:
+def _refuse_other_decisions(traits: Traits) -> str:
     """Return why the decision is not known from the gap, or an empty string."""
     if traits.rules.enforcement == "multiplier":
         return "the enforcement is by a multiplier, which decides in its own way"
     if traits.rules.gap == "cells and nodes":
         return "the slave nodes decide, and the points do not"
-    return refuse_without_rule(traits)
+    return _refuse_without_rule(traits)
 
 
 @define_projection(
-    id="projection.activity", rank=50, quantities=(WRONG,), cases_in_space=ON_FACES, applicable=refuse_other_decisions
+    id="projection.activity", rank=50, quantities=(WRONG,), cases_in_space=ON_FACES, applicable=_refuse_other_decisions
 )
 def projection_activity(case: Case, subject: Subject) -> Measurement:
     """A contact point is active exactly where its gap is closed and its foot is on the master.
@@ -512,11 +436,11 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     """
     # All lengths are divided by 2^32, which rounds nothing; the penalty stays.
     large = replace(case, interface=case.interface.at(case.interface.nodes * LARGE_UNIT), z=case.z * LARGE_UNIT)
-    both = [Reported.from_case(state, subject) for state in (case, large)]
-    wrong, decided = zip(*map(_count if case.interface.dim == PLANE else count_decisions, both), strict=True)
+    both = [_Reported.from_case(state, subject) for state in (case, large)]
+    wrong, decided = zip(*map(_count_decisions, both), strict=True)
     samples = [each.points for each in both]
     homeless = any(
-        (points.active & ~(name_places(points) & ((points.master_segment >= 0) | points.weighted))).any()
+        (points.active & ~(_name_places(points) & ((points.master_segment >= 0) | points.weighted))).any()
         for points in samples
     )
     n_points = sum(len(points.c) for points in samples)
@@ -528,34 +452,42 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     )
 
 
-def _count(reported: Reported) -> tuple[int, int]:
-    rule, wrong, decided = reported.traits.rules.gap, 0, 0
+def _count_decisions(reported: _Reported) -> tuple[int, int]:
+    """Return how many decisions for contact are wrong in a state, and how many points are decided."""
+    wrong = decided = 0
     for each in reported.passes:
         weighted = each.points.select(each.points.weighted)
-        local = Places.from_pass(each, rule, reported.distant)
-        certain, closed = _decide(local, rule)
-        wrong += int((certain & (local.reported.active != closed)).sum())
-        decided += int(certain.sum())
         sure = np.abs(weighted.gap) > 4 * UNIT_ROUNDOFF * (reported.state.diameter + reported.distant)
-        wrong += int((sure & (weighted.active != (weighted.gap < 0))).sum())
-        decided += int(sure.sum())
+        decide = _decide if reported.in_plane else _decide_on_faces
+        for active, certain, closed in (decide(each, reported), (weighted.active, sure, weighted.gap < 0)):
+            wrong += int((certain & (active != closed)).sum())
+            decided += int(certain.sum())
     return wrong, decided
 
 
-def _decide(places: Places, rule: str | None) -> tuple[BoolArray, BoolArray]:
-    """Return at which points (n_points,) every right formulation decides alike, and whether it decides for contact."""
+def _decide(each: Pass, reported: _Reported) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Return which points (n_points,) are active, where every right formulation decides alike, and for contact."""
+    places = _Places.from_pass(each, reported)
     points, view = places.reported, places.view
     rounding, foot_rounding = 4 * UNIT_ROUNDOFF * places.gap_scale, 4 * UNIT_ROUNDOFF * places.foot_scale
     gap, xi, length = view.gap.floats(), view.xi.floats(), view.master_length
     past = np.stack([-xi, xi - 1], axis=1) * length[:, None]  # Past the first end, and past the second.
     certain = (np.abs(gap) > rounding) & (np.abs(gap) <= DEEP * (length + view.slave_length)) & ~points.weighted
-    if rule != CLOSEST:
-        return certain & (past < -foot_rounding[:, None]).all(axis=1), gap < 0
-    free = places.interface.master.neighbours[points.master_segment] < 0
+    if reported.rule != CLOSEST:
+        return points.active, certain & (past < -foot_rounding[:, None]).all(axis=1), gap < 0
+    free = each.interface.master.neighbours[points.master_segment] < 0
     beyond = free & (past >= length[:, None])
     near_end = free & ~beyond & (past > -foot_rounding[:, None])
-    usable = points.active | (places.facing & (points.weight != 0))
-    return certain & usable & ~near_end.any(axis=1), (gap < 0) & ~beyond.any(axis=1)
+    facing = exact_points.run_against(places.lattice, places.exact, points.master_segment)
+    usable = points.active | (facing & (points.weight != 0))
+    return points.active, certain & usable & ~near_end.any(axis=1), (gap < 0) & ~beyond.any(axis=1)
+
+
+def _decide_on_faces(each: Pass, reported: _Reported) -> tuple[BoolArray, BoolArray, BoolArray]:
+    places = _FacePlaces.from_pass(each, reported)
+    points, gap, rounding = places.reported, places.view.gap.floats(), 4 * UNIT_ROUNDOFF * places.scale
+    certain = places.view.faces_it & (points.weight != 0) & (np.abs(gap) > rounding)
+    return points.active, certain & (places.depth_inside > rounding), gap < 0
 
 
 ENDS_REASON = "An end that a master node cuts is a quotient of differences; X is added unless points keep their digits."
@@ -597,27 +529,19 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never. The coverage of slave segments that see several bodies behind one another, or one that is
     deeper than two lengths, is not measured. A nodal penalty has no areas and is not asked.
     """
-    reported = Reported.from_case(case, subject)
-    in_space = case.interface.dim != PLANE
-    values = dict.fromkeys((SUM,) if in_space else (WEIGHT, ENDS, SUM), 0.0)
-    one_pass = not reported.points.on_master.any()
+    reported = _Reported.from_case(case, subject)
+    values = dict.fromkeys((WEIGHT, ENDS, SUM) if reported.in_plane else (SUM,), 0.0)
     for each in reported.passes:
-        lengths = _lengths(each, subject.traits)
-        if in_space:
-            rule, distant = subject.traits.rules.gap, reported.distant
-            values[SUM] = max(values[SUM], min(area_error(each, rule, length, distant) for length in lengths))
-            continue
-        trials = [_Areas(each, subject.traits, length, reported.distant, one_pass).errors() for length in lengths]
+        find_errors = _find_area_errors if reported.in_plane else _find_sum_error_of_faces
+        trials = [find_errors(each, reported, length) for length in _lengths(each, subject.traits)]
         best = min(trials, key=lambda trial: max(trial.values()))
         values = {name: max(value, best[name]) for name, value in values.items()}
     tolerances = {name: {SUM: 64 + WEIGHT_ROUNDINGS}.get(name, 16) * UNIT_ROUNDOFF for name in values}
-    fits = values[SUM] <= tolerances[SUM]
-    return Measurement(
-        check_all(values, tolerances), broken=_area_breach(reported, fits=fits), idle=not reported.points.active.any()
-    )
+    broken = _area_breach(reported, fits=values[SUM] <= tolerances[SUM])
+    return Measurement(check_all(values, tolerances), broken=broken, idle=reported.idle)
 
 
-def _area_breach(reported: Reported, *, fits: bool) -> str:
+def _area_breach(reported: _Reported, *, fits: bool) -> str:
     """Return how the points break the contract, or an empty string; `fits` says that weights have the right sums.
 
     Idle points are left out if no point is idle, and lengths are missing.
@@ -639,71 +563,77 @@ def _lengths(each: Pass, traits: Traits) -> list[FloatArray]:
     return {"current": [current], "reference": [reference], None: [current, reference]}[traits.rules.area]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Areas:
-    """The points of a pass, the lengths of the slave segments, and the length at which a point may be rounded.
+def _find_area_errors(each: Pass, reported: _Reported, length: FloatArray) -> dict[Quantity, float]:
+    """Return the errors of weights, ends and sums, for slave segments of a length (n_segments,)."""
+    points, distant = each.points, reported.distant
+    ends = np.stack([points.area_from, points.area_to])
+    within = np.abs(points.c) < 1  # A node may stand for parts of two segments, and its ends for one of them.
+    given = np.isfinite(ends).all(axis=0) & _name_places(points) & within
+    whole = replace(points, area_from=ends.min(axis=0), area_to=ends.max(axis=0)).select(given)
+    current = each.interface.slave.lengths(each.positions)
+    size = float(np.hypot(*np.ptp(each.positions, axis=0))) + distant  # Rounding is a share of it.
+    scale = len(current) * float((size * length / current).max())
+    low, high, on = whole.area_from, whole.area_to, whole.slave_segment
+    weights = np.where(whole.weight > 0, np.abs(whole.weight - (high - low) / 2 * length[on]), 0.0)
+    outside = np.maximum.reduce([low - whole.c, whole.c - high, -1 - low, high - 1, _overlaps(whole)], initial=0.0)
+    return {
+        WEIGHT: _largest(weights / (size * (length[on] / current[on]))),
+        ENDS: _largest(outside / 2 * current[on] / size),
+        SUM: _largest(np.array([_sum_error(each, reported, length) / scale])),
+    }
 
-    The trait `patch.overhang` speaks of the sum of all passes, so it says something here if there is one.
-    """
 
-    each: Pass
-    traits: Traits
-    length: FloatArray
-    distant: float
-    one_pass: bool
-
-    def errors(self) -> dict[Quantity, float]:
-        """Return the errors of weights, ends and sums by name."""
-        points = self.each.points
-        ends = np.stack([points.area_from, points.area_to])
-        within = np.abs(points.c) < 1  # A node may stand for parts of two segments, and its ends for one of them.
-        given = np.isfinite(ends).all(axis=0) & name_places(points) & within
-        whole = replace(points, area_from=ends.min(axis=0), area_to=ends.max(axis=0)).select(given)
-        current = self.each.interface.slave.lengths(self.each.positions)
-        size = float(np.hypot(*np.ptp(self.each.positions, axis=0))) + self.distant  # Rounding is a share of it.
-        scale = len(current) * float((size * self.length / current).max())
-        low, high, on = whole.area_from, whole.area_to, whole.slave_segment
-        stretch = self.length[on] / current[on]
-        weights = np.where(whole.weight > 0, np.abs(whole.weight - (high - low) / 2 * self.length[on]), 0.0)
-        outside = np.maximum.reduce([low - whole.c, whole.c - high, -1 - low, high - 1, _overlaps(whole)], initial=0.0)
-        return {
-            WEIGHT: largest(weights / (size * stretch)),
-            ENDS: largest(outside / 2 * current[on] / size),
-            SUM: largest(np.array(list(self._sum_errors(scale)))),
-        }
-
-    def _sum_errors(self, scale: float) -> Iterator[float]:
-        """Yield the errors of sums of weights over the lengths that they are formed from, the scale."""
-        points, rule = self.each.points, self.traits.rules.gap
-        total, whole = float(points.weight.sum()), float(self.length.sum())
-        lattice = exact_points.Lattice.from_state(self.each.interface, self.each.z)
-        if rule in CELLS:
-            yield from self._cell_errors(Coverage.along_slave_normals(lattice), scale)
-        elif rule is not None or lies_in_shadow(lattice, self.each.interface):
-            missing = abs(total - whole) if self._covers_all(lattice) else 0.0
-            yield max(total - whole, missing) / scale
-
-    def _covers_all(self, lattice: exact_points.Lattice) -> bool:
-        """Return whether the weights of the points must add up to the slave's length."""
-        rule, covers = self.traits.rules.gap, self.traits.promises.patch.overhang
-        if rule == CLOSEST:
-            return (covers is False and self.one_pass) or lies_in_shadow(lattice, self.each.interface)
-        if rule is None:
-            return False
+def _sum_error(each: Pass, reported: _Reported, length: FloatArray) -> float:
+    """Return the error of the sum of weights, a length; of cells segment by segment, where points lie on one."""
+    points, rule, interface = each.points, reported.rule, each.interface
+    lattice = exact_points.Lattice.from_state(interface, each.z)
+    excess, covered = float(points.weight.sum()) - float(length.sum()), False
+    if rule == CLOSEST:
+        # The trait speaks of the sum of all passes, so it says something here if there is one.
+        covers = reported.traits.promises.patch.overhang is False and not reported.points.on_master.any()
+        covered = covers or lies_in_shadow(lattice, interface)
+    elif rule is not None:
         coverage = Coverage.along_slave_normals(lattice)
-        return bool(coverage.clear.all() and (coverage.share.floats() == 1).all())
+        share, clear = coverage.share.floats(), coverage.clear
+        if rule not in CELLS:
+            covered = bool(clear.all() and (share == 1).all())
+        elif points.weighted.any():
+            difference = float(points.weight.sum()) - float((share * length).sum())
+            return abs(difference) if clear.all() else 0.0
+        else:
+            named = points.select(_name_places(points))
+            sums = np.bincount(named.slave_segment, named.weight, len(length))
+            return _largest(np.abs(sums - share * length)[clear])
+    elif not lies_in_shadow(lattice, interface):
+        return 0.0
+    return abs(excess) if covered else max(excess, 0.0)
 
-    def _cell_errors(self, coverage: Coverage, scale: float) -> Iterator[float]:
-        """Yield the errors of sums over the cells, segment by segment where points lie on one segment."""
-        points = self.each.points
-        expected = coverage.share.floats() * self.length
-        if points.weighted.any():
-            if coverage.clear.all():
-                yield abs(float(points.weight.sum()) - float(expected.sum())) / scale
-            return
-        named = points.select(name_places(points))
-        sums = np.bincount(named.slave_segment, named.weight, len(self.length))
-        yield largest(np.abs(sums - expected)[coverage.clear]) / scale
+
+def _find_sum_error_of_faces(each: Pass, reported: _Reported, areas: FloatArray) -> dict[Quantity, float]:
+    """Return the error of the sums of weights over the scale of areas (n_faces,), face by face where points lie on one.
+
+    An area is a product of lengths of which each is rounded at D, so its scale is L D; on needles the longest edge is
+    more than √A.
+    """
+    points, rule, whole = each.points.select(_name_places(each.points)), reported.rule, float(areas.sum())
+    faces = each.interface.slave.faces
+    length = max(sqrt(whole), float(_longest_edges(each.positions[faces]).max()))
+    scale = len(areas) * length * (length + reported.distant)
+    excess = float(points.weight.sum()) - whole
+    if rule is None:
+        return {SUM: excess / scale}
+    if rule == CLOSEST:  # Are the points the slave nodes, all of them?
+        corners = faces[points.slave_segment, points.slave_shape.argmax(axis=1)]
+        at_nodes = bool((points.slave_shape == 1).any(axis=1).all())
+        covered = at_nodes and len(np.unique(corners)) == each.interface.n_slave_nodes
+        return {SUM: (abs(excess) if covered else max(excess, 0.0)) / scale}
+    shares = np.array([float(share) for share in covered_shares(FaceLattice.from_state(each.interface, each.z))])
+    if (shares > 1).any():  # Master faces lie behind one another.
+        return {SUM: 0.0}
+    if rule not in CELLS:
+        return {SUM: (abs(excess) if (shares == 1).all() else max(excess, 0.0)) / scale}
+    errors = np.bincount(points.slave_segment, points.weight, len(areas)) - shares * areas
+    return {SUM: (abs(float(errors.sum())) if points.weighted.any() else float(np.abs(errors).max())) / scale}
 
 
 def _overlaps(points: ContactPoints) -> FloatArray:
@@ -763,43 +693,48 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never. What does not hold for a formulation by its traits is not measured.
     """
-    reported = Reported.from_case(case, subject)
-    points, state = reported.points, reported.state
-    distance = reported.distant
+    reported = _Reported.from_case(case, subject)
+    points, state, rules = reported.points, reported.state, subject.traits.rules
     reporting = (points.pressure > 0) | np.isfinite(points.normal).all(axis=1)
-    values = {UNIT: largest(np.abs(_norms(points.normal[reporting]) - 1))}
-    tolerances = {UNIT: 8 * UNIT_ROUNDOFF}
-    if (difference := _force_difference(reported)) is not None:
-        values[FORCES], tolerance = _compare_forces(reported, difference)
-        tolerances[FORCES] = tolerance + _bend(reported) + 8 * UNIT_ROUNDOFF * _thinness(reported)
-    if subject.traits.rules.gap is not None:
+    values = {UNIT: _largest(np.abs(_norms(points.normal[reporting]) - 1))}
+    tolerances = {UNIT: 8 * UNIT_ROUNDOFF, FOOT: 16 * UNIT_ROUNDOFF, LAW: 8 * UNIT_ROUNDOFF}
+    if (compared := _compare_forces(reported)) is not None:
+        values[FORCES], tolerances[FORCES] = compared
+    if rules.gap is not None:
         values[FOOT] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
-        tolerances[FOOT] = 16 * UNIT_ROUNDOFF
-    rules = subject.traits.rules
     springs = rules.enforcement == "penalty" and rules.penalty == "distributed" and rules.area is not None
     if springs and rules.gap not in (None, "cells and nodes"):
         penalty = 1.0 if state.n_multipliers else subject.penalty(state)
         active = points.select(points.active)
-        errors = np.abs(active.pressure + penalty * active.gap) / (penalty * (np.abs(active.gap) + distance))
-        values[LAW] = largest(errors)
-        tolerances[LAW] = 8 * UNIT_ROUNDOFF
-    return Measurement(
-        check_all(values, tolerances), broken=_breach(points, subject.traits), idle=not points.active.any()
-    )
+        sizes = penalty * (np.abs(active.gap) + reported.distant)
+        values[LAW] = _largest(np.abs(active.pressure + penalty * active.gap) / sizes)
+    return Measurement(check_all(values, tolerances), broken=_breach(points, subject.traits), idle=reported.idle)
 
 
-def _compare_forces(reported: Reported, difference: FloatArray) -> tuple[float, float]:
-    """Return a difference of forces over Σ|R|, and its tolerance.
+def _compare_forces(reported: _Reported) -> tuple[float, float] | None:
+    """Return Σ pressure × weight × normal + ΣR of the slave over Σ|R|, and its tolerance; None if it need not be 0.
 
-    A gap of roundoff may give a pressure in one place and none in the other. So Σ|R| counts for no less than a
-    penetration of u D gives.
+    A second pass pushes the master. What it does to the slave is the reaction, if forces balance. A gap of roundoff may
+    give a pressure in one place and none in the other. So Σ|R| counts for no less than a penetration of u D gives.
     """
-    state = reported.state
+    points, state, distant = reported.points, reported.state, reported.distant
+    size, bend = sum_slave_forces(state, reported.forces), _bend(reported)
+    balanced = np.abs(reported.forces.sum(axis=0)).max() <= UNIT_ROUNDOFF * 64 * state.n_segments * size
+    if bend > STRAIGHT or (points.on_master.any() and not balanced):  # `balance.force` asks for that.
+        return None
+    carrying = points.pressure > 0
+    pushes = (points.pressure * points.weight)[carrying, None] * points.normal[carrying]
+    slave, master = (pushes[points.on_master[carrying] == side].sum(axis=0) for side in (False, True))
+    forces = reported.forces[: state.interface.n_slave_nodes].sum(axis=0)
+    both = slave - master + forces
+    # In half passes each surface is pushed by its own points alone, and hands nothing on.
+    alone = max(slave + forces, master - forces, key=lambda difference: float(np.abs(difference).max()))
+    difference = min(float(np.abs(both).max()), float(np.abs(alone).max()))
     stiffness = state.penalty * state.slave_measure  # Force per length of penetration.
-    size = max(sum_slave_forces(state, reported.forces), UNIT_ROUNDOFF * reported.distant * stiffness)
+    size = max(size, UNIT_ROUNDOFF * distant * stiffness)
     reach = min(size / stiffness, state.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * reported.distant / reach + 4 * state.n_segments)
-    return float(np.abs(difference).max()) / size, tolerance
+    tolerance = UNIT_ROUNDOFF * (8 * distant / reach + 4 * state.n_segments)
+    return difference / size, tolerance + bend + 8 * UNIT_ROUNDOFF * _thinness(reported)
 
 
 def _breach(points: ContactPoints, traits: Traits) -> str:
@@ -819,30 +754,7 @@ def _norms(vectors: FloatArray) -> FloatArray:
     return np.hypot(vectors[:, 0], vectors[:, 1]) if vectors.shape[1] == PLANE else np.linalg.norm(vectors, axis=1)
 
 
-def _force_difference(reported: Reported) -> FloatArray | None:
-    """Return Σ pressure × weight × normal + ΣR of the slave (dim,), or None where the two need not be equal.
-
-    A second pass pushes the master. What it does to the slave is the reaction, if forces balance.
-    """
-    points = reported.points
-    size = sum_slave_forces(reported.state, reported.forces)
-    balanced = np.abs(reported.forces.sum(axis=0)).max() <= UNIT_ROUNDOFF * 64 * reported.state.n_segments * size
-    if points.on_master.any() and not balanced:  # `balance.force` asks for that.
-        return None
-    if _bend(reported) > STRAIGHT:
-        return None
-    carrying = points.pressure > 0
-    pushes = (points.pressure * points.weight)[carrying, None] * points.normal[carrying]
-    slave, master = (pushes[points.on_master[carrying] == side].sum(axis=0) for side in (False, True))
-    forces = reported.forces[: reported.state.interface.n_slave_nodes].sum(axis=0)
-    both = slave - master + forces
-    # In half passes each surface is pushed by its own points alone, and hands nothing on.
-    alone = max(slave + forces, master - forces, key=lambda difference: float(np.abs(difference).max()))
-    nearest: FloatArray = min(both, alone, key=lambda difference: float(np.abs(difference).max()))
-    return nearest
-
-
-def _bend(reported: Reported) -> float:
+def _bend(reported: _Reported) -> float:
     """Return by how much the normals of the slave differ where weighted nodes lie on it; 0 if there are none.
 
     A pressure between two nodes acts along the normal of its segment, and is reported along that of a node.
@@ -860,21 +772,21 @@ def _bend(reported: Reported) -> float:
     return bend
 
 
-def _thinness(reported: Reported) -> float:
+def _thinness(reported: _Reported) -> float:
     """Return the largest slave segment over the weight of an active weighted node on it; 0 if there are none.
 
     Dual shapes on a covered share of a segment are differences of places, which are rounded by u over that share.
     """
     thinness = 0.0
-    for each in reported.passes if reported.state.interface.dim == PLANE else ():
-        points = each.points.select(each.points.weighted & each.points.active & name_places(each.points))
+    for each in reported.passes if reported.in_plane else ():
+        points = each.points.select(each.points.weighted & each.points.active & _name_places(each.points))
         length = each.interface.slave.lengths(each.positions)[points.slave_segment]
         with np.errstate(divide="ignore"):
-            thinness = max(thinness, largest(length / points.weight))
+            thinness = max(thinness, _largest(length / points.weight))
     return thinness
 
 
-def _foot_error(each: Pass, reported: Reported) -> float:
+def _foot_error(each: Pass, reported: _Reported) -> float:
     """Return the largest |position − foot − gap × normal| over the lengths that these vectors are formed from.
 
     A foot along the slave's normal is a quotient by the cosine of the angle between the surfaces, and so is its gap. So
@@ -882,12 +794,12 @@ def _foot_error(each: Pass, reported: Reported) -> float:
     which moves the end of gap × normal by |gap| uD/ℓ, and ξ past an end by |ξ| uD/ℓ.
     """
     if each.interface.dim != PLANE:
-        places = FacePlaces.from_pass(each, reported.traits.rules.gap, reported.distant)
+        places = _FacePlaces.from_pass(each, reported)
         points, nodes = places.reported, each.positions[each.interface.master.faces]
         foot = np.einsum("qk,qki->qi", points.master_shape, nodes[points.master_segment])
         errors = points.position - foot - points.gap[:, None] * points.normal
-        return largest(_norms(errors) / (np.abs(each.positions).max() + places.scale))
-    named = name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
+        return _largest(_norms(errors) / (np.abs(each.positions).max() + places.scale))
+    named = _name_places(each.points) & (each.points.master_segment >= 0) & ~each.points.weighted
     points = each.points.select(named & np.isfinite(each.points.gap))
     first, second = np.swapaxes(each.positions[each.interface.master.segments[points.master_segment]], 0, 1)
     arm, along = points.position - first, second - first
@@ -895,9 +807,9 @@ def _foot_error(each: Pass, reported: Reported) -> float:
     far = np.abs(each.positions).max()
     length = np.hypot(along[:, 0], along[:, 1])
     carrier = each.interface.slave.lengths(each.positions)[points.slave_segment]
-    if reported.traits.rules.gap == CLOSEST:
+    if reported.rule == CLOSEST:
         carrier = length
     size = far + np.hypot(arm[:, 0], arm[:, 1]) + (1 + np.abs(points.xi)) * length
     size += reported.distant * (np.abs(points.gap) / carrier + np.abs(points.xi))
     cosine = np.abs(along[:, 0] * points.normal[:, 1] - along[:, 1] * points.normal[:, 0]) / length
-    return largest(np.hypot(errors[:, 0], errors[:, 1]) * cosine / size)
+    return _largest(np.hypot(errors[:, 0], errors[:, 1]) * cosine / size)

@@ -38,7 +38,7 @@ def worst_force(
     numbers, counted along the exact force, with their ratio; else the components of both.
     """
     node = int(np.linalg.norm(forces - exact, axis=1).argmax())
-    return _beside(describe_node(interface, node), forces[node], exact[node], names)
+    return _beside(_describe_node(interface, node), forces[node], exact[node], names)
 
 
 def total_force(total: FloatArray, exact: FloatArray) -> Finding:
@@ -47,22 +47,18 @@ def total_force(total: FloatArray, exact: FloatArray) -> Finding:
 
 
 def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, str]) -> Finding:
-    """Return a force beside the one that is right: one number of each if they lie on one line."""
+    """Return a force beside the one that is right: one number of each, and their ratio, if they lie on one line."""
     line = right if right.any() else force
     direction = line / np.linalg.norm(line)
     aside = distance_from_line(force, direction)
     if not aside <= _ASIDE * float(np.abs(np.stack([force, right])).max()):
         return Finding(f"{place}, {COMPONENTS[len(force)]}", tuple(force), tuple(right), "N", *names)
     along, size = float(force @ direction), float(right @ direction)
-    return Finding(place, (along,), (size,), "N", *names, _tell_ratio(along, size) if size else "")
-
-
-def _tell_ratio(force: float, right: float) -> str:
-    """Return a force over the right one in words, and by how much it differs from 1 if four digits do not say that."""
-    ratio, difference = f"ratio {force / right:.4g}", (force - right) / right
-    if ratio != "ratio 1" or difference == 0:
-        return ratio
-    return f"{ratio} {'+' if difference > 0 else '−'} {abs(difference):.2g}"
+    remark = f"ratio {along / size:.4g}" if size else ""
+    if remark == "ratio 1" and along != size:  # Four digits do not say by how much they differ.
+        difference = (along - size) / size
+        remark = f"{remark} {'+' if difference > 0 else '−'} {abs(difference):.2g}"
+    return Finding(place, (along,), (size,), "N", *names, remark)
 
 
 def distance_from_line(force: FloatArray, direction: FloatArray) -> float:
@@ -72,8 +68,7 @@ def distance_from_line(force: FloatArray, direction: FloatArray) -> float:
     return float(np.linalg.norm(np.cross(force, direction)))
 
 
-def describe_node(interface: Interface, node: int) -> str:
-    """Return a node in words: its side, its number, and whether the side ends there."""
+def _describe_node(interface: Interface, node: int) -> str:
     on_slave = node < interface.n_slave_nodes
     surface = interface.slave if on_slave else interface.master
     at_border = surface.neighbours < 0
@@ -240,8 +235,7 @@ def knows_linear_total(traits: Traits) -> bool:
 
 def slave_forces(case: Case, subject: Subject) -> FloatArray:
     """Return the forces (n_slave_nodes, dim) that push the slave; multipliers are all `uniform_multiplier`."""
-    forces = pushing_forces(uniform_state(case, subject, uniform_multiplier(case)))
-    return forces[: case.interface.n_slave_nodes]
+    return pushing_forces(uniform_state(case, subject, uniform_multiplier(case)))[: case.interface.n_slave_nodes]
 
 
 def uniform_multiplier(case: Case) -> float:
@@ -252,11 +246,11 @@ def uniform_multiplier(case: Case) -> float:
 def node_gaps(case: Case) -> FloatArray:
     """Return the gaps (n_slave_nodes,) of the slave's nodes along the master's normal, each rounded once."""
     if case.interface.dim != PLANE:
-        corners = _largest_face(case, case.interface.master)
+        corners = _largest_part(case, case.interface.master)
         normal = _normal_of_face(corners)
         heights = (_exact(case.positions[: case.interface.n_slave_nodes]) - corners[0]) @ normal
         return np.array([float(height) for height in heights]) / sqrt(normal @ normal)
-    first, second = _longest_segment(case)
+    first, second = _largest_part(case, case.interface.master)  # All master segments lie on its line.
     along, arms = second - first, _exact(case.positions[: case.interface.n_slave_nodes]) - first
     areas = arms[:, 0] * along[1] - arms[:, 1] * along[0]
     return np.array([float(area) for area in areas]) / sqrt(along @ along)
@@ -265,10 +259,10 @@ def node_gaps(case: Case) -> FloatArray:
 def directions(case: Case) -> tuple[FloatArray, FloatArray]:
     """Return the unit normals (dim,) along the master's and along the slave's, both out of the master."""
     if case.interface.dim != PLANE:
-        faces = [_largest_face(case, side) for side in (case.interface.master, case.interface.slave)]
+        faces = [_largest_part(case, side) for side in (case.interface.master, case.interface.slave)]
         of_master, of_slave = (_unit(_normal_of_face(corners)) for corners in faces)
         return of_master, -of_slave
-    ends = _longest_segment(case), _exact(case.positions[case.interface.slave.segments[0]])
+    ends = _largest_part(case, case.interface.master), _exact(case.positions[case.interface.slave.segments[0]])
     (x, y), (x_slave, y_slave) = (second - first for first, second in ends)
     return (
         np.array([float(y), -float(x)]) / sqrt(x * x + y * y),
@@ -299,14 +293,8 @@ def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
     return np.outer(nodal, of_master if traits.rules.force_along == "master normal" else of_slave)
 
 
-def _longest_segment(case: Case) -> NDArray[Any]:
-    """Return the exact ends (2, 2) of the longest master segment, on whose line all others lie."""
-    master = case.interface.master
-    return _exact(case.positions[master.segments[int(np.argmax(master.lengths(case.positions)))]])
-
-
-def _largest_face(case: Case, surface: Surface) -> NDArray[Any]:
-    """Return the exact corners (3, 3) of the largest triangle of a plane surface."""
+def _largest_part(case: Case, surface: Surface) -> NDArray[Any]:
+    """Return the exact ends or corners (dim, dim) of the longest segment, or the largest triangle, of a surface."""
     return _exact(case.positions[surface.faces[int(np.argmax(surface.measures(case.positions)))]])
 
 
@@ -331,17 +319,15 @@ def point_errors(state: FrozenState, penalty: float, pressure: float) -> tuple[f
     pressure is infinite if no point counts.
     """
     points = state.points
-    in_contact = points.active | (points.master_segment >= 0) & ~beside_master(state.case, points)
+    in_contact = points.active | (points.master_segment >= 0) & ~_beside_master(state.case, points)
     counted = (points.weight != 0) & in_contact
     gaps = np.where(counted, points.gap, -pressure / penalty)  # A gap is NaN where it is meaningless.
     gap = float(np.nanmax(np.abs(gaps * penalty / pressure + 1), initial=0.0))
     pressures = np.where(points.active, points.pressure, 0.0)[counted]
-    if not len(pressures):
-        return gap, np.inf
-    return gap, float(np.abs(pressures - pressure).max(initial=0.0) / pressure)
+    return gap, float(np.abs(pressures - pressure).max(initial=0.0) / pressure) if len(pressures) else np.inf
 
 
-def beside_master(case: Case, points: ContactPoints) -> BoolArray:
+def _beside_master(case: Case, points: ContactPoints) -> BoolArray:
     """Return which points (n_points,) lie beside the other surface, or within roundoff of its end; in space none does.
 
     A point that names no place on its surface does not lie beside the other. Where the master covers the slave, no

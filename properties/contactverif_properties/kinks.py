@@ -44,19 +44,13 @@ def explain_by_kink(state: FrozenState, reach: float, errors: dict[str, float], 
     if not reason:
         directions = random_directions(state.case.seed, N_DIRECTIONS, state.case.z.size)
         # Differences of all columns are many calls, which a failure of the forces alone does not need.
-        if ("forces" not in errors or 4 * measure_jump(state, reach, directions) >= errors["forces"]) and (
-            "tangent" not in errors or _slope_jumps(state, reach, errors["tangent"] / 4, columns)
-        ):
-            reason = "a kink: moving the nodes by roundoff changes the answer as much"
+        jumps = "forces" not in errors or 4 * measure_jump(state, reach, directions) >= errors["forces"]
+        if jumps and "tangent" in errors:
+            size = errors["tangent"] / 4
+            in_columns = columns is None or FAR * measure_jump_of_slope(state, reach, directions, columns) >= size
+            jumps = in_columns and measure_jump_of_slope(state, reach, directions) >= size
+        reason = "a kink: moving the nodes by roundoff changes the answer as much" if jumps else ""
     return reason if reason and is_like_its_surroundings(state, reach) else ""
-
-
-def _slope_jumps(state: FrozenState, reach: float, size: float, columns: IntArray | None) -> bool:
-    """Return whether an entry of the derivative changes by a size when the nodes move by `reach`."""
-    directions = random_directions(state.case.seed, N_DIRECTIONS, state.case.z.size)
-    if columns is not None and FAR * measure_jump_of_slope(state, reach, directions, columns) < size:
-        return False
-    return measure_jump_of_slope(state, reach, directions) >= size
 
 
 def is_like_its_surroundings(state: FrozenState, reach: float) -> bool:

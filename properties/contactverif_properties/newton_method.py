@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import ceil, frexp, inf, ldexp, log, log2
+from operator import itemgetter
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -24,7 +25,7 @@ from contactverif.contract.measurement import Measurement, Quantity, check_all
 from contactverif.contract.property import Property
 from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import change_units, move, snap
-from contactverif.mechanics.linear import Step, scale_factors
+from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import MAX_ITERATIONS, End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
@@ -158,28 +159,26 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     pairing to tell whether a kink is in the way, and where the residual has a noise that roundoff does not explain.
     """
     system = System(scene_of(case), subject.for_case(case))
-    trace = solve(system.scene, system.formulation)
-    undecided = _find_excuse(system, trace)
-    for load_steps in LOAD_STEPS:  # Smaller load steps overshoot less, so that the pairing may settle.
-        if not undecided:
-            break
+    for load_steps in (1, *LOAD_STEPS):  # Smaller load steps overshoot less, so that the pairing may settle.
         trace = solve(system.scene, system.formulation, load_steps=load_steps)
-        undecided = _find_excuse(system, trace)
+        if not (undecided := _find_excuse(system, trace)):
+            break
     details = solution_details(trace)
     columns = (trace.residuals, trace.energies, trace.changes.astype(np.float64), trace.conditions)
     series = dict(zip(SERIES, columns, strict=True))
     if undecided:
         return Measurement(details=details, series=series, undecided=undecided)
-    begin = _first_final_iterate(system, trace)
+    settled = _settling_iterate(system, trace)
+    near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
+    begin = int(next(iter(near[near >= settled]), settled))  # The pairing is the final one, and the residual is near.
     arrived = np.flatnonzero(trace.roundings <= (1.0 if trace.converged else NOISE))
     iterations = float(max(arrived[0] - begin, 0)) if _is_solved(trace) else inf
     details["finite"] = float(iterations <= 1)
-    return Measurement(
-        [FINAL_ITERATIONS.check(iterations, float(_allowed_iterations(trace, begin)))],
-        details=details,
-        series=series,
-        idle=is_untouched(trace),
-    )
+    ends = trace.residuals[begin], trace.floors[-1]
+    rho, rho_end = (max(residual / trace.residuals[0], np.finfo(float).tiny) for residual in ends)
+    allowed = ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
+    number = FINAL_ITERATIONS.check(iterations, float(allowed))
+    return Measurement([number], details=details, series=series, idle=is_untouched(trace))
 
 
 def _settling_iterate(system: System, trace: Trace) -> int:
@@ -219,23 +218,6 @@ def _find_excuse(system: System, trace: Trace) -> str:
     return ""
 
 
-def _first_final_iterate(system: System, trace: Trace) -> int:
-    """Return the first iterate with the final pairing and a residual of at most NEAR of the first one."""
-    settled = _settling_iterate(system, trace)
-    near = np.flatnonzero(trace.residuals <= NEAR * trace.residuals[0])
-    near = near[near >= settled]
-    return int(near[0]) if len(near) else settled
-
-
-def _allowed_iterations(trace: Trace, begin: int) -> int:
-    """Return ⌈log2(log ρ_end / log ρ)⌉ + 3, with residuals over the first one."""
-    rho, rho_end = (
-        max(residual / trace.residuals[0], np.finfo(float).tiny)
-        for residual in (trace.residuals[begin], trace.floors[-1])
-    )
-    return ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
-
-
 @_define(id="newton.order", rank=460, quantities=(ORDER,))
 def newton_order(case: Case, subject: Subject) -> Measurement:
     """One Newton step from near a solution ends at a distance of second order.
@@ -269,8 +251,8 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
     condition = system.step(matrix, np.zeros(system.size)).condition
     if condition <= system.size * UNIT_ROUNDOFF:
         return Measurement(details=details, undecided="the matrix has no inverse at the solution")
-    steps = fit_steps(system, case, trace, matrix, condition)
-    details["rate"], details["steps"] = steps.rate, float(steps.count)
+    steps = _fit_steps(system, case, trace, matrix, condition)
+    details["rate"], details["steps"] = steps.rate, float(steps.n_steps)
     if np.isnan(steps.order):
         return Measurement(details=details, undecided="a kink: too few states near the solution pair like it")
     undecided = ""
@@ -278,61 +260,55 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
         by_differences = replace(system, use_tangent=False)
         exact, _ = by_differences.matrix(solution, trace.pairing)
         details["spectral radius"] = spectral_radius(matrix, exact)
-        if not fit_steps(by_differences, case, trace, exact, condition, [steps.worst]).order >= QUADRATIC:
+        if not _fit_steps(by_differences, case, trace, exact, condition, [steps.worst]).order >= QUADRATIC:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
-    linear = steps.order == inf  # One step solves a linear problem, which has no order.
-    return Measurement(
-        [] if linear else [ORDER.check(steps.order, QUADRATIC)],
-        details=details,
-        undecided=undecided,
-        idle=is_untouched(trace),
-    )
+    # One step solves a linear problem, which has no order.
+    numbers = [] if steps.order == inf else [ORDER.check(steps.order, QUADRATIC)]
+    return Measurement(numbers, undecided, details=details, idle=is_untouched(trace))
 
 
-@dataclass(frozen=True, slots=True)
-class Steps:
+class _Steps(NamedTuple):
     """The order and rate of single Newton steps from around a solution."""
 
     order: float  # The lower order of the directions; NaN if none decides.
     rate: float  # The higher rate of the directions.
-    count: int  # The number of steps that started with the pairing of the solution.
+    n_steps: int  # The number of steps that started with the pairing of the solution.
     worst: int  # The direction with the lowest order.
 
 
-def fit_steps(
+def _fit_steps(
     system: System,
     case: Case,
     trace: Trace,
     matrix: Any,
     condition: float,
     directions: Sequence[int] = range(N_DIRECTIONS),
-) -> Steps:
+) -> _Steps:
     """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
 
     The matrix is the one at the solution, and the condition its reciprocal condition. Directions have numbers.
     """
-    solution, pairing, length = trace.u[-1], trace.pairing, case.shortest_segment
+    solution, pairing = trace.u[-1], trace.pairing
     units = scale_factors(matrix, system.scene.n_free)[1]
     floor = solution_floor(system.scene, solution, units, condition)
+    distances = [distance * case.shortest_segment for distance in DISTANCES]
     fits, count = [], 0
-    for direction in random_directions(case.seed, N_DIRECTIONS, system.size)[list(directions)]:
-        before, after = [], []
-        distances = [distance * length for distance in DISTANCES]
+    for number in directions:
+        direction = random_directions(case.seed, N_DIRECTIONS, system.size)[number]
         states = [solution + distance * direction * units for distance in distances]
         alike = _pair_alike(system, case, pairing, states, distances)
         near = [place for place, is_alike in zip(zip(distances, states, strict=True), alike, strict=True) if is_alike]
         both = system.forces_and_tangents([u for _, u in near], pairing)
-        for (distance, u), (forces, tangent) in zip(near, both, strict=True):
-            matrix = system.stiffness + system.contact_stiffness(u, pairing, tangent)
-            step = system.step(matrix, -system.balance(u, forces)).change
-            count += 1
-            before.append(distance)
+        before, after = np.array([distance for distance, _ in near]), []
+        for (_, u), (forces, tangent) in zip(near, both, strict=True):
+            stiffness = system.stiffness + system.contact_stiffness(u, pairing, tangent)
+            step = system.step(stiffness, -system.balance(u, forces)).change
             after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
-        fits.append(fit_order(np.array(before), np.array(after), floor))
-    numbered = [(*fit, number) for number, fit in zip(directions, fits, strict=True)]
-    decisive = [fit for fit in numbered if not np.isnan(fit[0])] or [(np.nan, np.nan, 0)]
+        count += len(near)
+        fits.append((*fit_order(before, np.array(after), floor), number))
+    decisive = [fit for fit in fits if not np.isnan(fit[0])] or [(np.nan, np.nan, 0)]
     order, _, worst = min(decisive)
-    return Steps(order, max(rate for _, rate, _ in decisive), count, worst)
+    return _Steps(order, max(rate for _, rate, _ in decisive), count, worst)
 
 
 def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
@@ -434,15 +410,26 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
     factors[scene.n_free :] = modulus * (1.0 if distributed else length)
 
     trace = solve(scene, system.formulation, iterations=ITERATIONS)
-    units = Units(system, other, factors)
     differences, broken, undecided = [], "", ""
-    for number in range(len(trace.u)):
-        broken = units.compare_decisions(trace, number)
+    inverted = STEP_ROUNDINGS * UNIT_ROUNDOFF * system.size  # A matrix with a larger condition has an inverse.
+    for number, u in enumerate(trace.u):
+        there, pairing, is_last = u * factors, trace.pairings[number], number + 1 == len(trace.u)
+        if pairing != other.pair(there):
+            broken = f"at iterate {number} the pairing is another one in other units"
+        elif not is_last or trace.end is End.SINGULAR:
+            # Asked as `solve` asks: forces of one call with the tangent may be rounded otherwise than forces alone.
+            forces, tangent = other.forces_and_tangent(there, pairing)
+            matrix, floor = other.assemble(there, pairing, forces, tangent)
+            step = other.step(matrix, -other.balance(there, forces), floor)
+            if not is_last:
+                differences.append(_compare_step(system, case, trace, number, step.change, factors))
+            elif step.change is not None and step.condition > inverted:
+                broken = f"at iterate {number} the matrix has an inverse in other units alone"
         if broken:
-            undecided = explain_pairing(system, case, trace.u[number])
+            state = replace(case, z=system.state(u), n_multipliers=system.n_multipliers)
+            reach = COORDINATE_ROUNDING * state.largest_coordinate
+            undecided = find_kink(FrozenState(system.formulation, state, system.pair(u)), reach)
             break
-        if number + 1 < len(trace.u):
-            differences.append(units.compare_step(case, trace, number))
     details = solution_details(trace) | {"exponent of lengths": float(k), "exponent of moduli": 2.0 * j}
     return Measurement(
         [STEPS.check(max(differences, default=0.0), 1.0)],
@@ -453,64 +440,31 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Units:
-    """A scene in two systems of units."""
+def _compare_step(
+    system: System, case: Case, trace: Trace, number: int, change: FloatArray | None, factors: FloatArray
+) -> float:
+    """Return the difference of the steps from an iterate in both systems of units over what roundoff does to it.
 
-    system: System  # The scene in its own units and in others, with the formulation.
-    other: System
-    factors: FloatArray  # (n_free + n_multipliers,) The unit of each unknown in the other units.
-
-    def step(self, trace: Trace, number: int) -> Step:
-        """Return the Newton step in the other units from the iterate `number`, on the pairing of both."""
-        u, pairing = trace.u[number] * self.factors, trace.pairings[number]
-        # Asked as `solve` asks: forces of one call with the tangent may be rounded otherwise than forces alone.
-        forces, tangent = self.other.forces_and_tangent(u, pairing)
-        matrix, floor = self.other.assemble(u, pairing, forces, tangent)
-        return self.other.step(matrix, -self.other.balance(u, forces), floor)
-
-    def compare_decisions(self, trace: Trace, number: int) -> str:
-        """Return in words what differs in the other units at the iterate `number`, or an empty string."""
-        if trace.pairings[number] != self.other.pair(trace.u[number] * self.factors):
-            return f"at iterate {number} the pairing is another one in other units"
-        if number + 1 == len(trace.u) and trace.end is End.SINGULAR:
-            step = self.step(trace, number)
-            if step.change is not None and step.condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size:
-                return f"at iterate {number} the matrix has an inverse in other units alone"
-        return ""
-
-    def compare_step(self, case: Case, trace: Trace, number: int) -> float:
-        """Return the difference of the step from the iterate `number` over what roundoff does to it."""
-        u, after, condition = trace.u[number], trace.u[number + 1], float(trace.conditions[number])
-        change = self.step(trace, number).change
-        if change is None:
-            return np.inf if condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * self.system.size else 0.0
-        difference = (u * self.factors + change) / self.factors - after
-        return measure_step(self.system, case, trace, number, difference) if difference.any() else 0.0
-
-
-def measure_step(system: System, case: Case, trace: Trace, number: int, difference: FloatArray) -> float:
-    """Return the difference (n_unknowns,) of the iterates after iterate `number` over what roundoff does to a step."""
-    u, units = trace.u[number], np.ones(system.size)
+    The step in other units is a change (n,), or None without an inverse; the factors (n,) are those of the unknowns.
+    """
+    u, after, condition = trace.u[number], trace.u[number + 1], float(trace.conditions[number])
+    if change is None:
+        return np.inf if condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * system.size else 0.0
+    difference = (u * factors + change) / factors - after
+    if not difference.any():
+        return 0.0
+    units = np.ones(system.size)
     if system.n_multipliers:
         units = scale_factors(system.matrix(u, trace.pairings[number])[0], system.scene.n_free)[1]
-    step = float(np.abs((trace.u[number + 1] - u) / units).max())
+    step = float(np.abs((after - u) / units).max())
     size = float(np.abs(u / units).max() + np.abs(system.scene.imposed_displacements).max()) + step
     largest = float(np.abs(system.state(u)[: system.scene.interface.n_unknowns]).max())
-    solved_to = STEP_ROUNDINGS * UNIT_ROUNDOFF * size
     quotient = 0.0
     if "tangent" not in system.formulation.provides:
         quotient = POSITION_ROUNDINGS * (UNIT_ROUNDOFF * largest / case.shortest_segment) ** (2 / 3) * step
-    condition = float(trace.conditions[number])
+    solved_to = STEP_ROUNDINGS * UNIT_ROUNDOFF * size
     roundoff = max(ratio(solved_to, condition), POSITION_ROUNDINGS * UNIT_ROUNDOFF * largest)
     return ratio(float(np.abs(difference / units).max()), roundoff + ratio(quotient, condition))
-
-
-def explain_pairing(system: System, case: Case, u: FloatArray) -> str:
-    """Return why another pairing at the unknowns u (n,) may be the fault of a kink, or an empty string."""
-    state = replace(case, z=system.state(u), n_multipliers=system.n_multipliers)
-    reach = COORDINATE_ROUNDING * state.largest_coordinate
-    return find_kink(FrozenState(system.formulation, state, system.pair(u)), reach)
 
 
 DIGITS = 32  # Coordinates are multiples of 2^-32 segments, so that the longest way rounds none.
@@ -554,8 +508,7 @@ class Solution:
         return ROUNDOFF_FACTOR * UNIT_ROUNDOFF * (self.contact * largest + self.terms)
 
 
-@dataclass(frozen=True, slots=True)
-class Attained:
+class _Attained(NamedTuple):
     """The residual and the accuracy that Newton's method attains in one place."""
 
     added: float  # ω, the roundings that the formulation adds.
@@ -603,7 +556,9 @@ def newton_attainable(case: Case, subject: Subject) -> Measurement:
     segment = ldexp(0.5, frexp(case.shortest_segment)[1])  # The power of two below the shortest segment.
     scene = snap(scene_of(case), segment * 2.0**-DIGITS)
     for share in LOAD_SHARES:
-        system = System(_load_less(scene, share), subject.for_case(case))
+        less = (replace(body, imposed=share * body.imposed, load=share * body.load) for body in scene.bodies)
+        loaded = scene if share == 1 else replace(scene, bodies=tuple(less))
+        system = System(loaded, subject.for_case(case))
         trace = find_solution(system)
         if trace.converged:
             break
@@ -613,29 +568,16 @@ def newton_attainable(case: Case, subject: Subject) -> Measurement:
     solution = examine(system, case, trace.u[-1])
     if solution is None:
         return Measurement(details=details, undecided="the matrix has no inverse at the solution")
-    places = dict(zip(OFFSETS, settle(solution, case, [segment * 2.0**power for power in OFFSETS]), strict=True))
-    for power, attained in places.items():
-        details |= {
-            f"{ADDED.name} at 2^{power}": attained.added,
-            f"{RESIDUAL.name} at 2^{power}": attained.residual,
-            f"{ERROR.name} at 2^{power}": attained.error,
-            f"error over the shortest segment at 2^{power}": attained.length / case.shortest_segment,
-        }
-    decided = [attained for attained in places.values() if not attained.undecided]
-    values = {ADDED: max(attained.added for attained in places.values())}
-    tolerances = {ADDED: MOST_ROUNDINGS}
-    if decided:
-        values[RESIDUAL] = max(attained.residual for attained in decided)
-        values[ERROR] = max(attained.error for attained in decided)
-        tolerances |= {RESIDUAL: 1.0, ERROR: 1.0}
+    places = settle(solution, case, [segment * 2.0**power for power in OFFSETS])
+    for power, place in zip(OFFSETS, places, strict=True):
+        for quantity, value in zip((ADDED, RESIDUAL, ERROR), place[:3], strict=True):
+            details[f"{quantity.name} at 2^{power}"] = value
+        details[f"error over the shortest segment at 2^{power}"] = place.length / case.shortest_segment
+    values = {ADDED: max(place.added for place in places)}
+    if decided := [place for place in places if not place.undecided]:
+        values |= {RESIDUAL: max(place.residual for place in decided), ERROR: max(place.error for place in decided)}
+    tolerances = {ADDED: MOST_ROUNDINGS, RESIDUAL: 1.0, ERROR: 1.0}
     return Measurement(check_all(values, tolerances), details=details, idle=is_untouched(trace))
-
-
-def _load_less(scene: Scene, share: float) -> Scene:
-    if share == 1:
-        return scene
-    bodies = tuple(replace(body, imposed=share * body.imposed, load=share * body.load) for body in scene.bodies)
-    return replace(scene, bodies=bodies)
 
 
 def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
@@ -672,7 +614,7 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
 
 
 @dataclass(slots=True, eq=False)
-class Place:
+class _Place:
     """The scene in another place, and how far Newton's method has come there."""
 
     interface: Interface  # The moved interface.
@@ -683,51 +625,39 @@ class Place:
     forces: FloatArray = field(init=False)
     residual: FloatArray = field(init=False)  # (n_free + n_multipliers,) The residual there.
     added: float = 0.0  # The largest ω of all steps.
-    rests: list[Rest] = field(default_factory=list)  # The state after each step.
-
-    def moves(self, scene: Scene) -> bool:
-        """Store the positions at the unknowns, in the place of the scene's own; return whether one has changed."""
-        q, multipliers = np.split(self.u, [scene.n_free])
-        positions = self.interface.nodes.reshape(-1) + scene.imposed_displacements + scene.transformation @ q
-        before, self.z = self.z, np.concatenate([positions, multipliers])
-        return not np.array_equal(self.z, before)
+    # After each step: the residual over its roundoff, the unknowns, the largest coordinate, the pairing.
+    rests: list[tuple[float, FloatArray, float, Pairing | None]] = field(default_factory=list)
 
 
-class Rest(NamedTuple):
-    """A state: its residual over its roundoff, its unknowns, its largest coordinate, its pairing."""
-
-    residual: float
-    u: FloatArray
-    largest: float
-    pairing: Pairing | None
-
-
-def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[Attained]:
+def settle(solution: Solution, case: Case, ways: Sequence[float]) -> list[_Attained]:
     """Let Newton's method come to rest in other places, from the solution near the origin."""
     near = solution.system
-    places = [Place(move(near.scene.interface, way), way, solution.u) for way in ways]
-    take_forces(solution, places)
+    places = [_Place(move(near.scene.interface, way), way, solution.u) for way in ways]
+    _take_forces(solution, places)
     for _ in range(N_STEPS):
         for place in places:
             change = near.step(solution.matrix, -place.residual).change
             assert change is not None  # The matrix has an inverse.
             place.u = place.u + change
-        take_forces(solution, places)
+        _take_forces(solution, places)
     return [_attain(solution, case, place) for place in places]
 
 
-def take_forces(solution: Solution, places: Sequence[Place]) -> None:
+def _take_forces(solution: Solution, places: Sequence[_Place]) -> None:
     """Ask for the forces where stored positions have changed, and for those of the same positions moved back."""
-    near, n = solution.system, solution.system.scene.interface.n_unknowns
-    changed = [place for place in places if place.moves(near.scene)]
-    calls: list[Call] = []
+    near, scene, n = solution.system, solution.system.scene, solution.system.scene.interface.n_unknowns
+    changed, calls = [], list[Call]()
+    for place in places:
+        q, multipliers = np.split(place.u, [scene.n_free])
+        positions = place.interface.nodes.reshape(-1) + scene.imposed_displacements + scene.transformation @ q
+        before, place.z = place.z, np.concatenate([positions, multipliers])
+        if not np.array_equal(place.z, before):
+            changed.append(place)
     for place in changed:
         place.pairing = near.formulation.pair(place.interface, place.z)
         back = np.concatenate([place.z[:n] - place.way, place.z[n:]])
-        calls += [
-            ("residual", place.interface, place.pairing, place.z),
-            ("residual", near.scene.interface, place.pairing, back),
-        ]
+        calls.append(("residual", place.interface, place.pairing, place.z))
+        calls.append(("residual", scene.interface, place.pairing, back))
     answers = near.formulation.answers(calls)
     for place, forces, same in zip(changed, answers[::2], answers[1::2], strict=True):
         place.added = max(place.added, solution.conditioning.count_roundings(forces - same))
@@ -735,24 +665,17 @@ def take_forces(solution: Solution, places: Sequence[Place]) -> None:
     for place in places:
         place.residual = near.balance(place.u, place.forces)
         largest = float(np.abs(place.z[:n]).max())
-        attained = over(np.abs(place.residual), solution.roundoff(largest))
-        place.rests.append(Rest(attained, place.u, largest, place.pairing))
+        sizes, floors = np.abs(place.residual).tolist(), solution.roundoff(largest).tolist()
+        place.rests.append((max(map(ratio, sizes, floors), default=0.0), place.u, largest, place.pairing))
 
 
-def _attain(solution: Solution, case: Case, place: Place) -> Attained:
+def _attain(solution: Solution, case: Case, place: _Place) -> _Attained:
     """Return what the best of the states after the first step has attained."""
-    near = solution.system
-    rest = min(place.rests[1:], key=lambda rest: rest.residual)
-    allowed = float((solution.inverse @ solution.roundoff(rest.largest) / solution.units).max())
-    length = float(np.abs((rest.u - solution.u) / solution.units).max())
-    undecided = ""
-    if rest.pairing != solution.pairing or rest.pairing is None:
-        state = replace(case, interface=near.scene.interface, z=near.state(rest.u), n_multipliers=near.n_multipliers)
-        frozen = FrozenState(near.formulation, state, near.pair(rest.u))
-        undecided = find_kink(frozen, COORDINATE_ROUNDING * rest.largest)
-    return Attained(place.added, rest.residual, ratio(length, allowed), length, undecided)
-
-
-def over(sizes: FloatArray, floor: FloatArray) -> float:
-    """Return the largest ratio of two arrays (n,), entry by entry; 0/0 counts as 0."""
-    return max((ratio(float(size), float(least)) for size, least in zip(sizes, floor, strict=True)), default=0.0)
+    near, undecided = solution.system, ""
+    residual, u, largest, pairing = min(place.rests[1:], key=itemgetter(0))
+    allowed = float((solution.inverse @ solution.roundoff(largest) / solution.units).max())
+    length = float(np.abs((u - solution.u) / solution.units).max())
+    if pairing != solution.pairing or pairing is None:
+        state = replace(case, interface=near.scene.interface, z=near.state(u), n_multipliers=near.n_multipliers)
+        undecided = find_kink(FrozenState(near.formulation, state, near.pair(u)), COORDINATE_ROUNDING * largest)
+    return _Attained(place.added, residual, ratio(length, allowed), length, undecided)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,17 +43,16 @@ _ORDERS_OF_PAIRINGS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Question:
+class _Question(NamedTuple):
     """The arguments of a residual, a tangent or contact points."""
 
-    interface: Interface  # The meshes.
-    pairing: Pairing | None  # The frozen pairing.
-    z: FloatArray  # (n_unknowns + n_multipliers,) The state.
+    interface: Interface
+    pairing: Pairing | None
+    z: FloatArray
 
 
-def count_changes(
-    first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[Question]
+def _count_changes(
+    first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[_Question]
 ) -> tuple[float, dict[str, float]]:
     """Ask two instances the same questions in different orders, and count the entries of the answers that differ.
 
@@ -75,8 +74,8 @@ def count_changes(
     return repeated, changed
 
 
-def count_changes_in_life(
-    formulation: CheckedFormulation, question: Question, states: FloatArray
+def _count_changes_in_life(
+    formulation: CheckedFormulation, question: _Question, states: FloatArray
 ) -> tuple[float, bool]:
     """Ask one instance a question with all methods, then in rounds of four calls, and all methods once more.
 
@@ -94,7 +93,7 @@ def count_changes_in_life(
         repeats = number % 2 == 1
         pairing = formulation.pair(interface, z if repeats else state)
         pairs_otherwise |= repeats and pairing != question.pairing
-        near = Question(interface, question.pairing if repeats else pairing, state)
+        near = _Question(interface, question.pairing if repeats else pairing, state)
         answers = _ask(
             formulation, [("residual", 0), (slow, 1), ("residual", 2)], [question, question if repeats else near, near]
         )
@@ -107,24 +106,18 @@ def count_changes_in_life(
 
 
 def _ask(
-    formulation: CheckedFormulation, calls: Sequence[tuple[str, int]], questions: Sequence[Question]
+    formulation: CheckedFormulation, calls: Sequence[tuple[str, int]], questions: Sequence[_Question]
 ) -> list[tuple[tuple[str, int], Array]]:
-    """Return some calls, each with its answer in one array."""
-    states = [questions[number] for _, number in calls]
-    answers = formulation.answers(
-        [(method, each.interface, each.pairing, each.z) for (method, _), each in zip(calls, states, strict=True)]
-    )
-    return [(call, _in_one_array(call[0], answer)) for call, answer in zip(calls, answers, strict=True)]
-
-
-def _in_one_array(method: str, answer: Any) -> Array:
-    """Return the residual (n,), the tangent (n, n), both (1 + n, n), or all arrays of the contact points in one."""
-    if method == "contact_points":
-        return np.concatenate([np.ravel(getattr(answer, entry.name)).astype(np.float64) for entry in fields(answer)])
-    if method == BOTH:
-        residual, tangent = answer
-        return np.vstack([residual, dense(tangent)])
-    return dense(answer)
+    """Return some calls, each with its answer in one array: all arrays of contact points, residual over tangent."""
+    arrays = []
+    answers = formulation.answers([(method, *questions[number]) for method, number in calls])
+    for (method, _), answer in zip(calls, answers, strict=True):
+        if method == "contact_points":
+            parts = [np.ravel(getattr(answer, entry.name)).astype(np.float64) for entry in fields(answer)]
+            arrays.append(np.concatenate(parts))
+        else:
+            arrays.append(np.vstack([answer[0], dense(answer[1])]) if method == BOTH else dense(answer))
+    return list(zip(calls, arrays, strict=True))
 
 
 def _count_different(answer: Array, other: Array) -> float:
@@ -147,7 +140,7 @@ def renumber(case: Case, formulation: CheckedFormulation) -> tuple[Interface, Fl
     return other, np.concatenate([case.positions[number].reshape(-1), multipliers])
 
 
-def compare_two_pairings(
+def _compare_two_pairings(
     formulation: CheckedFormulation, interface: Interface, z: FloatArray, distant: FloatArray
 ) -> list[str]:
     """Pair twice at a state, with a distant one in between, and return in words what differs."""
@@ -272,56 +265,48 @@ def purity(case: Case, subject: Subject) -> Measurement:
     # Each state is asked with its own pairing, or with that of a state nearby: far from the state of a pairing, a right
     # formulation may have no answer (a quadratic without a root).
     places = ((interface, z), (interface, distant), (other, z_other), (interface, near))
-    questions = [Question(mesh, formulation.pair(mesh, u), u) for mesh, u in places]
+    questions = [_Question(mesh, formulation.pair(mesh, u), u) for mesh, u in places]
     pairing, second = questions[0].pairing, subject.with_penalty(penalty)
     broken = []
     if formulation.pair(interface, z) != pairing:
         broken.append("the pairing of a state differs in a repeated call")
     pairing_of_some = formulation.pair(interface, partly)
     if second.pair(interface, partly) != pairing_of_some or any(
-        second.pair(question.interface, question.z) != question.pairing for question in (*questions[1:3], questions[1])
+        second.pair(mesh, u) != paired for mesh, paired, u in (*questions[1:3], questions[1])
     ):
         broken.append("the pairing of a state depends on the state before it")
-    broken += compare_two_pairings(formulation, interface, z, distant)
+    broken += _compare_two_pairings(formulation, interface, z, distant)
     if questions[3].pairing == pairing:
         questions = questions[:3]
     else:
-        questions.append(Question(interface, pairing, near))
-    repeated, changes = count_changes(formulation, second, questions)
+        questions.append(_Question(interface, pairing, near))
+    repeated, changes = _count_changes(formulation, second, questions)
 
-    numbers = [
-        REPEATED.check(repeated, 0.0),
-        REORDERED.check(changes["residual"], 0.0),
-        TANGENT.check(changes["tangent"], 0.0),
-        POINTS.check(changes["contact_points"], 0.0),
-    ]
+    by_method = {REORDERED: "residual", TANGENT: "tangent", POINTS: "contact_points"}
+    numbers = [REPEATED.check(repeated, 0.0), *(each.check(changes[name], 0.0) for each, name in by_method.items())]
     bound = pair_coordinates(state) * UNIT_ROUNDOFF
     forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
     if subject.traits.rules.enforcement == "penalty":
         broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
     if subject.traits.abilities.batched:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
-        numbers.append(BATCHED.check(compare_batch(state, near, forces, batch), bound))
+        difference = max(_compare(state, near, forces, each) for each in (batch[0], batch[1][::-1]))
+        numbers.append(BATCHED.check(difference, bound))
     if isinstance(subject, Restartable):
         far = subject.restart().with_penalty(penalty)
         far.residual(other, far.pair(other, z_other), z_other)
         if far.pair(interface, partly) != pairing_of_some or far.pair(interface, z) != pairing:
             broken.append("the pairing of a state differs in another process")
         forces_there = np.array(far.answers([("residual", interface, pairing, u) for u in (z, near)]))
-        difference = compare_batch(state, near, forces, np.array([forces_there, forces_there[::-1]]))
-        numbers.append(SECOND_PROCESS.check(difference, bound))
-    if "residual_and_tangent" in formulation.provides:
-        answers = formulation.answers(
-            [(verb, interface, pairing, u) for verb in ("tangent", "residual_and_tangent") for u in (z, near)]
-        )
+        numbers.append(SECOND_PROCESS.check(_compare(state, near, forces, forces_there), bound))
+    if BOTH in formulation.provides:
+        answers = formulation.answers([(verb, interface, pairing, u) for verb in ("tangent", BOTH) for u in (z, near)])
         tangents, pairs = np.array([dense(tangent) for tangent in answers[:2]]), answers[2:]
-        one_call = np.array([residual for residual, _ in pairs])
-        difference = compare_batch(state, near, forces, np.array([one_call, one_call[::-1]]))
-        of_tangents = compare_tangents(state, near, tangents, np.array([dense(each) for _, each in pairs]))
+        residuals, others = (np.array([dense(pair[part]) for pair in pairs]) for part in (0, 1))
         numbers += [
             IN_ONE_CALL.check(changes[BOTH], 0.0),
-            ONE_RESIDUAL.check(difference, bound),
-            ONE_TANGENT.check(of_tangents, FACTORS * bound),
+            ONE_RESIDUAL.check(_compare(state, near, forces, residuals), bound),
+            ONE_TANGENT.check(_compare(state, near, tangents, others), FACTORS * bound),
         ]
     if (_fingerprint(interface), _fingerprint(other)) != before:
         broken.append("the interface was changed")
@@ -380,8 +365,8 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
     formulation, state = prepare_state(case, subject)
     random = np.random.default_rng(state.seed)
     moves = random.uniform(-1, 1, (N_ROUNDS, state.z.size)) * state.resolution
-    question = Question(state.interface, formulation.pair(state.interface, state.z), state.z)
-    changed, pairs_otherwise = count_changes_in_life(formulation, question, state.z + NEAR * moves)
+    question = _Question(state.interface, formulation.pair(state.interface, state.z), state.z)
+    changed, pairs_otherwise = _count_changes_in_life(formulation, question, state.z + NEAR * moves)
     numbers = [IN_LIFE.check(changed, 0.0), *_compare_first(first, subject, random)]
     broken = "the pairing of a state differs after many calls" if pairs_otherwise else ""
     idle = not formulation.residual(state.interface, question.pairing, state.z)[: state.interface.n_unknowns].any()
@@ -393,64 +378,44 @@ def _compare_first(first: FirstAnswers, subject: Subject, random: np.random.Gene
     case, formulation = first.case, subject.for_case(first.case)
     near = case.z + NEAR * random.uniform(-1, 1, case.z.size) * case.resolution
     pairing = formulation.pair(case.interface, case.z)
-
-    def ask(verb: str) -> Array:
-        answers = formulation.answers([(verb, case.interface, pairing, u) for u in (case.z, near)])
-        return np.array([dense(answer) for answer in answers])
-
-    forces = ask("residual")
-    then = np.array([first.residual, forces[1]])
-    difference = compare_batch(case, near, forces, np.array([then, then[::-1]]))
-    bound = pair_coordinates(case) * UNIT_ROUNDOFF
-    numbers = [FIRST_RESIDUAL.check(difference, bound)]
-    if first.tangent is not None:
-        tangents = ask("tangent")
-        difference = compare_tangents(case, near, tangents, np.array([first.tangent, tangents[1]]))
-        numbers.append(FIRST_TANGENT.check(difference, FACTORS * bound))
+    bound, numbers = pair_coordinates(case) * UNIT_ROUNDOFF, []
+    for verb, quantity, then, tolerance in (
+        ("residual", FIRST_RESIDUAL, first.residual, bound),
+        ("tangent", FIRST_TANGENT, first.tangent, FACTORS * bound),
+    ):
+        if then is not None:
+            answers = formulation.answers([(verb, case.interface, pairing, u) for u in (case.z, near)])
+            now = np.array([dense(answer) for answer in answers])
+            numbers.append(quantity.check(_compare(case, near, now, np.array([then, now[1]])), tolerance))
     return numbers
 
 
 def _compare_penalties(
-    formulation: CheckedFormulation, other: CheckedFormulation, question: Question, forces: Array
+    formulation: CheckedFormulation, other: CheckedFormulation, question: _Question, forces: Array
 ) -> list[str]:
     """Return what is wrong, in words, where another instance has another penalty; `forces` are those of the first."""
-    arguments = question.interface, question.pairing, question.z
-    changed = other.residual(*arguments)
+    changed = other.residual(*question)
     broken = ["another penalty gives the same forces"] if forces.any() and (changed == forces).all() else []
-    if (formulation.residual(*arguments) != forces).any():
+    if (formulation.residual(*question) != forces).any():
         broken.append("the forces change when another instance is made with another penalty")
     return broken
 
 
-def compare_batch(case: Case, near: FloatArray, forces: Array, batch: Array) -> float:
-    """Return the largest difference of a batch over what moving the nodes by X would change.
+def _compare(case: Case, near: FloatArray, answers: Array, others: Array) -> float:
+    """Return the largest difference of answers over what moving the nodes by X would change.
 
-    The forces (2, n) are the residuals at the state of the case and at one nearby, (n,), asked one by one. The batch
-    (2, 2, n) has both states, then both in the other order.
+    Both are residuals (2, n) or tangents (2, n, n): in the state of the case, and in one nearby, on one pairing. Each
+    state has its own size: where one of the two just touches, its forces say nothing about those of the other.
     """
-    way = float(np.abs(near - case.z).max())
-    slope = float(np.abs(forces[1] - forces[0]).max()) / way if way > 0 else 0.0
+    axes, way = tuple(range(1, answers.ndim)), float(np.abs(near - case.z).max())
+    slope = float(np.abs(answers[1] - answers[0]).max()) / way if way > 0 else 0.0
+    largest = np.abs(answers).max(axis=axes)
+    turned = slenderness(case) * largest / case.resolution
     stiffness = max(case.penalty * case.slave_measure, slope)  # The slope counts where the law is stiffer than ε̂.
-    largest = np.abs(forces).max(axis=-1)
-    # Each state has its own size: where one of the two just touches, its forces say nothing about those of the other.
-    turned = slenderness(case) * largest / case.resolution
-    moved = case.largest_coordinate * (stiffness + turned) + case.n_segments * largest
-    differences = np.maximum(np.abs(batch[0] - forces), np.abs(batch[1] - forces[::-1])[::-1]).max(axis=-1)
-    return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
-
-
-def compare_tangents(case: Case, near: FloatArray, tangents: FloatArray, in_one_call: FloatArray) -> float:
-    """Return the largest difference of tangents in one call over what moving the nodes by X would change.
-
-    Both arrays (2, n, n) hold the tangents of both states on the same pairing; n = n_unknowns + n_multipliers.
-    """
-    way = float(np.abs(near - case.z).max())
-    slope = float(np.abs(tangents[1] - tangents[0]).max()) / way if way > 0 else 0.0
-    largest = np.abs(tangents).max(axis=(1, 2))
-    turned = slenderness(case) * largest / case.resolution
-    moved = case.largest_coordinate * np.maximum(slope, turned) + case.n_segments * largest
-    differences = np.abs(in_one_call - tangents).max(axis=(1, 2))
-    return float(max(ratio(float(part), float(whole)) for part, whole in zip(differences, moved, strict=True)))
+    changed = stiffness + turned if answers.ndim == 2 else np.maximum(slope, turned)
+    moved = case.largest_coordinate * changed + case.n_segments * largest
+    differences = np.abs(others - answers).max(axis=axes)
+    return float(max(map(ratio, differences.tolist(), moved.tolist())))
 
 
 def _fingerprint(interface: Interface) -> tuple[bytes, bytes, bytes]:

@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, combinations, permutations
-from typing import Any
+from itertools import chain, combinations, permutations, product
 
 import numpy as np
 from scipy import sparse
@@ -20,8 +19,7 @@ from scipy.sparse import csgraph, csr_array
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray, dense
 from contactverif.contract.case import Case, Cases
-from contactverif.contract.formulation import Pairing
-from contactverif.contract.interface import PLANE, Interface, Surface
+from contactverif.contract.interface import PLANE, Surface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property, Verdict, judge
 from contactverif.contract.subject import Subject
@@ -58,19 +56,23 @@ class Groups:
         return self.dim * self.n_nodes + self.n_multipliers
 
     @property
+    def unknowns(self) -> IntArray:
+        """The unknowns (count, dim) of each node; of a multiplier its own one, and −1 behind it."""
+        unknowns = np.full((self.count, self.dim), -1)
+        unknowns[: self.n_nodes] = np.arange(self.dim * self.n_nodes).reshape(-1, self.dim)
+        unknowns[self.n_nodes :, 0] = self.dim * self.n_nodes + np.arange(self.n_multipliers)
+        return unknowns
+
+    @property
     def of_unknowns(self) -> IntArray:
         """The node or multiplier (size,) that each unknown belongs to."""
-        return np.concatenate(
-            [np.repeat(np.arange(self.n_nodes), self.dim), self.n_nodes + np.arange(self.n_multipliers)]
-        )
+        return np.nonzero(self.unknowns >= 0)[0]
 
     def largest(self, matrix: FloatArray) -> FloatArray:
         """Return the largest absolute entry of each block (count, count) of a matrix (size, size)."""
-        entries, dim, behind = np.abs(matrix), self.dim, self.dim * self.n_nodes
-        largest = np.maximum.reduce([entries[axis:behind:dim] for axis in range(dim)])
-        rows = np.concatenate([largest, entries[behind:]])
-        columns = np.maximum.reduce([rows[:, axis:behind:dim] for axis in range(dim)])
-        return np.concatenate([columns, rows[:, behind:]], axis=1)
+        first = self.unknowns[:, 0]
+        largest: FloatArray = np.maximum.reduceat(np.maximum.reduceat(np.abs(matrix), first), first, axis=1)
+        return largest
 
     def surroundings(self, blocks: FloatArray) -> FloatArray:
         """Return for each block the largest block of its row or its column, all (count, count).
@@ -78,12 +80,9 @@ class Groups:
         Columns of nodes and of multipliers have different units, and so have rows. Each kind counts apart.
         """
         scale = np.empty_like(blocks)
-        kinds = (slice(0, self.n_nodes), slice(self.n_nodes, self.count))
-        for rows in kinds:
-            for columns in kinds:
-                part = blocks[rows, columns]
-                if part.size:
-                    scale[rows, columns] = np.maximum(part.max(axis=1, keepdims=True), part.max(axis=0, keepdims=True))
+        for kinds in product((slice(0, self.n_nodes), slice(self.n_nodes, self.count)), repeat=2):
+            rows, columns = (blocks[kinds].max(axis=axis, keepdims=True, initial=0.0) for axis in (1, 0))
+            scale[kinds] = np.maximum(rows, columns)
         return scale
 
     def describe(self, unknown: int) -> str:
@@ -94,8 +93,7 @@ class Groups:
         return f"{'xyz'[axis]} of {'slave' if node < self.n_slave else 'master'} node {node}"
 
 
-def groups_of(case: Case) -> Groups:
-    """Return the nodes and multipliers of a case."""
+def _groups_of(case: Case) -> Groups:
     return Groups(case.interface.n_slave_nodes, case.interface.n_nodes, case.n_multipliers, case.interface.dim)
 
 
@@ -117,7 +115,7 @@ class Moves:
 
 def single_moves(columns: IntArray, size: int) -> Moves:
     """Return one move for each of some unknowns (n_columns,); `size` is the number of all unknowns."""
-    return Moves([columns[k : k + 1] for k in range(len(columns))], np.repeat(columns[:, None], size, axis=1))
+    return Moves(list(columns[:, None]), np.repeat(columns[:, None], size, axis=1))
 
 
 def plan_moves(case: Case, pattern: BoolArray) -> Moves:
@@ -125,76 +123,66 @@ def plan_moves(case: Case, pattern: BoolArray) -> Moves:
 
     The pattern (size, size) are the entries that the tangent has.
     """
-    groups = groups_of(case)
+    groups = _groups_of(case)
     if groups.count <= MOST_SINGLE:
         return single_moves(np.arange(groups.size), groups.size)
-    contacts = _find_contacts(case.interface, groups, pattern)
+    unknowns, of_unknowns = groups.unknowns, groups.of_unknowns
+    # Which nodes and multipliers feel each other: by the tangent, or in one segment or face.
+    rows, columns = (of_unknowns[index] for index in np.nonzero(pattern))
+    corners = [surface.faces.T for surface in (case.interface.slave, case.interface.master)]
+    pairs = [side[[first, second]] for side in corners for first, second in combinations(range(len(side)), 2)]
+    first, second = np.concatenate(pairs, axis=1)
+    itself = np.arange(groups.count)
+    i, j = (
+        np.concatenate([rows, columns, first, second, itself]),
+        np.concatenate([columns, rows, second, first, itself]),
+    )
+    contacts = csr_array((np.ones(len(i)), (i, j)), shape=(groups.count, groups.count))
     members, owners = [], []
-    of_unknowns = groups.of_unknowns
     for colour in _colours(contacts):
         owner = np.full(groups.count, -1)
         for group in colour:
             owner[contacts.indices[contacts.indptr[group] : contacts.indptr[group + 1]]] = group
+        of_rows = owner[of_unknowns]
         for axis in range(groups.dim):
-            moved = colour if axis == 0 else [group for group in colour if group < groups.n_nodes]
-            columns = np.array([_unknown(groups, group, axis) for group in moved])
-            if len(columns):
-                of_rows = owner[of_unknowns]
-                has = (of_rows >= 0) & ((axis == 0) | (of_rows < groups.n_nodes))
-                members.append(columns)
-                owners.append(np.where(has, _unknown(groups, of_rows, axis), -1))
+            moved = unknowns[colour, axis]
+            if (moved >= 0).any():  # A multiplier has one unknown.
+                members.append(moved[moved >= 0])
+                owners.append(np.where(of_rows >= 0, unknowns[of_rows, axis], -1))
     return Moves(members, np.array(owners))
 
 
-def _unknown(groups: Groups, group: IntArray | int, axis: int) -> IntArray:
-    """Return the unknown of a node along an axis, or the one of a multiplier."""
-    behind = (groups.dim - 1) * groups.n_nodes
-    return np.where(np.less(group, groups.n_nodes), np.multiply(group, groups.dim) + axis, np.add(group, behind))
-
-
-def _find_contacts(interface: Interface, groups: Groups, pattern: BoolArray) -> sparse.csr_array:
-    """Return which nodes and multipliers (count, count) feel each other, as a symmetric matrix."""
-    rows, columns = (groups.of_unknowns[index] for index in np.nonzero(pattern))
-    corners = [surface.faces.T for surface in (interface.slave, interface.master)]
-    pairs = [side[[first, second]] for side in corners for first, second in combinations(range(len(side)), 2)]
-    first, second = np.concatenate(pairs, axis=1)
-    itself = np.arange(groups.count)
-    i = np.concatenate([rows, columns, first, second, itself])
-    j = np.concatenate([columns, rows, second, first, itself])
-    return sparse.csr_array((np.ones(len(i)), (i, j)), shape=(groups.count, groups.count))
-
-
-def _colours(contacts: sparse.csr_array) -> list[list[int]]:
+def _colours(contacts: csr_array) -> list[IntArray]:
     """Return sets of nodes and multipliers of which no two are felt in one row."""
-    conflicts = sparse.csr_array(contacts @ contacts)
+    conflicts = csr_array(contacts @ contacts)
     colour = np.full(contacts.shape[0], -1)
     for group in range(len(colour)):
         used = set(colour[conflicts.indices[conflicts.indptr[group] : conflicts.indptr[group + 1]]].tolist())
         colour[group] = next(number for number in range(len(colour)) if number not in used)
-    return [np.flatnonzero(colour == number).tolist() for number in range(int(colour.max()) + 1)]
+    return [np.flatnonzero(colour == number) for number in range(int(colour.max()) + 1)]
 
 
-def roundoff(case: Case, dtype: type) -> float:
+def _roundoff(case: Case, dtype: type) -> float:
     """Return u S/ℓ in a precision; u is 2⁻⁵³ for doubles."""
     unit = UNIT_ROUNDOFF if dtype is np.float64 else float(np.finfo(dtype).eps) / 2
     return unit * case.largest_coordinate / case.resolution
 
 
-def step(case: Case, dtype: type) -> float:
+def _step(case: Case, dtype: type) -> float:
     """Return the step h = ℓ (u S/ℓ)^(1/3), a length, at which truncation and roundoff are equal."""
-    return case.resolution * float(np.cbrt(roundoff(case, dtype)))
+    return case.resolution * float(np.cbrt(_roundoff(case, dtype)))
 
 
-def differences_by_complex_step(state: FrozenState, directions: FloatArray) -> FloatArray:
+def _complex_step(state: FrozenState, directions: FloatArray) -> FloatArray:
     """Return Im R(x + ihd)/h (n_directions, size) along directions d (n_directions, size) at a state x."""
     h = state.case.resolution * COMPLEX_STEP
     forces = state.residual_at(state.case.z + 1j * h * directions)
     return np.asarray(forces.imag / h, dtype=np.float64)
 
 
-def differences_on_both_sides(state: FrozenState, directions: FloatArray, dtype: type) -> tuple[FloatArray, FloatArray]:
+def _both_sides(state: FrozenState, directions: FloatArray, dtype: type) -> tuple[FloatArray, FloatArray]:
     """Return the differences ahead and behind, each (n_steps, n_directions, size), for the steps in STEPS."""
-    steps = step(state.case, dtype) * np.array(STEPS, dtype=dtype)[:, None, None]
+    steps = _step(state.case, dtype) * np.array(STEPS, dtype=dtype)[:, None, None]
     z: Array = state.case.z.astype(dtype)
     states = np.stack([z + steps * directions, z - steps * directions])
     forces = state.residual_at(states.reshape(-1, z.size)).reshape(states.shape)
@@ -227,11 +215,10 @@ MOST_REPEATED = 3  # So many moves of a long interface that look wrong are taken
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+class _Comparison:
     """The blocks of a tangent beside those of the derivative of the residual."""
 
-    # (count, count) The largest error of an entry of each block, and what is allowed, both in the unit of the entry.
-    error: FloatArray
+    error: FloatArray  # (count, count) The largest error of an entry of each block, and what is allowed.
     tolerance: FloatArray
     largest: FloatArray  # (count, count) The largest entry of each block, of tangent or derivative.
     surroundings: FloatArray  # (count, count) The largest block in the row or the column of each.
@@ -240,8 +227,13 @@ class Comparison:
     @property
     def excess(self) -> FloatArray:
         """Error over tolerance of each block (count, count); 0 where both are 0."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.error > 0, self.error / self.tolerance, 0.0)
+        return _over(self.error, self.tolerance)
+
+
+def _over(errors: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return errors ≥ 0 over sizes; 0/0 counts as 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(errors > 0, errors / sizes, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -262,57 +254,49 @@ class BlockJudge:
     def answers(self, moves: Moves) -> FloatArray:
         """Return the derivatives (n_steps, n_moves, size) along the moves; by a complex step there is one."""
         if self.by_complex_step:
-            return differences_by_complex_step(self.state, moves.directions())[None]
-        ahead, behind = differences_on_both_sides(self.state, moves.directions(), self.dtype)
+            return _complex_step(self.state, moves.directions())[None]
+        ahead, behind = _both_sides(self.state, moves.directions(), self.dtype)
         return (ahead + behind) / 2
 
-    def compare(self, derivatives: FloatArray) -> Comparison:
+    def compare(self, derivatives: FloatArray) -> _Comparison:
         """Compare the tangent with derivatives (n_steps, size, size), the best step of each block."""
         groups, numbers = self.groups, self.groups.of_unknowns
         errors = np.array([groups.largest(self.tangent - derivative) for derivative in derivatives])
-        best = errors.argmin(axis=0)
-        derivative = derivatives[0]
-        if len(derivatives) > 1:
-            derivative = np.take_along_axis(derivatives, best[np.ix_(numbers, numbers)][None], axis=0)[0]
+        best = errors.argmin(axis=0)[np.ix_(numbers, numbers)]
+        derivative = np.take_along_axis(derivatives, best[None], axis=0)[0]
         largest = np.maximum(groups.largest(self.tangent), groups.largest(derivative))
         surroundings = groups.surroundings(largest)
         # Rounding moves the ends of cells and areas by uS. A node that they reach by no more has blocks of so little.
-        dust = roundoff(self.state.case, np.float64) * np.abs(derivative).max(initial=0.0)
+        dust = _roundoff(self.state.case, np.float64) * np.abs(derivative).max(initial=0.0)
         tolerance = self.tolerate(largest, surroundings, np.ones_like(largest)) + dust
-        return Comparison(errors.min(axis=0), tolerance, largest, surroundings, derivative)
+        return _Comparison(errors.min(axis=0), tolerance, largest, surroundings, derivative)
 
     def tolerate(self, largest: FloatArray, surroundings: FloatArray, bending: FloatArray) -> FloatArray:
         """Return the tolerance of blocks, given the lengths over ℓ over which they bend; arrays of one shape."""
-        rounding = ROUNDINGS * roundoff(self.state.case, np.float64) / bending * surroundings
+        rounding = ROUNDINGS * _roundoff(self.state.case, np.float64) / bending * surroundings
         if self.by_complex_step:
             return EXACT * largest + rounding
-        accuracy = (roundoff(self.state.case, self.dtype) / bending) ** (2 / 3)
+        accuracy = (_roundoff(self.state.case, self.dtype) / bending) ** (2 / 3)
         return accuracy * (LARGEST * largest + SURROUNDINGS * surroundings) + rounding
 
 
 def judge_of(case: Case, subject: Subject) -> BlockJudge:
     """Return the judge of a formulation with a tangent at a state."""
     state = freeze_state(case, subject)
-    formulation, case, pairing = state.formulation, state.case, state.pairing
-    tangent = formulation.tangent(case.interface, pairing, case.z)
+    formulation, abilities = state.formulation, subject.traits.abilities
+    tangent = formulation.tangent(state.case.interface, state.pairing, state.case.z)
     dtype: type = np.float64
-    if formulation.decides_anew(pairing):  # No smaller step is exact where decisions may change with it.
+    if formulation.decides_anew(state.pairing):  # No smaller step is exact where decisions may change with it.
         pass
-    elif subject.traits.abilities.takes_complex:
+    elif abilities.takes_complex:
         dtype = np.complex128
-    elif subject.traits.abilities.takes_longdouble:
+    elif abilities.takes_longdouble:
         dtype = np.longdouble
-    return BlockJudge(state, dense(tangent), pattern_of(tangent), groups_of(case), dtype)
-
-
-def pattern_of(tangent: Any) -> BoolArray:
-    """Return the entries (size, size) that a matrix stores; of an array, those that are not zero."""
-    if not sparse.issparse(tangent):
-        pattern: BoolArray = np.asarray(tangent) != 0
-        return pattern
-    pattern = np.zeros(tangent.shape, dtype=np.bool_)
-    pattern[tangent.tocoo().coords] = True
-    return pattern
+    matrix = dense(tangent)
+    pattern = matrix != 0
+    if sparse.issparse(tangent):  # A sparse tangent has an entry where it stores a zero, too.
+        pattern[tangent.tocoo().coords] = True
+    return BlockJudge(state, matrix, pattern, _groups_of(state.case), dtype)
 
 
 def scatter(answers: FloatArray, moves: Moves) -> FloatArray:
@@ -323,41 +307,30 @@ def scatter(answers: FloatArray, moves: Moves) -> FloatArray:
     return matrices
 
 
-def compare_blocks(judge: BlockJudge) -> Comparison:
+def _compare_blocks(judge: BlockJudge) -> _Comparison:
     """Compare all blocks; on a long interface, what looks wrong is measured again, one unknown at a time."""
-    moves = plan_moves(judge.state.case, judge.pattern)
+    groups, moves = judge.groups, plan_moves(judge.state.case, judge.pattern)
     answers = judge.answers(moves)
     derivatives = scatter(answers, moves)
     comparison = judge.compare(derivatives)
     if all(len(members) == 1 for members in moves.members):
         return comparison
-    excess = _excess_of_moves(judge, comparison, answers, moves)
+    of_unknowns, by_column = groups.of_unknowns, comparison.excess.max(axis=0)
+    strangers = np.where(moves.owner < 0, np.abs(answers).min(axis=0), 0.0)  # Rows in which nothing should be felt.
+    around = comparison.surroundings.max(axis=1)  # The surroundings of a row are those of its largest block.
+    allowed = judge.tolerate(np.zeros_like(around), around, np.ones_like(around))[of_unknowns]
+    owned = np.array([by_column[of_unknowns[members]].max() for members in moves.members])
+    excess = np.maximum(owned, _over(strangers, allowed).max(axis=1))
     if (excess <= 1).all():
         return comparison
     worst = np.argsort(-excess)[:MOST_REPEATED]
-    trusted = np.zeros(judge.groups.count, dtype=np.bool_)
+    trusted = np.zeros(groups.count, dtype=np.bool_)
     for number in worst[excess[worst] > 1]:
         columns = moves.members[number]
-        derivatives[:, :, columns] = judge.answers(single_moves(columns, judge.groups.size)).transpose(0, 2, 1)
-        trusted[judge.groups.of_unknowns[columns]] = True
+        derivatives[:, :, columns] = judge.answers(single_moves(columns, groups.size)).transpose(0, 2, 1)
+        trusted[of_unknowns[columns]] = True
     comparison = judge.compare(derivatives)
-    error = np.where(trusted, comparison.error, 0.0)
-    return Comparison(error, comparison.tolerance, comparison.largest, comparison.surroundings, comparison.derivative)
-
-
-def _excess_of_moves(judge: BlockJudge, comparison: Comparison, answers: FloatArray, moves: Moves) -> FloatArray:
-    """Return the largest error over its tolerance of each move (n_moves,), in rows that it owns and in others."""
-    of_unknowns = judge.groups.of_unknowns
-    by_column = comparison.excess.max(axis=0)
-    excess = np.array([by_column[of_unknowns[members]].max() for members in moves.members])
-    strangers = np.where(moves.owner < 0, np.abs(answers).min(axis=0), 0.0)  # Rows in which nothing should be felt.
-    # The surroundings of a row are those of its largest block.
-    around = comparison.surroundings.max(axis=1)
-    allowed = judge.tolerate(np.zeros_like(around), around, np.ones_like(around))[of_unknowns]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = np.where(strangers > 0, strangers / allowed, 0.0)
-    worst: FloatArray = np.maximum(excess, beyond.max(axis=1))
-    return worst
+    return replace(comparison, error=np.where(trusted, comparison.error, 0.0))
 
 
 _define = partial(
@@ -432,47 +405,45 @@ def tangent_long(case: Case, subject: Subject) -> Measurement:
 def measure_blocks(case: Case, subject: Subject) -> Measurement:
     """Compare each block of the tangent, rows of a node × columns of a node, with the derivative of the residual."""
     judge = judge_of(case, subject)
-    comparison = compare_blocks(judge)
-    excess, excuses = comparison.excess, Excuses(0, 0)
-    if (excess > 1).any():
-        excess, excuses = _excuse(judge, comparison)
-    lacking = 0
-    if (excess > 1).any():  # Blocks that do not fail lack nothing.
-        part = np.ix_(judge.groups.of_unknowns, judge.groups.of_unknowns)
-        unstored = ~judge.pattern & (np.abs(comparison.derivative) > comparison.tolerance[part])
-        lacking = int((unstored & (excess[part] > 1)).sum())
-    row, column = np.unravel_index(int(excess.argmax()), excess.shape)
+    comparison = _compare_blocks(judge)
+    excess, kinked, bent = _excuse(judge, comparison)
+    part = np.ix_(judge.groups.of_unknowns, judge.groups.of_unknowns)
+    # Blocks that do not fail lack nothing.
+    unstored = ~judge.pattern & (np.abs(comparison.derivative) > comparison.tolerance[part]) & (excess[part] > 1)
+    row, column = map(int, np.unravel_index(int(excess.argmax()), excess.shape))
     size = float(comparison.largest[row, column]) or 1.0
-    value = float(excess[row, column])
+    value, lacking = float(excess[row, column]), int(unstored.sum())
     error = float(comparison.error[row, column]) / size if value else 0.0  # A block that is excused has none.
-    quantity = COMPLEX_BLOCK if judge.by_complex_step else BLOCK
-    undecided = "" if value > 1 or lacking else excuses.reason
+    undecided, finding = "", None
     if value > 1:
-        length = step(case, np.float64)
+        length = _step(case, np.float64)
         undecided = excuse_barrier(judge.state, max(STEPS) * length, length, float(comparison.error[row, column]))
-    tolerance = error / value if value else EXACT
-    numbers = [] if undecided and value <= 1 else [quantity.check(error, tolerance), LACKING.check(float(lacking), 0.0)]
+        finding = _worst_entry(judge, comparison, row, column)
+    elif kinked and not lacking:
+        undecided = f"a kink: one-sided differences disagree in {kinked} blocks"
+    elif bent and not lacking:
+        undecided = f"roundoff: {bent} blocks bend over lengths that are too short for differences"
+    quantity = COMPLEX_BLOCK if judge.by_complex_step else BLOCK
+    numbers = [quantity.check(error, error / value if value else EXACT), LACKING.check(float(lacking), 0.0)]
     return Measurement(
-        numbers,
+        [] if undecided and value <= 1 else numbers,
         undecided=undecided,
-        finding=worst_entry(judge, comparison, int(row), int(column)) if value > 1 else None,
+        finding=finding,
         details={
             "blocks": float((comparison.largest > 0).sum()),
-            "blocks at a kink": float(excuses.kinked),
-            "blocks that bend too sharply": float(excuses.bent),
+            "blocks at a kink": float(kinked),
+            "blocks that bend too sharply": float(bent),
         },
         idle=not judge.tangent.any() and not comparison.derivative.any(),
     )
 
 
-def worst_entry(judge: BlockJudge, comparison: Comparison, row: int, column: int) -> Finding:
-    """Return the worst entry of a block, by nodes or multipliers, beside its derivative."""
-    of_unknowns, groups = judge.groups.of_unknowns, judge.groups
-    rows, columns = np.flatnonzero(of_unknowns == row), np.flatnonzero(of_unknowns == column)
-    part = np.ix_(rows, columns)
+def _worst_entry(judge: BlockJudge, comparison: _Comparison, row: int, column: int) -> Finding:
+    groups = judge.groups
+    part = np.ix_(*(unknowns[unknowns >= 0] for unknowns in groups.unknowns[[row, column]]))
     errors = np.abs(judge.tangent[part] - comparison.derivative[part])
     first, second = divmod(int(errors.argmax()), errors.shape[1])
-    i, j = int(rows[first]), int(columns[second])
+    i, j = int(part[0][first, 0]), int(part[1][0, second])
     missing = "" if judge.pattern[i, j] else ", not in the pattern"
     return Finding(
         f"row {i} ({groups.describe(i)}), column {j} ({groups.describe(j)}){missing}",
@@ -485,29 +456,12 @@ def worst_entry(judge: BlockJudge, comparison: Comparison, row: int, column: int
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Excuses:
-    """The numbers of blocks that fail and are excused, by a kink or because the residual bends too sharply."""
-
-    kinked: int
-    bent: int
-
-    @property
-    def reason(self) -> str:
-        """The reason why such a block decides nothing; empty if there is none."""
-        if self.kinked:
-            return f"a kink: one-sided differences disagree in {self.kinked} blocks"
-        if self.bent:
-            return f"roundoff: {self.bent} blocks bend over lengths that are too short for differences"
-        return ""
-
-
-def _excuse(judge: BlockJudge, comparison: Comparison) -> tuple[FloatArray, Excuses]:
-    """Return the excess (count, count) of the blocks without those that are excused, and how many those are.
+def _excuse(judge: BlockJudge, comparison: _Comparison) -> tuple[FloatArray, int, int]:
+    """Return the excess (count, count) of the blocks that are not excused, and how many kinks and bends excuse.
 
     The worst blocks that fail are looked at first. As soon as one has no excuse, it decides.
     """
-    excess, kinked, bent = comparison.excess.copy(), 0, 0
+    excess, kinked, bent = comparison.excess, 0, 0
     order = np.argsort(-excess, axis=None)[: int((excess > 1).sum())]
     columns: dict[int, _Sides] = {}
     for place in order:
@@ -515,7 +469,7 @@ def _excuse(judge: BlockJudge, comparison: Comparison) -> tuple[FloatArray, Excu
         if column not in columns:
             columns[column] = _Sides.of_column(judge, column)
         sides = columns[column].in_row(judge, row)
-        block, around = (getattr(comparison, name)[row, column] for name in ("largest", "surroundings"))
+        block, around = comparison.largest[row, column], comparison.surroundings[row, column]
         bending = sides.bending(float(around))
         allowed = float(judge.tolerate(block, around, np.asarray(max(bending, SHORTEST_BENDING))))
         excess[row, column] = comparison.error[row, column] / allowed
@@ -523,12 +477,12 @@ def _excuse(judge: BlockJudge, comparison: Comparison) -> tuple[FloatArray, Excu
             continue
         if bending < SHORTEST_BENDING:
             excess[row, column], bent = 0.0, bent + 1
-        elif sides.jump() > JUMP * sides.accuracy * around and not judge.by_complex_step:
+        elif sides.jump() > JUMP * sides.step**2 * around and not judge.by_complex_step:
             excess[row, column] = 0.0
             kinked += not sides.is_one_sided(2 * allowed)
         else:
             break
-    return excess, Excuses(kinked, bent)
+    return excess, kinked, bent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -538,26 +492,18 @@ class _Sides:
     ahead: FloatArray  # (n_steps, n_columns, n_rows) The differences to both sides, for the steps in STEPS.
     behind: FloatArray
     tangent: FloatArray  # (n_columns, n_rows) The columns of the tangent.
-    step: float  # The step h over ℓ.
+    step: float  # The step h over ℓ; its square is the accuracy of a difference, (uS/ℓ)^(2/3).
 
     @classmethod
     def of_column(cls, judge: BlockJudge, column: int) -> _Sides:
-        """Return all rows of the columns of a node or multiplier."""
         columns, case = np.flatnonzero(judge.groups.of_unknowns == column), judge.state.case
         dtype = np.float64 if judge.by_complex_step else judge.dtype
-        directions = single_moves(columns, judge.groups.size).directions()
-        ahead, behind = differences_on_both_sides(judge.state, directions, dtype)
-        return cls(ahead, behind, judge.tangent[:, columns].T, step(case, dtype) / case.resolution)
+        ahead, behind = _both_sides(judge.state, single_moves(columns, judge.groups.size).directions(), dtype)
+        return cls(ahead, behind, judge.tangent[:, columns].T, _step(case, dtype) / case.resolution)
 
     def in_row(self, judge: BlockJudge, row: int) -> _Sides:
-        """Return the rows of a node or multiplier alone."""
         rows = judge.groups.of_unknowns == row
         return _Sides(self.ahead[..., rows], self.behind[..., rows], self.tangent[:, rows], self.step)
-
-    @property
-    def accuracy(self) -> float:
-        """(uS/ℓ)^(2/3), the accuracy of a difference."""
-        return self.step**2
 
     def bending(self, size: float) -> float:
         """Return the length over ℓ over which a residual with derivatives of this size bends; 1 if it is longer."""
@@ -568,18 +514,16 @@ class _Sides:
 
     def jump(self) -> float:
         """Return by how much the derivative jumps at the state, without what a smooth residual bends by."""
-        bends = self.ahead - self.behind
-        return float(np.abs(_extrapolate(bends)).max())
+        return float(np.abs(_extrapolate(self.ahead - self.behind)).max())
 
     def is_one_sided(self, tolerance: float) -> bool:
         """Return whether the block of the tangent is the derivative to one side."""
-        return any(
-            bool((np.abs(_extrapolate(side) - self.tangent) <= tolerance).all()) for side in (self.ahead, self.behind)
-        )
+        sides = (np.abs(_extrapolate(side) - self.tangent) <= tolerance for side in (self.ahead, self.behind))
+        return any(bool(side.all()) for side in sides)
 
 
 def _extrapolate(differences: FloatArray) -> FloatArray:
-    """Return one-sided differences (n_steps, …) extrapolated to a step of zero, from the two shorter steps."""
+    """Return one-sided differences (n_steps, …) at a step of zero, from the two shorter steps."""
     ratio = STEPS[1] / STEPS[2]
     limit: FloatArray = (ratio * differences[2] - differences[1]) / (ratio - 1)
     return limit
@@ -657,29 +601,30 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
     case, shortest = state.case, state.case.resolution
     directions = first_directions(case, N_DIRECTIONS)
     undecided, broken = _check_pairing(state, directions)
+    by_complex_step = subject.traits.abilities.takes_complex and not state.formulation.decides_anew(state.pairing)
 
     def measure_over(length: float) -> tuple[Measurement, float]:
-        comparison = compare(state, directions, length)
+        comparison = _compare(state, directions, length)
         more = defect_directions(directions, comparison.defects)
         if len(more):
-            comparison = comparison.join(compare(state, more, length))
+            comparison = comparison.join(_compare(state, more, length))
         conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
         tolerances = {CENTRAL: 30 * conditioning ** (2 / 3), TAYLOR: SLOPE, COMPLEX: 1e-11 + 64 * conditioning}
         values, finding = {CENTRAL: comparison.error}, comparison.finding
         if np.isfinite(comparison.slope):
             values[TAYLOR] = comparison.slope
-        if subject.traits.abilities.takes_complex and not state.formulation.decides_anew(state.pairing):
-            values[COMPLEX], complex_finding = compare_complex_step(
-                state, np.vstack([directions, more]), comparison.turns
-            )
+        if by_complex_step:
+            along = np.vstack([directions, more])
+            derivative, exact = along @ state.tangent.T, _complex_step(state, along)
+            largest = np.maximum(np.abs(exact).max(axis=0), np.abs(derivative).max(axis=0))
+            sizes = _row_sizes(state, largest, comparison.turns)
+            values[COMPLEX], worst = _worst_row(case, np.abs(exact - derivative), sizes, derivative, exact)
             if values[COMPLEX] > tolerances[COMPLEX]:
                 # Real differences would have seen an error of the tangent that is so large.
                 real_agrees = values[CENTRAL] <= tolerances[CENTRAL] < values[COMPLEX] / 2
-                finding = replace(complex_finding, remark=NOT_ANALYTIC if real_agrees else "")
-        idle = comparison.bending == np.inf
-        measurement = Measurement(
-            check_all(values, tolerances), undecided, broken, {"length": length}, idle=idle, finding=finding
-        )
+                finding = replace(worst, remark=NOT_ANALYTIC if real_agrees else "")
+        numbers, idle = check_all(values, tolerances), comparison.bending == np.inf
+        measurement = Measurement(numbers, undecided, broken, {"length": length}, idle=idle, finding=finding)
         return measurement, comparison.bending
 
     first, bending = measure_over(shortest)
@@ -699,47 +644,47 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DirectionalComparison:
+class _Directional:
     """The results of differences along some directions."""
 
     error: float  # The largest error against the best central difference, over the size of the derivative at its node.
     # The least slope of the Taylor remainder; infinite where all remainders are roundoff, or the residual has none.
     slope: float
-    bending: float  # The length over which the residual is seen to bend, see `compare`.
+    bending: float  # The length over which the residual is seen to bend, see `_compare`.
     defects: FloatArray  # (n_directions, n_unknowns) The tangent times each direction, minus the central difference.
     finding: Finding | None  # The row of the largest error.
     # (n_unknowns,) The change of the derivative in each row over a length ℓ, from the third derivative.
     turns: FloatArray
 
-    def join(self, other: DirectionalComparison) -> DirectionalComparison:
+    def join(self, other: _Directional) -> _Directional:
         """Return the worse of both."""
-        worse = self if self.error >= other.error else other
-        turns = np.maximum(self.turns, other.turns)
-        slope, bending = min(self.slope, other.slope), min(self.bending, other.bending)
-        return replace(worse, slope=slope, bending=bending, turns=turns)
+        return replace(
+            self if self.error >= other.error else other,
+            slope=min(self.slope, other.slope),
+            bending=min(self.bending, other.bending),
+            turns=np.maximum(self.turns, other.turns),
+        )
 
 
-def compare(state: FrozenState, directions: FloatArray, length: float) -> DirectionalComparison:
+def _compare(state: FrozenState, directions: FloatArray, length: float) -> _Directional:
     """Compare derivatives along directions (n, n_unknowns) with central differences and Taylor remainders, all at once.
 
     Steps are shares of the length over which the residual is taken to bend. The length over which it does bend is the
     root of its size over its third derivative, from the central differences of two steps. The tangent plays no part in
     it.
     """
-    case, reach = state.case, state.case.largest_coordinate
+    case, n = state.case, len(STEPS)
     derivative = directions @ state.tangent.T  # (n_directions, n_unknowns)
-    central, taylor = _central_steps(case, length), np.array(TAYLOR_STEPS) * length
-    steps = np.concatenate([central, -central, taylor])
+    steps = _all_steps(case, length)
+    central = steps[:n]
     batch = case.z + steps[:, None, None] * directions  # (n_steps, n_directions, n_unknowns)
-    states = np.concatenate([batch.reshape(-1, case.z.size), case.z[None]])
-    forces = state.residual_at(states)
+    forces = state.residual_at(np.concatenate([batch.reshape(-1, case.z.size), case.z[None]]))
     here, moved = forces[-1], forces[:-1].reshape(batch.shape)
 
-    n = len(central)
     slopes = (moved[:n] - moved[n : 2 * n]) / (2 * central[:, None, None])
     size = max(np.abs(derivative).max(), np.abs(slopes).max())
     if size == 0:
-        return DirectionalComparison(0.0, np.inf, np.inf, 0 * derivative, None, 0 * case.z)
+        return _Directional(0.0, np.inf, np.inf, 0 * derivative, None, 0 * case.z)
     errors = np.abs(slopes - derivative)  # (n_steps, n_directions, n_unknowns)
     best = errors.max(axis=2).argmin(axis=0)
     closest = np.take_along_axis(slopes, best[None, :, None], axis=0)[0]
@@ -747,23 +692,18 @@ def compare(state: FrozenState, directions: FloatArray, length: float) -> Direct
     turns = third * case.resolution**2
     sizes = _row_sizes(state, np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
     error, finding = _worst_row(case, errors.min(axis=0), sizes, derivative, closest)
-    forward = np.r_[0, 2 * n : 2 * n + len(taylor)]  # The longest central step serves here too.
-    remainders = np.abs(moved[forward] - here - steps[forward, None, None] * derivative).max(axis=2)
-    floor = 1e3 * UNIT_ROUNDOFF * reach * size
-    slope = taylor_slope(remainders, steps[forward], floor)
-    if slope < SLOPE:  # If the best difference as derivative gives no better slope, the residual is not smooth.
-        smooth = np.abs(moved[forward] - here - steps[forward, None, None] * closest).max(axis=2)
-        if taylor_slope(smooth, steps[forward], floor) < SLOPE:
-            slope = np.inf
+    forward = np.r_[0, 2 * n : len(steps)]  # The longest central step serves here too.
+    floor = 1e3 * UNIT_ROUNDOFF * case.largest_coordinate * size
+
+    def slope_of(derivatives: FloatArray) -> float:
+        remainders = moved[forward] - here - steps[forward, None, None] * derivatives
+        return taylor_slope(np.abs(remainders).max(axis=2), steps[forward], floor)
+
+    slope = slope_of(derivative)
+    if slope < SLOPE and slope_of(closest) < SLOPE:  # The best difference has no better one: no smooth residual.
+        slope = np.inf
     bending = float(np.sqrt(size / third.max())) if third.any() else np.inf
-    return DirectionalComparison(error, slope, bending, derivative - closest, finding, turns)
-
-
-def compare_complex_step(state: FrozenState, directions: FloatArray, turns: FloatArray) -> tuple[float, Finding]:
-    """Return the largest difference of a complex step from the derivative, likewise, and its row."""
-    derivative, exact = directions @ state.tangent.T, differences_by_complex_step(state, directions)
-    sizes = _row_sizes(state, np.maximum(np.abs(exact).max(axis=0), np.abs(derivative).max(axis=0)), turns)
-    return _worst_row(state.case, np.abs(exact - derivative), sizes, derivative, exact)
+    return _Directional(error, slope, bending, derivative - closest, finding, turns)
 
 
 def _row_sizes(state: FrozenState, derivatives: FloatArray, turns: FloatArray) -> FloatArray:
@@ -772,7 +712,7 @@ def _row_sizes(state: FrozenState, derivatives: FloatArray, turns: FloatArray) -
     It is the largest of these derivatives (n_unknowns,) there, or their change over ℓ, `turns` (n_unknowns,), or
     the largest block of the tangent in a column that the node feels: what cancels in a row is rounded like that.
     """
-    groups = groups_of(state.case)
+    groups = _groups_of(state.case)
     blocks = groups.largest(state.tangent)
     around = np.where(blocks > 0, groups.surroundings(blocks), 0.0).max(axis=1)
     at_nodes = np.zeros(groups.count)
@@ -789,15 +729,13 @@ def _worst_row(
     Rounding the positions moves the ends of what a point, a cell or an area reaches by uS. A node that is reached by no
     more than that has a derivative of uS/ℓ of the largest one, and whether it is 0 or as large is no error.
     """
-    dust = UNIT_ROUNDOFF * case.largest_coordinate / case.resolution * np.abs(difference).max()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where(errors > dust, errors / sizes, 0.0)
+    dust = _roundoff(case, np.float64) * np.abs(difference).max()
+    relative = _over(np.where(errors > dust, errors, 0.0), sizes)
     number, row = divmod(int(relative.argmax()), relative.shape[1])
-    place = f"row {row} ({groups_of(case).describe(row)})"
+    place = f"row {row} ({_groups_of(case).describe(row)})"
     found, right = (derivative[number, row],), (difference[number, row],)
-    return float(relative[number, row]), Finding(
-        place, found, right, "N m-1", found_name="tangent times direction", right_name="derivative"
-    )
+    finding = Finding(place, found, right, "N m-1", found_name="tangent times direction", right_name="derivative")
+    return float(relative[number, row]), finding
 
 
 def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
@@ -823,6 +761,12 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> flo
 def _central_steps(case: Case, length: float) -> FloatArray:
     steps: FloatArray = np.array(STEPS) * length * (UNIT_ROUNDOFF * case.largest_coordinate / length) ** (1 / 3)
     return steps
+
+
+def _all_steps(case: Case, length: float) -> FloatArray:
+    """Return the steps of central differences, the same backwards, and those of Taylor remainders."""
+    central = _central_steps(case, length)
+    return np.concatenate([central, -central, np.array(TAYLOR_STEPS) * length])
 
 
 def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str]:
@@ -855,9 +799,7 @@ def _check_pairing(state: FrozenState, directions: FloatArray) -> tuple[str, str
 def _change_forces(pairings: Sequence[Pairing | None], state: FrozenState, directions: FloatArray) -> bool:
     """Return whether any pairing changes the residual by more than roundoff, where differences are taken of it."""
     case = state.case
-    central = _central_steps(case, case.resolution)
-    steps = np.concatenate([central, -central, np.array(TAYLOR_STEPS) * case.resolution])
-    moves = (steps[:, None, None] * directions).reshape(-1, case.z.size)
+    moves = (_all_steps(case, case.resolution)[:, None, None] * directions).reshape(-1, case.z.size)
     places = np.concatenate([case.z[None], case.z + moves])
     forces = state.residual_at(places)
     slope = (np.abs(forces[1:] - forces[0]).max(axis=1) / np.abs(moves).max(axis=1)).max()
@@ -871,7 +813,10 @@ def first_directions(case: Case, n_random: int) -> FloatArray:
 
     The largest entry of each is ±1.
     """
-    regions = _regions(case)
+    dim, nodes = case.interface.dim, [*_chains(case.interface.slave), *_chains(case.interface.master)]
+    regions = [(dim * np.sort(chain)[:, None] + np.arange(dim)).reshape(-1) for chain in nodes]
+    if case.n_multipliers:
+        regions.append(np.arange(case.interface.n_unknowns, case.z.size))
     moves = random_directions(case.seed, n_random + len(regions), case.z.size)
     local = np.zeros((len(regions), case.z.size))
     for number, unknowns in enumerate(regions):
@@ -897,16 +842,6 @@ def defect_directions(directions: FloatArray, defects: FloatArray) -> FloatArray
     both = np.array([worst, singular])
     scaled: FloatArray = both / np.abs(both).max(axis=1, keepdims=True)
     return scaled
-
-
-def _regions(case: Case) -> list[IntArray]:
-    """Return the unknowns of each chain, and those of all multipliers."""
-    nodes = [chain for side in (case.interface.slave, case.interface.master) for chain in _chains(side)]
-    dim = case.interface.dim
-    regions = [(dim * np.sort(chain)[:, None] + np.arange(dim)).reshape(-1) for chain in nodes]
-    if case.n_multipliers:
-        regions.append(np.arange(case.interface.n_unknowns, case.z.size))
-    return regions
 
 
 def _chains(surface: Surface) -> list[IntArray]:
