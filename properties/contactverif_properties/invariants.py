@@ -1,4 +1,4 @@
-"""Two states, or two scenes of a whole code, that have the same answer: mirrored, in other units, beside other bodies.
+"""Two states that have the same answer: mirrored, in other units, in other numbers, beside other bodies.
 
 Each state is one case. `Carry` says which node of the second state is which node of the first, and how vectors go over.
 Multipliers are uniform, so that their order does not matter; only the rows of positions are compared.
@@ -6,10 +6,9 @@ Multipliers are uniform, so that their order does not matter; only the rows of p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import cos, radians, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -21,23 +20,17 @@ from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Property
-from contactverif.contract.subject import SOLVE, EngineSubject, Subject
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.mechanics import changed_scenes
-from contactverif.mechanics.accuracy import Solution, solve_by_engine
-from contactverif.mechanics.bodies import Placing, Rectangle, block
-from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.oracle import default_points, nearest_segments
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.general import closed_cases
-from contactverif.strategies.solids import closed_cases as closed_scenes
 from contactverif.strategies.straight import bent_end_cases, cases_over_a_body, plane_cases_by_a_plate
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif_properties import roundoff
 from contactverif_properties.applicability import refuse_unstated_penalty
 from contactverif_properties.exact_forces import worst_force
 from contactverif_properties.kinks import explain_by_kink
-from contactverif_properties.patch_solved import engine_tolerance
 from contactverif_properties.states import FrozenState, any_cases, ask_forces_and_tangents, freeze_state
 
 TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
@@ -55,7 +48,7 @@ class Carry:
     matrix: FloatArray = field(default_factory=lambda: np.eye(2))
 
 
-def same_answer_quantities(situation: str) -> tuple[Quantity, Quantity]:
+def _same_answer(situation: str) -> tuple[Quantity, Quantity]:
     """Return the quantities of `compare`, the changes of forces and tangent; `situation` ends their names."""
     return (
         Quantity(f"change of the forces {situation}", TOLERANCE, roundoff.SEGMENT_REASON),
@@ -73,10 +66,10 @@ def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tup
         formulation = subject.with_penalty(1.0)
     state = FrozenState.with_multiplier(formulation, case, multiplier)
     (forces,), tangents = ask_forces_and_tangents(state)
-    return state, forces[:n].reshape(case.interface.nodes.shape), tangents[0][:n, :n] if tangents else np.empty((0, 0))
+    return state, forces[:n].reshape(case.positions.shape), tangents[0][:n, :n] if tangents else np.empty((0, 0))
 
 
-class Change(NamedTuple):
+class _Change(NamedTuple):
     """The change of the forces, or of the tangent, between two states."""
 
     part: str  # "forces" or "tangent".
@@ -90,37 +83,32 @@ class Change(NamedTuple):
     def worst_columns(self, number: int) -> IntArray:
         """Return the columns of the node, or the multiplier, with the largest change, in the first state or second."""
         n_columns = self.change.shape[-1]
-        node = int(np.abs(self.change).argmax()) % n_columns // self.dim
-        if self.nodes is None or number == 0:
-            columns: IntArray = np.minimum(self.dim * node + np.arange(self.dim), n_columns - 1)
-            return columns
-        return self.dim * int(self.nodes[node]) + np.arange(self.dim)
+        node, axes = int(np.abs(self.change).argmax()) % n_columns // self.dim, np.arange(self.dim)
+        if self.nodes is not None and number > 0:
+            return self.dim * int(self.nodes[node]) + axes
+        columns: IntArray = np.minimum(self.dim * node + axes, n_columns - 1)
+        return columns
 
 
-def judge_changes(
-    changes: Sequence[Change], tolerance: float, states: Iterable[FrozenState], largest: float | None = None
+def _judge_changes(
+    changes: Sequence[_Change], tolerance: float, states: Iterable[FrozenState], largest: float | None = None
 ) -> tuple[tuple[CheckedNumber, ...], str]:
     """Return the largest changes over their sizes, and why a kink excuses those above the tolerance.
 
     Coordinates are rounded at the largest one of each state, or at a length. Without states, nothing is excused.
     """
-    errors = [float(np.abs(each.change).max()) for each in changes]
-    values = {each.quantity: roundoff.ratio(error, each.size) for each, error in zip(changes, errors, strict=True)}
-    failures = [each for each in changes if values[each.quantity] > tolerance]
-    excuses = (_find_excuse(failures, number, state, largest) for number, state in enumerate(states))
-    return check_all(values, tolerance), next(filter(None, excuses), "") if failures else ""
+    largest_changes = {each.part: float(np.abs(each.change).max()) for each in changes}
+    values = {each.quantity: roundoff.ratio(largest_changes[each.part], each.size) for each in changes}
+    failures = {each.part: each for each in changes if values[each.quantity] > tolerance}
+    errors, undecided = {part: largest_changes[part] for part in failures}, ""
+    for number, state in enumerate(states) if failures else ():
+        columns = failures["tangent"].worst_columns(number) if "tangent" in failures else None
+        reach = roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate)
+        undecided = undecided or explain_by_kink(state, reach, errors, columns)
+    return check_all(values, tolerance), undecided
 
 
-def _find_excuse(failures: Sequence[Change], number: int, state: FrozenState, largest: float | None) -> str:
-    """Return why a kink in the first state, or the second, excuses changes that are too large, or an empty string."""
-    errors = {each.part: float(np.abs(each.change).max()) for each in failures}
-    columns = next((each.worst_columns(number) for each in failures if each.part == "tangent"), None)
-    return explain_by_kink(
-        state, roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate), errors, columns
-    )
-
-
-def compare(
+def _compare(
     quantities: tuple[Quantity, Quantity],
     subject: Subject,
     case: Case,
@@ -138,17 +126,17 @@ def compare(
         _ask(state, subject, penalty, multiplier) for state in (case, other)
     )
     size = max(roundoff.sum_larger_forces(case, forces), roundoff.sum_larger_forces(other, forces_there))
-    changes = [Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
+    changes = [_Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
     if tangent.size:
         dim = case.interface.dim
         places = (dim * carry.nodes[:, None] + np.arange(dim)).reshape(-1)
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
         change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
         size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
-        changes.append(Change("tangent", quantities[1], change, size, carry.nodes, dim))
+        changes.append(_Change("tangent", quantities[1], change, size, carry.nodes, dim))
     distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
     tolerance = roundoff.segment_tolerance(case, forces, distance)
-    numbers, undecided = judge_changes(changes, tolerance, [first, second] if explain else [])
+    numbers, undecided = _judge_changes(changes, tolerance, [first, second] if explain else [])
     if explain and not undecided and any(number.value > number.tolerance for number in numbers):
         # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
         undecided = _find_tie(first) or _find_tie(second)
@@ -167,34 +155,33 @@ def _find_tie(state: FrozenState) -> str:
     A point in the normal cone of a re-entrant vertex is equally near to both segments there, wherever it is. By the
     rule "the nearest segment" alone, a formulation may take the one with the lower number.
     """
-    if state.case.interface.dim != PLANE:
+    interface, positions = state.case.interface, state.case.positions
+    if interface.dim != PLANE:
         return ""
     if state.has_points:
-        passes = [(each.interface, each.z, each.points.position[each.points.active]) for each in state.passes]
+        passes = [(each.interface, each.positions, each.points.position[each.points.active]) for each in state.passes]
     else:
-        interface, positions = state.case.interface, state.case.positions
         segment, c, _, _ = default_points(interface)
         first, second = np.swapaxes(positions[interface.slave.segments[segment]], 0, 1)
         share = (1 + c[:, None]) / 2
-        passes = [(interface, state.case.z, (1 - share) * first + share * second)]
-    for interface, z, places in passes:
-        nodes = z[: interface.n_unknowns].reshape(-1, 2)
-        for place in places[np.isfinite(places).all(axis=1)]:
-            near = nearest_segments(nodes, interface.master.segments, (float(place[0]), float(place[1]))).segments
+        passes = [(interface, positions, (1 - share) * first + share * second)]
+    for interface, nodes, places in passes:
+        for x, y in places[np.isfinite(places).all(axis=1)].tolist():
+            near = nearest_segments(nodes, interface.master.segments, (x, y)).segments
             open_point = all(segment.signed_squared_gap > 0 for segment in near)
             if len(near) > 1 and (not open_point or state.case.n_multipliers):  # Multipliers may push across a gap.
                 return TIE
     return ""
 
 
-IN_MIRROR = same_answer_quantities("in the mirror image")
-WITH_ROLES_EXCHANGED = same_answer_quantities("with roles exchanged")
-IN_OTHER_NUMBERS = same_answer_quantities("in other numbers")
+IN_MIRROR = _same_answer("in the mirror image")
+WITH_ROLES_EXCHANGED = _same_answer("with roles exchanged")
+IN_OTHER_NUMBERS = _same_answer("in other numbers")
 ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 FAR, BEHIND = "a far pair of bodies", "a body behind the master"
 DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
 PLATE = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]])  # The faces of a plate's lower and upper side.
-BESIDE_OTHERS = same_answer_quantities("beside another body")
+BESIDE_OTHERS = _same_answer("beside another body")
 
 
 def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> tuple[Case, Carry]:
@@ -212,10 +199,9 @@ def mirror_case(case: Case) -> tuple[Case, Carry]:
     """Return the mirror image in the y-axis; segments run the other way, so that the body stays on the left."""
     interface = case.interface
     sides = (Surface(side.faces[:, ::-1]) for side in (interface.slave, interface.master))
-    image = Interface(reflect(interface.nodes), *sides)
-    return replace(case, interface=image, z=reflect(case.positions).reshape(-1)), Carry(
-        np.arange(len(image.nodes)), np.diag(_mirror_signs(interface.dim))
-    )
+    image = Interface(_reflect(interface.nodes), *sides)
+    carry = Carry(np.arange(interface.n_nodes), np.diag(_mirror_signs(interface.dim)))
+    return replace(case, interface=image, z=_reflect(case.positions).reshape(-1)), carry
 
 
 def exchange_roles(case: Case) -> tuple[Case, Carry]:
@@ -226,14 +212,13 @@ def exchange_roles(case: Case) -> tuple[Case, Carry]:
     return renumber(case, nodes, interface.master.faces, interface.slave.faces)
 
 
-def reflect(points: FloatArray) -> FloatArray:
+def _reflect(points: FloatArray) -> FloatArray:
     """Return the points (n, dim), mirrored; no zero becomes −0."""
     return points * _mirror_signs(points.shape[1]) + 0.0
 
 
 def _mirror_signs(dim: int) -> FloatArray:
-    """Return the factors of the coordinates in the mirror: x changes its sign."""
-    return np.array([-1.0, *[1.0] * (dim - 1)])
+    return np.where(np.arange(dim) == 0, -1.0, 1.0)
 
 
 _define = partial(Property.define, family="invariants", promise=lambda traits: True, asks=WITH_BARRIER)
@@ -264,7 +249,7 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
     vertex, a point is as near to one segment as to another, and the mirror image may choose the other.
     """
-    return compare(IN_MIRROR, subject, case, *mirror_case(case))
+    return _compare(IN_MIRROR, subject, case, *mirror_case(case))
 
 
 @_define(
@@ -294,7 +279,7 @@ def swap(case: Case, subject: Subject) -> Measurement:
     or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
     """
     unbiased = bool(subject.traits.promises.unbiased)
-    return compare(WITH_ROLES_EXCHANGED, subject, case, *exchange_roles(case), explain=unbiased)
+    return _compare(WITH_ROLES_EXCHANGED, subject, case, *exchange_roles(case), explain=unbiased)
 
 
 @random_source("contactverif_properties.renumbering.renumbering_cases")
@@ -347,22 +332,21 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
     if interface.dim != PLANE:  # Which corner of a face is the first has no meaning.
         slave, master = (_roll_corners(faces, random) for faces in (slave, master))
     renumbered = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
-    measurement = compare(IN_OTHER_NUMBERS, subject, case, *renumbered)
+    measurement = _compare(IN_OTHER_NUMBERS, subject, case, *renumbered)
     if measurement.undecided != TIE:
         return measurement
     # The numbers of segments may decide a tie. Those of nodes still must not matter.
-    return compare(IN_OTHER_NUMBERS, subject, case, *renumber(case, nodes, slave, master))
+    return _compare(IN_OTHER_NUMBERS, subject, case, *renumber(case, nodes, slave, master))
 
 
 def _roll_corners(faces: IntArray, random: np.random.Generator) -> IntArray:
     """Return faces (n_faces, n_corners) that begin at another one of their corners each."""
-    n_faces, n_corners = faces.shape
-    places = (np.arange(n_corners) + random.integers(n_corners, size=(n_faces, 1))) % n_corners
-    return np.take_along_axis(faces, places, axis=1)
+    places = np.arange(faces.shape[1]) + random.integers(faces.shape[1], size=(len(faces), 1))
+    return np.take_along_axis(faces, places % faces.shape[1], axis=1)
 
 
 @random_source("contactverif_properties.remote.remote_cases")
-def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case] | None:
+def _remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case] | None:
     """Return states of any kind, and straight slaves over two bodies; states of a given interface."""
     if interface is not None:
         return smooth_cases(interface)
@@ -372,7 +356,7 @@ def remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
 
 
 @random_source("contactverif_properties.remote.remote_surface_cases")
-def remote_surface_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+def _remote_surface_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return the same in space; there are none on an interface of the user."""
     far, behind = smooth_surface_cases(interface), plane_cases_by_a_plate(interface)
     return None if far is None or behind is None else {FAR: far, BEHIND: behind}
@@ -383,8 +367,8 @@ def remote_surface_cases(interface: Interface | None = None) -> dict[str, Search
     rank=190,
     role="comparison",
     quantities=BESIDE_OTHERS,
-    cases=Cases.by_kind(remote_cases),
-    cases_in_space=Cases.by_kind(remote_surface_cases),
+    cases=Cases.by_kind(_remote_cases),
+    cases_in_space=Cases.by_kind(_remote_surface_cases),
     kinds=(FAR, BEHIND),
     asks=WITHOUT_BARRIER,  # The bodies that are added penetrate each other.
 )
@@ -408,16 +392,16 @@ def remote(case: Case, subject: Subject) -> Measurement:
     """
     if "behind" in case.parameters:
         nothing = np.empty((0, case.interface.dim))
-        part = _as_part(case.parameters["behind"])
-        return compare(BESIDE_OTHERS, subject, case, *add_parts(case, (nothing, nothing.astype(np.int64)), part))
-    first = case.interface.dim != PLANE and case.seed % 2 == 1  # Multipliers of a plane case keep their places.
-    return compare(BESIDE_OTHERS, subject, case, *add_parts(case, *make_far_pair(case), first=first))
+        parts, first = ((nothing, nothing.astype(np.int64)), _as_part(case.parameters["behind"])), False
+    else:  # Multipliers of a plane case keep their places.
+        parts, first = _make_far_pair(case), case.interface.dim != PLANE and case.seed % 2 == 1
+    return _compare(BESIDE_OTHERS, subject, case, *_add_parts(case, *parts, first=first))
 
 
-Part = tuple[FloatArray, IntArray]  # The nodes (n, dim) of a part of a surface, and its faces by their places there.
+_Part = tuple[FloatArray, IntArray]  # The nodes (n, dim) of a part of a surface, and its faces by their places there.
 
 
-def make_far_pair(case: Case) -> tuple[Part, Part]:
+def _make_far_pair(case: Case) -> tuple[_Part, _Part]:
     """Return a slave and a master of one face each, that penetrate each other far from a state."""
     random, length = np.random.default_rng([case.seed, 3]), case.shortest_segment
     if case.interface.dim == PLANE:
@@ -433,14 +417,14 @@ def make_far_pair(case: Case) -> tuple[Part, Part]:
     return _as_part(origin + length * slave), _as_part(origin + length * master)
 
 
-def _as_part(nodes: FloatArray) -> Part:
+def _as_part(nodes: FloatArray) -> _Part:
     """Return a part with these nodes: a chain as it is walked, a triangle, or a plate."""
     if nodes.shape[1] == PLANE:
         return nodes, np.column_stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))])
     return nodes, PLATE if len(nodes) == 8 else np.array([[0, 1, 2]])
 
 
-def add_parts(case: Case, slave: Part, master: Part, *, first: bool = False) -> tuple[Case, Carry]:
+def _add_parts(case: Case, slave: _Part, master: _Part, *, first: bool = False) -> tuple[Case, Carry]:
     """Return a case with one more part on each side, and the new numbers of its nodes.
 
     The nodes of the new parts are in the same places in the reference. They come behind the others of their side, or
@@ -457,7 +441,7 @@ def add_parts(case: Case, slave: Part, master: Part, *, first: bool = False) -> 
         joined: FloatArray = np.vstack([nodes, slave[0], master[0]])[order]
         return joined
 
-    def surface(old: Surface, part: Part, at: int) -> Surface:
+    def surface(old: Surface, part: _Part, at: int) -> Surface:
         faces = [number[old.faces], number[part[1] + at]]
         return Surface(np.vstack(faces[::-1] if first else faces))
 
@@ -467,7 +451,7 @@ def add_parts(case: Case, slave: Part, master: Part, *, first: bool = False) -> 
     return state, Carry(number[:n_all], np.eye(interface.dim))
 
 
-AFTER_A_BEND = same_answer_quantities("after a bend elsewhere")
+AFTER_A_BEND = _same_answer("after a bend elsewhere")
 
 
 @Property.define(
@@ -498,7 +482,7 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
     the answer by a quarter of the error or more.
     """
     bent = replace(case, z=case.parameters["bent"])
-    return compare(AFTER_A_BEND, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))
+    return _compare(AFTER_A_BEND, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))
 
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
@@ -510,7 +494,7 @@ TURNED_FORCES = Quantity("error of the forces after a rotation", roundoff.SEGMEN
 TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
 
 
-def refuse_unknown_unit(traits: Traits) -> str:
+def _refuse_unknown_unit(traits: Traits) -> str:
     """Return why the number of the penalty in another unit of length is unknown, or an empty string."""
     if traits.rules.enforcement != "barrier":
         return refuse_unstated_penalty(traits)
@@ -519,7 +503,7 @@ def refuse_unknown_unit(traits: Traits) -> str:
     return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"
 
 
-def penalty_power(traits: Traits, dim: int = PLANE) -> float:
+def _penalty_power(traits: Traits, dim: int = PLANE) -> float:
     """Return the power of a length in the penalty, so that forces grow with lengths and the tangent stays."""
     if traits.rules.enforcement == "barrier":
         return traits.rules.penalty_power or 0.0
@@ -534,7 +518,7 @@ def penalty_power(traits: Traits, dim: int = PLANE) -> float:
     quantities=(SCALED_FORCES, SCALED_TANGENT),
     cases=Cases.random(any_cases),
     cases_in_space=Cases.random(surface_cases),
-    applicable=refuse_unknown_unit,
+    applicable=_refuse_unknown_unit,
 )
 def units(case: Case, subject: Subject) -> Measurement:
     """Another unit of length changes nothing, so no absolute tolerance is hidden.
@@ -563,40 +547,34 @@ def units(case: Case, subject: Subject) -> Measurement:
     case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
     there = FrozenState.at(
-        subject.with_penalty(penalty * factor ** penalty_power(subject.traits, interface.dim)), case_there
+        subject.with_penalty(penalty * factor ** _penalty_power(subject.traits, interface.dim)), case_there
     )
     (forces,), tangents = ask_forces_and_tangents(state)
     (forces_there,), tangents_there = ask_forces_and_tangents(there)
     forces, forces_there = forces[:n], forces_there[:n]
-    changes = [Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
+    changes = [_Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
     if tangents:
         tangent, tangent_there = tangents[0][:n, :n], tangents_there[0][:n, :n]
         changes.append(
-            Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max()), dim=dim)
+            _Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max()), dim=dim)
         )
     tolerance = roundoff.segment_tolerance(case, forces, roundoff.rounding_distance(case, subject.traits))
-    return Measurement(*judge_changes(changes, tolerance, [state]), idle=not forces.any())
+    return Measurement(*_judge_changes(changes, tolerance, [state]), idle=not forces.any())
 
 
-def turn_state(case: Case) -> tuple[Case, FloatArray]:
+def _turn_state(case: Case) -> tuple[Case, FloatArray]:
     """Return a case with the nodes at Qx + c, and the rotation Q (dim, dim), both random by the seed of the case."""
     random = np.random.default_rng(case.seed)
-    rotation = _draw_rotation(random, case.interface.dim)
+    if case.interface.dim == PLANE:
+        angle = random.uniform(-np.pi, np.pi)
+        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    else:  # A random quaternion.
+        quaternion = random.normal(size=4)
+        a, x, y, z = quaternion / np.linalg.norm(quaternion)
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        rotation = np.eye(3) + 2 * a * cross + 2 * cross @ cross
     positions = case.positions @ rotation.T + random.uniform(-1, 1, case.interface.dim) * case.diameter
     return replace(case, z=np.concatenate([positions.reshape(-1), case.multipliers])), rotation
-
-
-def _draw_rotation(random: np.random.Generator, dim: int) -> FloatArray:
-    """Return a rotation (dim, dim): by a random angle in the plane, and of a random quaternion in space."""
-    if dim == PLANE:
-        angle = random.uniform(-np.pi, np.pi)
-        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    quaternion = random.normal(size=4)
-    a, *axis = quaternion / np.linalg.norm(quaternion)
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: FloatArray = np.eye(3) + 2 * a * cross + 2 * cross @ cross
-    return rotation
 
 
 @_define(
@@ -631,7 +609,7 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     """
     state = freeze_state(case, subject)
     case, n = state.case, case.interface.n_unknowns
-    case_there, rotation = turn_state(case)
+    case_there, rotation = _turn_state(case)
     there = FrozenState.at(state.formulation, case_there)
     turn = linalg.block_diag(np.kron(np.eye(case.interface.n_nodes), rotation), np.eye(case.n_multipliers))
     (forces, forces_there), tangents = ask_forces_and_tangents(state, there)
@@ -642,220 +620,12 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     one_pass = forces / n_passes
     tolerance = roundoff.segment_tolerance(case, one_pass, largest)
     size = roundoff.sum_larger_forces(case, forces) + float(np.abs(forces[n:]).sum())
-    changes = [Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
+    changes = [_Change("forces", TURNED_FORCES, forces_there - turn @ forces, size)]
     if tangents:
         tangent, tangent_there = tangents
         change = tangent_there - turn @ tangent @ turn.T
         size = float(np.abs(tangent).max())
-        changes.append(Change("tangent", TURNED_TANGENT, change, size, dim=case.interface.dim))
+        changes.append(_Change("tangent", TURNED_TANGENT, change, size, dim=case.interface.dim))
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
-    numbers, undecided = judge_changes(changes, tolerance, [state, there], largest)
+    numbers, undecided = _judge_changes(changes, tolerance, [state, there], largest)
     return Measurement(numbers, undecided, idle=not forces[:n].any())
-
-
-CHANGE = Quantity(
-    "change of the forces",
-    "2 (a (1 + M U/(ℓ p)) + 1e-12 κ)",
-    "Both displacements are wrong by their accuracy a, which strains the shortest segment.",
-)
-LENGTH, MODULUS = 2.0**6, 4.0**-8  # Other units, and another one of force, which is their product
-ANGLES = (17.3, 45.0, 90.0, 135.0)  # Degrees
-IMAGE = np.diag([-1.0, 1.0])
-
-Values = Sequence[FloatArray]  # A vector for each node of each body, 0 off the interface.
-
-
-@random_source("contactverif_properties.engine_scenes.scenes")
-def tilted_scenes(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return blocks that are pressed together and tilted, all of the interface in contact; or a scene that is given."""
-    return closed_scenes(scene)
-
-
-_define_for_codes = partial(
-    Property.define,
-    family="engine",
-    quantities=(CHANGE,),
-    cases=Cases.random(tilted_scenes),
-    needs=frozenset({SOLVE}),
-    promise=lambda traits: True,
-    bodies=True,
-)
-
-
-def compare_scenes(
-    case: Case,
-    subject: Subject,
-    changed: Scene,
-    back: Callable[[int, FloatArray], FloatArray] = lambda body, forces: forces,
-) -> Measurement:
-    """Solve the scene of a case and a changed one, and return the largest change of a nodal force over p L.
-
-    `back` takes the forces of all nodes of a body of the changed scene to those of the scene.
-    """
-    assert isinstance(subject, EngineSubject)
-    scene = scene_of(case)
-    first, second = (solve_by_engine(item, subject)[0] for item in (scene, changed))
-    if reason := first.no_solution or second.no_solution:
-        return Measurement(undecided=reason)
-    forces, others = _by_body(scene, first), _by_body(changed, second)
-    largest = max(
-        float(np.abs(back(index, other) - force).max(initial=0.0))
-        for index, (force, other) in enumerate(zip(forces, others, strict=False))
-    )
-    total = float(np.linalg.norm(first.forces[: scene.interface.n_slave_nodes].sum(axis=0)))
-    if total == 0:
-        return Measurement([CHANGE.check(largest, 0.0)], idle=True)
-    length = float(scene.interface.slave.lengths(scene.interface.nodes).sum())
-    tolerance = 2 * engine_tolerance(scene, first, subject.engine_traits.accuracy, total / length)
-    return Measurement([CHANGE.check(largest / total, tolerance)])
-
-
-def _by_body(scene: Scene, solution: Solution) -> Values:
-    """Return the forces of all nodes of each body, 0 off the interface."""
-    values = [np.zeros((len(body.nodes), 2)) for body in scene.bodies]
-    first = 0
-    for index in scene.bodies_in_reach:
-        nodes = scene.bodies[index].contact_nodes
-        values[index][nodes] = solution.forces[first : first + len(nodes)]
-        first += len(nodes)
-    return values
-
-
-def _of_seed(case: Case) -> np.random.Generator:
-    return np.random.default_rng([case.seed, 28])
-
-
-@_define_for_codes(id="engine.purity")
-def engine_purity(case: Case, subject: Subject) -> Measurement:
-    """A scene that is solved again has the same solution, also after another one.
-
-    **Question.** A random scene of two blocks is solved, then another one, and then the first one again. Are the forces
-    that the bodies need the same?
-
-    **Why it matters.** A code that keeps a search, a mesh or a penalty of an earlier job answers by chance.
-
-    **How it is judged.** Changes of nodal forces count over p L, the force on the slave. The tolerance is twice that of
-    a patch test, as both solutions are as accurate as the code states.
-
-    **Undecided.** Where the code finds no solution.
-    """
-    assert isinstance(subject, EngineSubject)
-    solve_by_engine(changed_scenes.mirror(scene_of(case)), subject)
-    return compare_scenes(case, subject, scene_of(case))
-
-
-@_define_for_codes(id="engine.mirror")
-def engine_mirror(case: Case, subject: Subject) -> Measurement:
-    """The mirror image of a scene has the mirror image of its solution.
-
-    **Question.** A random scene of two blocks is mirrored. Are the forces that the bodies need the old ones, mirrored?
-
-    **Why it matters.** Left and right are alike in mechanics. A code that treats the first node of an edge otherwise
-    than the second gives an unsymmetric answer to a symmetric part.
-
-    **How it is judged.** As in `engine.purity`.
-
-    **Undecided.** Where the code finds no solution.
-    """
-    return compare_scenes(case, subject, changed_scenes.mirror(scene_of(case)), lambda _, forces: forces @ IMAGE)
-
-
-@_define_for_codes(id="engine.renumbering")
-def engine_renumbering(case: Case, subject: Subject) -> Measurement:
-    """Other numbers of nodes, cells and edges change nothing.
-
-    **Question.** Nodes, cells and contact edges of a random scene get other numbers. Are the forces that the bodies
-    need the old ones?
-
-    **Why it matters.** A mesh generator numbers as it likes.
-
-    **How it is judged.** As in `engine.purity`.
-
-    **Undecided.** Where the code finds no solution.
-    """
-    changed, numbers = changed_scenes.renumber(scene_of(case), _of_seed(case))
-    return compare_scenes(case, subject, changed, lambda body, forces: forces[numbers[body]])
-
-
-@_define_for_codes(id="engine.units")
-def engine_units(case: Case, subject: Subject) -> Measurement:
-    """Other units of length and force change nothing but the numbers.
-
-    **Question.** All lengths of a random scene are 64 times as large, and all moduli 1/65536, so that forces are
-    1/1024. Are the forces that the bodies need the old ones, times that?
-
-    **Why it matters.** A user of millimetres must not get another answer than a user of metres. Absolute tolerances of
-    a search or of a convergence test are such mistakes.
-
-    **How it is judged.** As in `engine.purity`.
-
-    **Undecided.** Where the code finds no solution.
-    """
-    changed = changed_scenes.change_units(scene_of(case), LENGTH, MODULUS)
-    return compare_scenes(case, subject, changed, lambda _, forces: forces / (LENGTH * MODULUS))
-
-
-@_define_for_codes(id="engine.swap", promise=lambda traits: traits.promises.unbiased)
-def engine_swap(case: Case, subject: Subject) -> Measurement:
-    """Slave and master may exchange their roles.
-
-    **Question.** The slave of a random scene becomes the master, and the master the slave. Are the forces that the
-    bodies need the old ones?
-
-    **Why it matters.** An analyst must choose one surface as the slave, and often no choice is natural. Most codes give
-    another answer then, and promise nothing.
-
-    **How it is judged.** As in `engine.purity`.
-
-    **Undecided.** Where the code finds no solution.
-    """
-    return compare_scenes(case, subject, changed_scenes.exchange_roles(scene_of(case)))
-
-
-@_define_for_codes(id="engine.objectivity")
-def engine_objectivity(case: Case, subject: Subject) -> Measurement:
-    """A scene that is turned has the solution that is turned.
-
-    **Question.** A random scene of two blocks is turned by 17.3°, 45°, 90° or 135°, with its supports. Are the forces
-    that the bodies need the old ones, turned?
-
-    **Why it matters.** No machine is built along the axes of its drawing.
-
-    **How it is judged.** As in `engine.purity`.
-
-    **Undecided.** Where the code finds no solution, and where it takes no inclined supports.
-    """
-    assert isinstance(subject, EngineSubject)
-    if not subject.engine_traits.inclined_supports:
-        return Measurement(undecided="the code takes no inclined supports")
-    angle = radians(float(_of_seed(case).choice(ANGLES)))
-    rotation = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
-    return compare_scenes(
-        case,
-        subject,
-        changed_scenes.turn(scene_of(case), (cos(angle), sin(angle))),
-        lambda _, forces: forces @ rotation,
-    )
-
-
-@_define_for_codes(id="engine.remote")
-def engine_remote(case: Case, subject: Subject) -> Measurement:
-    """A body that touches nothing, far away, changes nothing.
-
-    **Question.** One more slave block, held, is added far from a random scene. Are the forces that the bodies need
-    those of before?
-
-    **Why it matters.** Parts of an assembly that do not touch have nothing to do with each other. A code that scales
-    its penalty or its search by the mean of all elements couples them.
-
-    **How it is judged.** As in `engine.purity`.
-
-    **Undecided.** Where the code finds no solution.
-    """
-    scene = scene_of(case)
-    low, high = scene.interface.nodes.min(axis=0), scene.interface.nodes.max(axis=0)
-    size = float(np.abs(high - low).max())
-    along_x, along_y = scene.bodies[0].frame[:, 0].tolist()  # Some codes take no inclined supports.
-    place = Placing((along_x, along_y), (float(low[0]) + DISTANCE * size, float(high[1])))
-    far = block(Rectangle([0, size / 3, size], [0, size]), contact="bottom", approach=0.0, placing=place, name="far")
-    return compare_scenes(case, subject, changed_scenes.add_body(scene, far))

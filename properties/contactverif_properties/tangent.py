@@ -19,6 +19,7 @@ from scipy.sparse import csgraph, csr_array
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray, dense
 from contactverif.contract.case import Case, Cases
+from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import PLANE, Surface
 from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
 from contactverif.contract.property import WITH_BARRIER, Property, Verdict, judge
