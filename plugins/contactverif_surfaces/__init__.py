@@ -2,17 +2,16 @@
 
 `face_search` decides which pairs of faces make a cell and what its corners are, as integers. `cell_points` computes
 every real number of a cell from the positions of its nodes. A method is a rule for the pressures: at points of cells,
-or at slave nodes from weighted gaps (`cell_methods`), at quarters of slave faces (`face_quarters`), or at slave nodes
-themselves (`nodes_on_faces`).
+at slave nodes from weighted gaps or at quarters of slave faces (`cell_methods`), or at slave nodes themselves
+(`nodes_on_faces`).
 
 These files are written to be read. All numbers are computed on arrays of real or complex positions, so a tangent is the
 derivative of the same lines, by a complex step in the nodes of one cell. One method is compiled: one point a cell
 (`centre_springs`).
 """
 
-from contactverif_surfaces.cell_methods import mortar_3d, sts_3d
+from contactverif_surfaces.cell_methods import mortar_3d, sts_3d, vts_ppt_3d
 from contactverif_surfaces.centre_springs import vts_cell_3d
-from contactverif_surfaces.face_quarters import vts_ppt_3d
 from contactverif_surfaces.nodes_on_faces import nts_3d, nts_ar_3d
 
 __all__ = ["mortar_3d", "nts_3d", "nts_ar_3d", "sts_3d", "vts_cell_3d", "vts_ppt_3d"]

@@ -1,4 +1,4 @@
-"""Methods on cells in three dimensions: segment-to-segment springs at Gauss points, and mortar.
+"""Methods on cells in three dimensions: springs at Gauss points, mortar, and virtual slave nodes in parts of faces.
 
 Springs: a point has the pressure −ε̂ g where g < 0, along the slave's normal, and pushes both faces by their shape
 functions there. So force and moment balance point by point, and a uniform pressure is integrated exactly over what is
@@ -7,6 +7,11 @@ covered.
 Mortar: the gap of slave node i is G_i / W_i with G_i = ∫ N_i g and W_i = ∫ N_i over what the master covers. Its
 pressure −ε̂ G_i / W_i, where that is above 0, acts with the same shape function. So a uniform pressure is exact, and
 force and moment balance at each point of the integrals.
+
+Quarters, as the outlook of Zavarise & De Lorenzis (2009) describes: a virtual slave node at the centre of each of four
+parts of a slave face has the gap to the master face opposite. It presses its part of the slave by the shape functions
+at the node. The same pressure acts on every master face under the part, integrated with the master's shape functions.
+On triangles both sides balance where the master covers the part; on warped quadrilaterals they do not.
 """
 
 from __future__ import annotations
@@ -23,7 +28,9 @@ from contactverif.contract.formulation import ContactPoints, Pairing, check_pena
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif_surfaces.cell_points import (
+    PAST_BORDER,
     SURFACE_TRAITS,
+    TRIANGLE,
     CellPoints,
     FacePairs,
     SlaveView,
@@ -31,15 +38,19 @@ from contactverif_surfaces.cell_points import (
     add_rows,
     axes_of,
     differentiate,
+    evaluate_shapes,
     first_faces,
     flatten_pushes,
     gauss_points,
+    plane_areas,
+    positions_of,
     report_points,
     unknowns_of,
 )
+from contactverif_surfaces.face_search import find_cells, longest_edges
 
 PointRule = Callable[[SlaveView, IntArray], CellPoints]  # It takes the view and the codes of cells.
-N_POINTS = 6  # Gauss points a triangle: a gap × two shape functions has degree 3.
+N_POINTS = 6  # Gauss points a triangle of the mortar method: a gap × two shape functions has degree 3.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,46 +64,32 @@ class CellSprings:
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells, and which of their points are in contact (n_cells, n_points)."""
         pairs = FacePairs.find(interface, z)
-        points = _points(self.rule, pairs.n_slave_corners, pairs.corners_at(z), pairs.codes)
-        return Pairing({**pairs.as_arrays(), "active": points.gap < 0})
+        return Pairing({**pairs.as_arrays(), "active": self.rule(pairs.view_at(z), pairs.codes).gap < 0})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         pairs = FacePairs.from_pairing(interface, pairing)
-        local = self._forces(pairs)(pairs.corners_at(z), pairs.codes, pairing["active"])
+        local = self._forces(pairs.n_slave_corners, pairs.corners_at(z), pairs.codes, pairing["active"])
         return add_rows(local, unknowns_of(pairs.nodes), z.shape[-1])
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
-        pairs, unknowns = FacePairs.from_pairing(interface, pairing), interface.n_unknowns
-        blocks = differentiate(self._forces(pairs), pairs.corners_at(z), pairs.codes, pairing["active"])
-        places = unknowns_of(pairs.nodes)
-        return add_blocks(blocks, places, places, (unknowns, unknowns))
+        pairs, n = FacePairs.from_pairing(interface, pairing), interface.n_unknowns
+        forces, places = partial(self._forces, pairs.n_slave_corners), unknowns_of(pairs.nodes)
+        return add_blocks(
+            differentiate(forces, pairs.corners_at(z), pairs.codes, pairing["active"]), places, places, (n, n)
+        )
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the points of all cells."""
         pairs = FacePairs.from_pairing(interface, pairing)
-        corners = pairs.corners_at(z)
-        points = _points(self.rule, pairs.n_slave_corners, corners, pairs.codes)
-        pressure = np.where(pairing["active"], -self.penalty * points.gap, 0.0)
-        return report_points(pairs, points, corners, pressure, pairing["active"])
+        points = self.rule(pairs.view_at(z), pairs.codes)
+        return report_points(pairs, points, z, self.penalty, pairing["active"])
 
-    def _forces(self, pairs: FacePairs) -> Callable[..., Array]:
-        return partial(_spring_forces, self.rule, self.penalty, pairs.n_slave_corners)
-
-
-def _points(rule: PointRule, n_slave: int, corners: Array, codes: IntArray) -> CellPoints:
-    """Return the points of cells with corners (..., n_cells, n_corners, 3), the first `n_slave` of the slave."""
-    return rule(SlaveView.of_corners(corners[..., :n_slave, :], corners[..., n_slave:, :]), codes)
-
-
-def _spring_forces(
-    rule: PointRule, penalty: float, n_slave: int, corners: Array, codes: IntArray, active: BoolArray
-) -> Array:
-    """Return the residuals (..., n_cells, n_corners · 3) of cells with corners (..., n_cells, n_corners, 3)."""
-    points = _points(rule, n_slave, corners, codes)
-    force = np.where(active, -penalty * points.gap, 0.0) * points.weight
-    return flatten_pushes(*points.push(force))
+    def _forces(self, n_slave: int, corners: Array, codes: IntArray, active: BoolArray) -> Array:
+        """Return the residuals (..., n_cells, n_corners · 3) of cells with corners (..., n_cells, n_corners, 3)."""
+        points = self.rule(SlaveView.of_corners(corners[..., :n_slave, :], corners[..., n_slave:, :]), codes)
+        return flatten_pushes(*points.push(np.where(active, -self.penalty * points.gap, 0.0) * points.weight))
 
 
 def sts_3d(*, penalty: float) -> CellSprings:
@@ -116,8 +113,7 @@ def sts_3d(*, penalty: float) -> CellSprings:
 
 
 def _by_corners(view: SlaveView, codes: IntArray) -> CellPoints:
-    """Return three Gauss points for each triangle of a cell of triangles, and six for others."""
-    triangles = view.slave.shape[-2] == view.master.shape[-2] == 3
+    triangles = view.slave.shape[-2] == view.master.shape[-2] == TRIANGLE
     return gauss_points(view, codes, 3 if triangles else 6)
 
 
@@ -149,7 +145,9 @@ class SurfaceMortar:
         gaps, weights = _node_sums(pairs, z, n_nodes)
         pressure = self._pressures(gaps, weights, pairing)
         fixed = differentiate(partial(_forces, n_slave), corners, pairs.codes, pressure[slave_nodes])
-        by_pressure = add_blocks(_unit_forces(n_slave, corners, pairs.codes), places, slave_nodes, (n, n_nodes))
+        units = np.eye(n_slave)[:, None, :]  # A unit pressure at each slave corner.
+        forces_of_units = np.moveaxis(_forces(n_slave, corners, pairs.codes, units), 0, -1)
+        by_pressure = add_blocks(forces_of_units, places, slave_nodes, (n, n_nodes))
         sums = differentiate(partial(_local_sums, n_slave), corners, pairs.codes)
         by_gap, by_weight = (add_blocks(sums[:, k], slave_nodes, places, (n_nodes, n)) for k in range(2))
         whole = np.where(active, weights, 1.0)
@@ -161,18 +159,17 @@ class SurfaceMortar:
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes that the master covers: weighted nodes without a foot, on the first of their faces."""
-        pairs, faces = FacePairs.from_pairing(interface, pairing), interface.slave.faces
+        pairs, x, faces = FacePairs.from_pairing(interface, pairing), z.reshape(-1, 3), interface.slave.faces
         gaps, weights = _node_sums(pairs, z, interface.n_slave_nodes)
         nodes = np.flatnonzero(weights > 0)
         carrier, shape = first_faces(faces, nodes)
-        slave = z.reshape(-1, 3)[faces[carrier]]
         return ContactPoints.on_faces(
             slave_segment=carrier,
             slave_shape=shape,
             master_segment=np.full(len(nodes), -1),
             master_shape=np.full((len(nodes), interface.master.faces.shape[1]), np.nan),
-            position=z.reshape(-1, 3)[nodes],
-            normal=-axes_of(slave)[2],
+            position=x[nodes],
+            normal=-axes_of(x[faces[carrier]])[2],
             gap=gaps[nodes] / weights[nodes],
             pressure=self._pressures(gaps, weights, pairing)[nodes],
             weight=weights[nodes],
@@ -181,19 +178,18 @@ class SurfaceMortar:
         )
 
     def _pressures(self, gaps: Array, weights: Array, pairing: Pairing) -> Array:
-        """Return the pressures (..., n_slave_nodes) of weighted gaps."""
         active = pairing["active"]
         pressures: Array = np.where(active, -self.penalty * gaps / np.where(active, weights, 1.0), 0.0)
         return pressures
 
 
-def _six_points(view: SlaveView, codes: IntArray) -> CellPoints:
-    return gauss_points(view, codes, N_POINTS)
+def _mortar_points(n_slave: int, corners: Array, codes: IntArray) -> CellPoints:
+    return gauss_points(SlaveView.of_corners(corners[..., :n_slave, :], corners[..., n_slave:, :]), codes, N_POINTS)
 
 
 def _local_sums(n_slave: int, corners: Array, codes: IntArray) -> Array:
     """Return ∫ N_i g and ∫ N_i of each cell, (..., n_cells, 2, n_slave_corners)."""
-    points = _points(_six_points, n_slave, corners, codes)
+    points = _mortar_points(n_slave, corners, codes)
     weights = np.stack([points.weight * points.gap, points.weight], axis=-2)  # (..., n_cells, 2, n_points)
     sums: Array = weights @ points.slave_shape
     return sums
@@ -208,16 +204,9 @@ def _node_sums(pairs: FacePairs, z: Array, n_nodes: int) -> tuple[Array, Array]:
 
 def _forces(n_slave: int, corners: Array, codes: IntArray, pressure: Array) -> Array:
     """Return the residuals (..., n_cells, n_corners · 3) of pressures (..., n_cells, n_slave_corners) there."""
-    points = _points(_six_points, n_slave, corners, codes)
+    points = _mortar_points(n_slave, corners, codes)
     force = (points.slave_shape @ pressure[..., None])[..., 0] * points.weight
     return flatten_pushes(*points.push(force))
-
-
-def _unit_forces(n_slave: int, corners: FloatArray, codes: IntArray) -> FloatArray:
-    """Return the residuals (n_cells, n_corners · 3, n_slave_corners) of a unit pressure at each slave corner."""
-    units = np.eye(n_slave)[:, None, :]  # (n_slave_corners, 1, n_slave_corners)
-    forces: FloatArray = np.moveaxis(_forces(n_slave, corners, codes, units), 0, -1)
-    return forces
 
 
 def mortar_3d(*, penalty: float) -> SurfaceMortar:
@@ -234,3 +223,177 @@ def mortar_3d(*, penalty: float) -> SurfaceMortar:
     """
     source = "Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629; the slave's normal: here"
     return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source), check_penalty(penalty))
+
+
+N_PARTS = 4
+
+
+def _quarter(n_corners: int) -> FloatArray:
+    """Return the corners of the parts as shares of the corners of a face, (N_PARTS, corners of a part, n_corners).
+
+    Each corner of the face has a part, between the middles of its edges. A triangle has a fourth part in its middle.
+    """
+    whole = np.eye(n_corners)
+    after, before = (whole + np.roll(whole, step, axis=0) for step in (-1, 1))
+    if n_corners == TRIANGLE:
+        corners = np.stack([whole, after / 2, before / 2], axis=1)
+        return np.concatenate([corners, corners[None, :, 1]])
+    return np.stack([whole, after / 2, np.full_like(whole, 1 / n_corners), before / 2], axis=1)
+
+
+PARTS = {n_corners: _quarter(n_corners) for n_corners in (3, 4)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceQuarters:
+    """The formulation: pressure −ε̂ g of each part of a slave face, where the gap g at its centre is below 0."""
+
+    traits: Traits
+    penalty: float  # Distributed stiffness ε̂.
+
+    def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
+        """Find the cells of the parts, the master face under each centre (`home`), and the parts in contact."""
+        slave, master, x = interface.slave.faces, interface.master, np.array(z).reshape(-1, 3)
+        x = x - x[0]  # The middle of an edge is rounded at its distance from the origin.
+        corners = np.einsum("pci,fij->fpcj", PARTS[slave.shape[1]], x[slave]).reshape(-1, slave.shape[1], 3)
+        numbers = np.arange(corners.shape[0] * corners.shape[1]).reshape(corners.shape[:2])
+        edges = np.repeat(longest_edges(interface.slave, x), N_PARTS), longest_edges(master, x)
+        faces, codes = find_cells(np.vstack([corners.reshape(-1, 3), x]), numbers, master.faces + numbers.size, *edges)
+        home = _find_homes(corners, x[master.faces], faces)
+        parts, active = np.flatnonzero(home >= 0), np.zeros(len(home), bool)
+        shares, nodes = _parts_on_faces(interface, parts, home[parts])
+        active[parts] = _centre_points(positions_of(z, nodes), shares).gap[:, 0] < 0
+        return Pairing(
+            {"part": faces[:, 0], "master_face": faces[:, 1], "corners": codes, "home": home, "active": active}
+        )
+
+    def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
+        """Compute the forces (..., n_unknowns)."""
+        (shares, nodes), (cell_shares, cell_nodes), codes, part_of_cell = _in_contact(interface, pairing)
+        n_slave, corners = shares.shape[-1], positions_of(z, nodes)
+        on_slave, pressure = self._press_slave(corners, shares), self._pressure(corners, shares)[..., 0]
+        on_master = _unit_master(positions_of(z, cell_nodes), cell_shares, codes) * pressure[..., part_of_cell, None]
+        forces = add_rows(on_slave, unknowns_of(nodes[:, :n_slave]), z.shape[-1])
+        return forces + add_rows(on_master, unknowns_of(cell_nodes[:, n_slave:]), z.shape[-1])
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
+        """Compute the derivative of the residual: on the slave, and on the master at fixed pressures and by these."""
+        (shares, nodes), (cell_shares, cell_nodes), codes, part_of_cell = _in_contact(interface, pairing)
+        n, n_slave = interface.n_unknowns, shares.shape[-1]
+        at_centres, at_cells = positions_of(z, nodes), positions_of(z, cell_nodes)
+        pressure, by_nodes = self._pressure(at_centres, shares)[..., 0], unknowns_of(nodes)
+        on_slave = differentiate(self._press_slave, at_centres, shares)
+        fixed = differentiate(_unit_master, at_cells, cell_shares, codes) * pressure[part_of_cell, None, None]
+        units = _unit_master(at_cells, cell_shares, codes)[..., None]
+        slopes, rows = differentiate(self._pressure, at_centres, shares), unknowns_of(cell_nodes[:, n_slave:])
+        by_pressure = add_blocks(units, rows, part_of_cell[:, None], (n, len(pressure)))
+        of_pressure = add_blocks(slopes, np.arange(len(pressure))[:, None], by_nodes, (len(pressure), n))
+        direct = add_blocks(on_slave, unknowns_of(nodes[:, :n_slave]), by_nodes, (n, n))
+        on_master = add_blocks(fixed, rows, unknowns_of(cell_nodes), (n, n))
+        return sparse.csr_array(direct + on_master + by_pressure @ of_pressure)
+
+    def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
+        """Return the centres of all parts that have a master face under them."""
+        parts = np.flatnonzero(pairing["home"] >= 0)
+        home, active = pairing["home"][parts], pairing["active"][parts]
+        shares, nodes = _parts_on_faces(interface, parts, home)
+        corners = positions_of(z, nodes)
+        points, slave = _centre_points(corners, shares), corners[:, : shares.shape[-1]]
+        return ContactPoints.on_faces(
+            slave_segment=parts // N_PARTS,
+            slave_shape=points.slave_shape[:, 0],
+            master_segment=home,
+            master_shape=points.master_shape[:, 0],
+            position=(points.slave_shape[:, 0, :, None] * slave).sum(axis=1),
+            normal=-points.normal,
+            gap=points.gap[:, 0],
+            pressure=np.where(active, -self.penalty * points.gap[:, 0], 0.0),
+            weight=points.weight[:, 0],
+            active=active,
+        )
+
+    def _press_slave(self, corners: Array, shares: FloatArray) -> Array:
+        """Return the residuals (..., n, n_slave_corners · 3) of pressures −ε̂ g on the slave faces of parts."""
+        points = _centre_points(corners, shares)
+        return flatten_pushes(points.push(-self.penalty * points.gap * points.weight)[0])
+
+    def _pressure(self, corners: Array, shares: FloatArray) -> Array:
+        """Return the pressures (..., n, 1) of parts."""
+        return -self.penalty * _centre_points(corners, shares).gap
+
+
+def _parts_on_faces(interface: Interface, parts: IntArray, master: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return for parts (n,), numbered through all slave faces, and master faces (n,) two arrays.
+
+    The corners of each part as shares of those of its face, (n, corners of a part, n_slave_corners), and the nodes of
+    the slave face, then of the master face (n, n_corners).
+    """
+    slave = interface.slave.faces[parts // N_PARTS]
+    nodes = np.concatenate([slave, interface.master.faces[master]], axis=1)
+    return PARTS[slave.shape[1]][parts % N_PARTS], nodes
+
+
+def _in_contact(
+    interface: Interface, pairing: Pairing
+) -> tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray], IntArray, IntArray]:
+    """Return the parts in contact, the same for each of their cells, the codes of the cells, and their parts' numbers.
+
+    A part has the master face under its centre, a cell its own. The numbers count parts in contact.
+    """
+    active = pairing["active"]
+    parts, in_contact = np.flatnonzero(active), active[pairing["part"]]
+    part, master, codes = (pairing[name][in_contact] for name in ("part", "master_face", "corners"))
+    centres = _parts_on_faces(interface, parts, pairing["home"][parts])
+    return centres, _parts_on_faces(interface, part, master), codes, np.searchsorted(parts, part)
+
+
+def _centre_points(corners: Array, shares: FloatArray) -> CellPoints:
+    """Return the centres of parts with face corners (..., n, n_corners, 3), and the areas of the parts."""
+    n_slave = shares.shape[-1]
+    view = SlaveView.of_corners(corners[..., :n_slave, :], corners[..., n_slave:, :])
+    places = np.einsum("npk,...nkd->...npd", shares, view.slave)
+    return view.points_at(places.mean(axis=-2, keepdims=True), plane_areas(places)[..., None])
+
+
+def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
+    """Return the residuals (..., n, n_master_corners · 3) of a unit pressure on the master faces of cells."""
+    n_slave, corners = shares.shape[-1], corners - corners[..., :1, :]
+    part = np.einsum("npk,...nkd->...npd", shares, corners[..., :n_slave, :])
+    view = SlaveView.of_corners(part, corners[..., n_slave:, :])
+    points = gauss_points(view, codes, 3 if n_slave == TRIANGLE else 6)
+    return flatten_pushes(points.push(points.weight)[1])
+
+
+def _find_homes(parts: FloatArray, master: FloatArray, faces: IntArray) -> IntArray:
+    """Return the master face under the centre of each part, −1 for none, of cells with these faces (n_cells, 2).
+
+    Parts are (n_parts, n_corners, 3), and master faces (n_faces, n_corners, 3).
+    """
+    view = SlaveView.of_corners(parts[faces[:, 0]], master[faces[:, 1]])
+    depth = evaluate_shapes(view.master, view.slave.mean(axis=1, keepdims=True))[:, 0].min(axis=1)
+    home, deepest = np.full(len(parts), -1), np.full(len(parts), -PAST_BORDER)
+    for (part, face), value in zip(faces.tolist(), depth.tolist(), strict=True):
+        if value > deepest[part]:
+            home[part], deepest[part] = face, value
+    return home
+
+
+def vts_ppt_3d(*, penalty: float) -> FaceQuarters:
+    """Virtual slave nodes at the centres of four equal parts of each triangle, pressing on all master faces below.
+
+    Parameters
+    ----------
+    penalty : float
+        Distributed stiffness ε̂ > 0, force per area per length of penetration.
+
+    References
+    ----------
+    Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Section 8.
+    """
+    source = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, the outlook"
+    # A part that overhangs the master presses the slave with all its area, and the master with what is covered.
+    witnesses = {**SURFACE_TRAITS.evidence.witnesses, "balance": "tilted-faces"}
+    traits = SURFACE_TRAITS.revise(
+        gap="slave normal", conserves_force=False, conserves_moment=False, witnesses=witnesses, source=source
+    )
+    return FaceQuarters(traits, check_penalty(penalty))

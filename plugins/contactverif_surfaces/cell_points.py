@@ -11,7 +11,7 @@ roundoff for h = 2^-200.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,17 +69,14 @@ class FacePairs:
         """Return the cells of an interface at a state z (n_unknowns,)."""
         x, slave, master = np.array(z).reshape(-1, 3), interface.slave, interface.master
         faces, codes = find_cells(x, slave.faces, master.faces, longest_edges(slave, x), longest_edges(master, x))
-        return cls.of_arrays(interface, faces[:, 0], faces[:, 1], codes)
+        arrays = {"slave_face": faces[:, 0], "master_face": faces[:, 1], "corners": codes}
+        return cls.from_pairing(interface, arrays)
 
     @classmethod
-    def of_arrays(cls, interface: Interface, slave: IntArray, master: IntArray, codes: IntArray) -> FacePairs:
-        """Return the cells of faces (n_cells,) of both sides."""
-        return cls(slave, master, codes, interface.slave.faces[slave], interface.master.faces[master])
-
-    @classmethod
-    def from_pairing(cls, interface: Interface, pairing: Pairing) -> FacePairs:
+    def from_pairing(cls, interface: Interface, pairing: Mapping[str, IntArray]) -> FacePairs:
         """Return the cells that a pairing holds."""
-        return cls.of_arrays(interface, pairing["slave_face"], pairing["master_face"], pairing["corners"])
+        slave, master = pairing["slave_face"], pairing["master_face"]
+        return cls(slave, master, pairing["corners"], interface.slave.faces[slave], interface.master.faces[master])
 
     def as_arrays(self) -> dict[str, IntArray]:
         """Return the integers of a pairing."""
@@ -99,6 +96,10 @@ class FacePairs:
         """Return the positions (..., n_cells, n_corners, 3) of these nodes at states z (..., n_unknowns)."""
         return positions_of(z, self.nodes)
 
+    def view_at(self, z: FloatArray) -> SlaveView:
+        """Return the cells as their slave faces see them at a state z (n_unknowns,)."""
+        return SlaveView.of_corners(positions_of(z, self.slave_nodes), positions_of(z, self.master_nodes))
+
 
 def first_faces(faces: IntArray, nodes: IntArray) -> tuple[IntArray, FloatArray]:
     """Return the first of the faces at each node (n,), and the shape functions of its corners there (n, n_corners)."""
@@ -117,6 +118,13 @@ def cross_plane(first: Array, second: Array) -> Array:
     """Return the cross products (...,) of plane vectors (..., 2)."""
     product: Array = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
     return product
+
+
+def plane_areas(corners: Array) -> Array:
+    """Return the areas (...,) of polygons with plane corners (..., n_corners, 2)."""
+    arms = corners[..., 1:, :] - corners[..., :1, :]
+    area: Array = cross_plane(arms[..., :-1, :], arms[..., 1:, :]).sum(axis=-1) / 2
+    return area
 
 
 def evaluate_shapes(corners: Array, points: Array) -> Array:
@@ -252,7 +260,8 @@ def gauss_points(view: SlaveView, codes: IntArray, n_points: int) -> CellPoints:
     triangles = np.stack([middle, corners, following], axis=-2)
     points = places @ triangles
     count = points.shape[-3] * n_points
-    area = _areas(triangles)[..., None] * weights
+    first, others = triangles[..., 0, :], triangles[..., 1:, :]
+    area = (cross_plane(others[..., 0, :] - first, others[..., 1, :] - first) / 2)[..., None] * weights
     return view.points_at(points.reshape(*points.shape[:-3], count, 2), area.reshape(*area.shape[:-2], count))
 
 
@@ -268,13 +277,7 @@ def _middle(corners: Array, following: Array) -> Array:
     return np.where(total == 0, corners[..., :1, :], middle)
 
 
-def _areas(triangles: Array) -> Array:
-    first = triangles[..., 0, :]
-    return cross_plane(triangles[..., 1, :] - first, triangles[..., 2, :] - first) / 2
-
-
 def _dot(arms: Array, axis: Array) -> Array:
-    """Return the products (..., n_cells, n_corners) of arms (..., n_cells, n_corners, 3) and axes (..., n_cells, 3)."""
     product: Array = (arms @ axis[..., None])[..., 0]
     return product
 
@@ -287,11 +290,11 @@ def _take(corners: Array, numbers: IntArray) -> Array:
 
 
 def report_points(
-    pairs: FacePairs, points: CellPoints, corners: FloatArray, pressure: FloatArray, active: BoolArray
+    pairs: FacePairs, points: CellPoints, z: FloatArray, penalty: float, active: BoolArray
 ) -> ContactPoints:
-    """Return points of cells as contact points, with pressures and activity (n_cells, n_points)."""
+    """Return points of cells at a state z as contact points, with pressures −ε̂ g where `active` (n_cells, n_points)."""
     n_points = points.gap.shape[1]
-    place = np.einsum("cqk,cki->cqi", points.slave_shape, corners[:, : pairs.n_slave_corners])
+    place = np.einsum("cqk,cki->cqi", points.slave_shape, positions_of(z, pairs.slave_nodes))
     return ContactPoints.on_faces(
         slave_segment=np.repeat(pairs.slave_face, n_points),
         slave_shape=points.slave_shape.reshape(-1, points.slave_shape.shape[-1]),
@@ -300,7 +303,7 @@ def report_points(
         position=place.reshape(-1, 3),
         normal=np.repeat(-points.normal, n_points, axis=0),
         gap=points.gap.reshape(-1),
-        pressure=pressure.reshape(-1),
+        pressure=np.where(active, -penalty * points.gap, 0.0).reshape(-1),
         weight=points.weight.reshape(-1),
         active=active.reshape(-1),
     )

@@ -43,12 +43,12 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.compiler import compile_inline, compile_kernel, compile_part
-from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty
 from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, Csr, NumberArray, find_entry, zero_matrix
+from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, find_entry, zero_matrix
 from contactverif_surfaces.cell_points import SURFACE_TRAITS, CellPoints, FacePairs, report_points
 from contactverif_surfaces.face_search import MOST_CORNERS, set_axes, view_face
 
@@ -57,6 +57,7 @@ FRAME, MASTER, CORNERS, SLOPES = 0, 4, 7, 7 + MOST_CORNERS  # The rows of `room`
 AXES, PLACES = SLOPES + 3, SLOPES + 6  # The axes of `face_search`, and along them the corners of slave and master.
 ROOM = PLACES + 6, 4
 N_NODES = 6  # The nodes of a cell: those of the slave face, then of the master face.
+Faces = tuple[IntArray, IntArray]  # (n_cells, 3) The nodes of the slave and of the master face of each cell.
 Arm = tuple[float, float, float]  # A vector in space.
 SCANNED = 64  # A row with at most so many entries is scanned for a column; in a longer one the column is bisected for.
 # The rows of `slopes`: δα and α δc by the six s_j, t_j; then a row for the force of each node by s_j, t_j, h_j.
@@ -212,17 +213,9 @@ def _set_shapes(shapes: Array, room: Array, point: CentrePoint) -> None:
 
 @compile_kernel
 def _write_points(
-    points: FloatArray,
-    shapes: FloatArray,
-    room: FloatArray,
-    x: FloatArray,
-    faces: tuple[IntArray, IntArray],
-    codes: IntArray,
+    points: FloatArray, shapes: FloatArray, room: FloatArray, x: FloatArray, faces: Faces, codes: IntArray
 ) -> None:
-    """Write gap, weight and normal (n_cells, 5) and the shape functions (n_cells, 6) of all points.
-
-    The nodes of slave and master faces are (n_cells, 3) each.
-    """
+    """Write gap, weight and normal (n_cells, 5) and the shape functions (n_cells, 6) of all points."""
     slave, master = faces
     for cell in range(len(codes)):
         point = _place_centre(room, x, slave[cell], master[cell], codes[cell])
@@ -233,18 +226,9 @@ def _write_points(
 
 
 @compile_kernel
-def _add_forces(
-    forces: Array,
-    room: Array,
-    shapes: Array,
-    x: Array,
-    faces: tuple[IntArray, IntArray],
-    codes: IntArray,
-    active: BoolArray,
-    penalty: float,
-) -> None:
+def _add_forces(forces: Array, rooms: Fields, x: Array, cells: Fields, penalty: float) -> None:
     """Add the forces (n_states, n_nodes, 3) of the active points of states x (n_states, n_nodes, 3)."""
-    slave, master = faces
+    (room, shapes), ((slave, master), codes, active) = rooms, cells
     for state in range(len(x)):
         for cell in range(len(codes)):
             if not active[cell]:
@@ -259,51 +243,28 @@ def _add_forces(
                     forces[state, master[cell, 2 - k], axis] -= shapes[3 + k] * push
 
 
-def _forces_and_tangent(
-    x: FloatArray, nodes: tuple[IntArray, IntArray], codes: IntArray, active: BoolArray, penalty: float
-) -> tuple[FloatArray, sparse.csr_array]:
-    """Return the forces (n_nodes, 3) of the active points, and their derivative, sparse.
-
-    The nodes of the slave and the master face of each cell are (n_cells, 3) each.
-    """
-    here = np.flatnonzero(active)
-    members = np.concatenate([side[here].astype(np.int32) for side in nodes], axis=1)  # (n_active, N_NODES)
-    starts = np.arange(0, members.size + 1, N_NODES)
-    matrix = zero_matrix(len(x), 0, Couplings(members.reshape(-1), starts, starts[:-1]), per_node=3)
-    forces = np.zeros(x.shape)
-    rooms = np.empty(ROOM), np.empty(N_NODES), np.empty((FORCE + N_NODES, 9)), np.empty((N_NODES, 3))
-    csr = matrix.indptr, matrix.indices, matrix.data
-    _add_springs(forces, csr, *rooms, x, members, codes, here, penalty)
-    return forces, matrix
-
-
 @compile_kernel
-def _add_springs(
-    forces: FloatArray,
-    csr: Csr,
-    room: FloatArray,
-    shapes: FloatArray,
-    slopes: FloatArray,
-    row: FloatArray,
-    x: FloatArray,
-    members: NumberArray,
-    codes: IntArray,
-    cells: IntArray,
-    penalty: float,
-) -> None:
-    for number in range(len(cells)):
-        nodes, code = members[number], codes[cells[number]]
+def _add_springs(forces: FloatArray, csr: Csr, rooms: Fields, x: FloatArray, cells: Fields, penalty: float) -> None:
+    """Add the forces (n_nodes, 3) of some cells, and their derivative."""
+    (room, shapes, slopes, row), (members, codes, numbers) = rooms, cells
+    for i in range(len(numbers)):
+        nodes, code = members[i], codes[numbers[i]]
         point = _place_centre(room, x, nodes[:3], nodes[3:], code)
         _set_shapes(shapes, room, point)
         _differentiate_centroid(slopes, room, code, point)
         _differentiate_forces(slopes, room, shapes, point, penalty)
-        metric, force = _metric(room), -penalty * point.gap * point.size * point.share
+        g_11, g_12, g_22 = 0.0, 0.0, 0.0
+        for axis in range(3):
+            g_11 += room[FRAME, axis] * room[FRAME, axis]
+            g_12 += room[FRAME, axis] * room[FRAME + 1, axis]
+            g_22 += room[FRAME + 1, axis] * room[FRAME + 1, axis]
+        force = -penalty * point.gap * point.size * point.share
         for k in range(N_NODES):
             push = force * shapes[k] if k < 3 else -force * shapes[k]
             node = nodes[k if k < 3 else 8 - k]
             for axis in range(3):
                 forces[node, axis] += push * room[FRAME + 2, axis]
-            _set_row(row, slopes[FORCE + k], room, metric, push)
+            _set_row(row, slopes[FORCE + k], room, (g_11, g_12, g_22), push)
             _add_row(csr, row, room, nodes, node, push)
 
 
@@ -399,23 +360,12 @@ def _differentiate_forces(
 
 
 @compile_inline
-def _metric(room: FloatArray) -> tuple[float, float, float]:
-    """Return g^11, g^12 and g^22."""
-    g_11, g_12, g_22 = 0.0, 0.0, 0.0
-    for axis in range(3):
-        g_11 += room[FRAME, axis] * room[FRAME, axis]
-        g_12 += room[FRAME, axis] * room[FRAME + 1, axis]
-        g_22 += room[FRAME + 1, axis] * room[FRAME + 1, axis]
-    return g_11, g_12, g_22
-
-
-@compile_inline
 def _set_row(
     row: FloatArray, slopes: FloatArray, room: FloatArray, metric: tuple[float, float, float], push: float
 ) -> None:
-    """Write the derivative of a push along n by the nodes of the cell: (N_NODES, 3), by their moves along e^1, e^2, n.
+    """Write the derivative of a push along n by moves of the nodes along e^1, e^2, n (N_NODES, 3); it grows with J.
 
-    It is made of the derivatives (9,) by s_j, t_j and h_j. The push itself grows with J.
+    `slopes` (9,) are its derivatives by s_j, t_j and h_j.
     """
     turn_1, turn_2 = 0.0, 0.0
     for d in range(3):
@@ -436,14 +386,7 @@ def _set_row(
 
 
 @compile_inline
-def _add_row(
-    csr: Csr,
-    row: FloatArray,
-    room: FloatArray,
-    nodes: NumberArray,
-    node: int,
-    push: float,
-) -> None:
+def _add_row(csr: Csr, row: FloatArray, room: FloatArray, nodes: NumberArray, node: int, push: float) -> None:
     """Add n ⊗ `row` and the push × ∂n/∂x to the three rows of a node."""
     indptr, indices, data = csr
     start, end = indptr[3 * node], indptr[3 * node + 1]
@@ -490,8 +433,8 @@ class CentreSprings:
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, interface.n_nodes, 3)
-        forces, room, shapes = np.zeros_like(x), np.empty(ROOM, x.dtype), np.empty(6, x.dtype)
-        _add_forces(forces, room, shapes, x, _nodes(pairs), pairs.codes, pairing["active"], self.penalty)
+        forces, rooms = np.zeros_like(x), (np.empty(ROOM, x.dtype), np.empty(N_NODES, x.dtype))
+        _add_forces(forces, rooms, x, (_faces(pairs), pairs.codes, pairing["active"]), self.penalty)
         return forces.reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
@@ -503,19 +446,23 @@ class CentreSprings:
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
         pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, 3)
-        forces, tangent = _forces_and_tangent(x, _nodes(pairs), pairs.codes, pairing["active"], self.penalty)
-        return forces.reshape(-1), tangent
+        numbers = np.flatnonzero(pairing["active"])
+        members = np.concatenate([side[numbers].astype(np.int32) for side in _faces(pairs)], axis=1)
+        starts = np.arange(0, members.size + 1, N_NODES)
+        matrix = zero_matrix(len(x), 0, Couplings(members.reshape(-1), starts, starts[:-1]), per_node=3)
+        forces, csr = np.zeros(x.shape), (matrix.indptr, matrix.indices, matrix.data)
+        rooms = np.empty(ROOM), np.empty(N_NODES), np.empty((FORCE + N_NODES, 9)), np.empty((N_NODES, 3))
+        _add_springs(forces, csr, rooms, x, (members, pairs.codes, numbers), self.penalty)
+        return forces.reshape(-1), matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the points of all cells."""
-        pairs, active = FacePairs.from_pairing(interface, pairing), pairing["active"][:, None]
-        points = _points(pairs, z)
-        pressure = np.where(active, -self.penalty * points.gap, 0.0)
-        return report_points(pairs, points, pairs.corners_at(z), pressure, active)
+        pairs = FacePairs.from_pairing(interface, pairing)
+        return report_points(pairs, _points(pairs, z), z, self.penalty, pairing["active"][:, None])
 
 
-def _nodes(pairs: FacePairs) -> tuple[IntArray, IntArray]:
-    """Return the nodes of both faces of each cell (n_cells, 3); the kernels would read past other faces."""
+def _faces(pairs: FacePairs) -> Faces:
+    """Return the triangles of each cell; the kernels would read past other faces."""
     for nodes in (pairs.slave_nodes, pairs.master_nodes):
         if nodes.shape[1] != TRIANGLE:
             raise MisuseError("interface", f"faces with {nodes.shape[1]} corners", "triangles")
@@ -525,7 +472,7 @@ def _nodes(pairs: FacePairs) -> tuple[IntArray, IntArray]:
 def _points(pairs: FacePairs, z: FloatArray) -> CellPoints:
     n_cells = len(pairs.codes)
     points, shapes = np.empty((n_cells, 5)), np.empty((n_cells, 6))
-    _write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), _nodes(pairs), pairs.codes)
+    _write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), _faces(pairs), pairs.codes)
     slave, master = shapes[:, None, :3], shapes[:, None, :2:-1]
     return CellPoints(slave, master, points[:, 1:2], points[:, :1], points[:, 2:])
 

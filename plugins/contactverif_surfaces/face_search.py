@@ -27,13 +27,12 @@ Rule for the next editor: this file makes decisions. It returns integers, never 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from contactverif.compiler import compile_kernel, compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.interface import Surface
+from contactverif.geometry.block_rows import Fields
 
 MOST_CORNERS = 9  # Two quadrilaterals overlap in eight corners at most, and the clip may count one twice.
 TIE = 32 * UNIT_ROUNDOFF  # The share of the size that counts as a distance from an edge.
@@ -45,6 +44,9 @@ LEAF = 4  # The number of boxes in a leaf.
 BITS = 20  # The bits of a place along each axis; three such numbers are interleaved in 60 bits.
 # A box that is farther off than this share of all lengths in the comparison is apart, whatever was rounded.
 MARGIN = 64 * UNIT_ROUNDOFF
+# The numbers of the boxes along the curve (n,), and the lower and the upper corner of each box (2 n_leaves, 2, 3).
+# Box 1 holds everything, and box i is halved into 2i and 2i + 1. The second half are the leaves.
+Tree = tuple[IntArray, FloatArray]
 
 
 def find_cells(
@@ -55,8 +57,7 @@ def find_cells(
     Positions x are (n_nodes, 3). The last corner of a cell is repeated as often as the fullest cell has more corners.
     The edges are those of `longest_edges`.
     """
-    order, boxes = tree_of_faces(x, master)
-    faces, corners = find_face_cells(x, slave, master, slave_edge, master_edge, (order, boxes))
+    faces, corners = find_face_cells(x, slave, master, (slave_edge, master_edge), tree_of_faces(x, master))
     return faces, np.ascontiguousarray(corners)
 
 
@@ -73,7 +74,7 @@ def longest_edges(surface: Surface, x: FloatArray) -> FloatArray:
 
 @compile_maker
 def _longest_edges(x: FloatArray, faces: IntArray, neighbours: IntArray) -> FloatArray:
-    """Return the lengths (n_faces,), walking from each face that no walk has reached to all that hang together."""
+    """Walk from each face that no walk has reached to all that hang together."""
     longest, path = np.full(len(faces), -1.0), np.empty(len(faces), np.int64)
     for start in range(len(faces)):
         if longest[start] >= 0:
@@ -99,15 +100,11 @@ def _longest_edges(x: FloatArray, faces: IntArray, neighbours: IntArray) -> Floa
 
 @compile_maker
 def find_face_cells(
-    x: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    slave_edge: FloatArray,
-    master_edge: FloatArray,
-    tree: tuple[IntArray, FloatArray],
+    x: FloatArray, slave: IntArray, master: IntArray, edges: tuple[FloatArray, FloatArray], tree: Tree
 ) -> tuple[IntArray, IntArray]:
     """Return what `find_cells` does, from a tree of the master faces."""
     room, count, most_corners, longest = 4 * (len(slave) + len(master)), 0, 1, 0.0
+    slave_edge, master_edge = edges
     faces, corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
     on_slave, on_master = np.empty((slave.shape[1], 3)), np.empty((master.shape[1], 3))
     axes, question, members = np.empty((3, 3)), np.empty((2, 3)), np.empty(len(master), np.int64)
@@ -119,58 +116,47 @@ def find_face_cells(
         set_axes(axes, x, slave[s])
         origin = x[slave[s, 0]]
         view_face(on_slave, x, slave[s], origin, axes, False)
-        set_question(question, on_slave, REACH * (slave_edge[s] + longest) + longest)
-        n_facing = collect_facing(members, on_master, x, master, origin, axes, question, tree)
+        for axis in range(2):
+            question[0, axis], question[1, axis] = on_slave[0, axis], on_slave[0, axis]
+            for i in range(1, len(on_slave)):
+                question[0, axis] = min(question[0, axis], on_slave[i, axis])
+                question[1, axis] = max(question[1, axis], on_slave[i, axis])
+        # A cell's gap is that in its middle, so the question reaches farther than rule 4 by the longest master edge.
+        reach = REACH * (slave_edge[s] + longest) + longest
+        question[0, 2], question[1, 2] = -reach, reach
+        seen = x, master, origin, axes, on_master
+        n_facing = _collect_facing(members, seen, question, tree)
         if count + n_facing > room:
             room = 2 * (count + n_facing)
-            faces, corners = lengthen(faces, corners, room)
+            old_faces, old_corners = faces, corners
+            faces, corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
+            for cell in range(count):
+                _copy_cell(faces, corners, cell, old_faces, old_corners, cell)
         first = count
         for place in range(n_facing):
             m = members[place]
             view_face(on_master, x, master[m], origin, axes, True)
-            n_corners = clip_face(on_slave, on_master, corners[count], places, codes)
+            n_corners = _clip_face(on_slave, on_master, corners[count], places, codes)
             if n_corners > 0:
                 row = table[count - first]
-                set_plane(row, places[len(on_slave) % 2], n_corners, on_master)
-                gap = height_at(row, row[MIDDLE_X], row[MIDDLE_Y])
+                _set_plane(row, places[len(on_slave) % 2], n_corners, on_master)
+                gap = _height_at(row, row[MIDDLE_X], row[MIDDLE_Y])
                 if abs(gap) <= REACH * (slave_edge[s] + master_edge[m]):
                     faces[count, 0], faces[count, 1] = s, m
                     count, most_corners = count + 1, max(most_corners, n_corners)
-        count = drop_hidden(x, master, origin, axes, faces, corners, first, count, table, on_master)
+        count = _drop_hidden(faces, corners, first, count, table, seen)
     return faces[:count], corners[:count, :most_corners]
 
 
 @compile_part
-def set_question(question: FloatArray, on_slave: FloatArray, reach: float) -> None:
-    """Write the lower and the upper corner of the box over a slave face, seen along its axes.
-
-    It reaches farther than rule 4 by the longest edge of the master, since a cell's gap is that in its middle.
-    """
-    for axis in range(2):
-        question[0, axis], question[1, axis] = on_slave[0, axis], on_slave[0, axis]
-        for i in range(1, len(on_slave)):
-            question[0, axis] = min(question[0, axis], on_slave[i, axis])
-            question[1, axis] = max(question[1, axis], on_slave[i, axis])
-    question[0, 2], question[1, 2] = -reach, reach
-
-
-@compile_part
-def collect_facing(
-    members: IntArray,
-    on_master: FloatArray,
-    x: FloatArray,
-    master: IntArray,
-    origin: FloatArray,
-    axes: FloatArray,
-    question: FloatArray,
-    tree: tuple[IntArray, FloatArray],
-) -> int:
+def _collect_facing(members: IntArray, seen: Fields, question: FloatArray, tree: Tree) -> int:
     """Write the master faces that may overlap a slave face, in ascending order, and return how many."""
+    x, master, origin, axes, on_master = seen
     n_facing = 0
-    for place in range(collect_boxes(members, tree, origin, axes, question)):
+    for place in range(_collect_boxes(members, tree, origin, axes, question)):
         m = members[place]
         view_face(on_master, x, master[m], origin, axes, True)
-        if may_overlap(question, on_master):
+        if _may_overlap(question, on_master):
             i = n_facing
             while i > 0 and members[i - 1] > m:
                 members[i] = members[i - 1]
@@ -180,20 +166,10 @@ def collect_facing(
     return n_facing
 
 
-@compile_maker
-def lengthen(faces: IntArray, corners: IntArray, room: int) -> tuple[IntArray, IntArray]:
-    """Return copies of both arrays with room for more cells."""
-    more_faces, more_corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
-    for cell in range(len(faces)):
-        copy_cell(more_faces, more_corners, cell, faces, corners, cell)
-    return more_faces, more_corners
-
-
 @compile_part
-def copy_cell(
+def _copy_cell(
     faces: IntArray, corners: IntArray, to: int, old_faces: IntArray, old_corners: IntArray, place: int
 ) -> None:
-    """Copy the cell at a place of the old arrays to another one."""
     for side in range(2):
         faces[to, side] = old_faces[place, side]
         for v in range(MOST_CORNERS):
@@ -209,29 +185,27 @@ def set_axes(axes: FloatArray, x: FloatArray, face: IntArray) -> None:
     for axis in range(3):
         along[axis] = x[face[first], axis] - x[face[0], axis]
         across[axis] = x[face[last], axis] - x[face[start], axis]
-    set_cross(normal, along, across)
-    scale(normal)
+    _set_cross(normal, along, across)
+    _scale(normal)
     part = 0.0
     for axis in range(3):
         along[axis] = x[face[1], axis] - x[face[0], axis]
         part += along[axis] * normal[axis]
     for axis in range(3):
         along[axis] -= part * normal[axis]
-    scale(along)
-    set_cross(across, normal, along)
+    _scale(along)
+    _set_cross(across, normal, along)
 
 
 @compile_part
-def set_cross(product: FloatArray, a: FloatArray, b: FloatArray) -> None:
-    """Write a × b."""
+def _set_cross(product: FloatArray, a: FloatArray, b: FloatArray) -> None:
     product[0] = a[1] * b[2] - a[2] * b[1]
     product[1] = a[2] * b[0] - a[0] * b[2]
     product[2] = a[0] * b[1] - a[1] * b[0]
 
 
 @compile_part
-def scale(vector: FloatArray) -> None:
-    """Divide a vector by its length."""
+def _scale(vector: FloatArray) -> None:
     length = np.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
     for axis in range(3):
         vector[axis] /= length
@@ -250,7 +224,7 @@ def view_face(
 
 
 @compile_part
-def may_overlap(question: FloatArray, master: FloatArray) -> bool:
+def _may_overlap(question: FloatArray, master: FloatArray) -> bool:
     """Return whether the box of a master face, seen in the plane, meets that of the slave, and faces it."""
     for axis in range(2):
         first, last = master[0, axis], master[0, axis]
@@ -266,7 +240,7 @@ def may_overlap(question: FloatArray, master: FloatArray) -> bool:
 
 
 @compile_part
-def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray) -> int:
+def _clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray) -> int:
     """Clip the master face by the slave face; write the corners of what is left, and return their number, 0 for none.
 
     Of both halves of `places` and `codes` one is written from the other, once for each slave edge: the result is in
@@ -281,9 +255,15 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: 
         places[0, j, 0], places[0, j, 1] = master[j, 0], master[j, 1]
         codes[0, j, 0], codes[0, j, 1], codes[0, j, 2] = -1, j, j
     for i in range(len(slave)):
-        count = cut_by_edge(slave, i, TIE * size, places[old], codes[old], count, places[1 - old], codes[1 - old])
-        old = 1 - old
-    if is_thin(places[old], count, TIE * size):
+        before, behind = (places[old], codes[old]), (places[1 - old], codes[1 - old])
+        count, old = _cut_by_edge(slave, i, TIE * size, before, count, behind), 1 - old
+    area, longest, cell = 0.0, 0.0, places[old]
+    for v in range(1, count):
+        w = v + 1 if v + 1 < count else v
+        x, y = cell[v, 0] - cell[0, 0], cell[v, 1] - cell[0, 1]
+        area += (x * (cell[w, 1] - cell[0, 1]) - y * (cell[w, 0] - cell[0, 0])) / 2
+        longest = max(longest, x * x + y * y)
+    if area <= np.sqrt(longest) * (TIE * size):  # A thin cell
         return 0
     for v in range(len(corners)):
         corners[v, 0], corners[v, 1] = codes[old, min(v, count - 1), 0], codes[old, min(v, count - 1), 1]
@@ -291,17 +271,9 @@ def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: 
 
 
 @compile_part
-def cut_by_edge(
-    slave: FloatArray,
-    i: int,
-    width: float,
-    places: FloatArray,
-    codes: IntArray,
-    count: int,
-    new_places: FloatArray,
-    new_codes: IntArray,
-) -> int:
+def _cut_by_edge(slave: FloatArray, i: int, width: float, cell: Fields, count: int, new_cell: Fields) -> int:
     """Write what lies within slave edge i of a cell of so many corners, and return the number of its corners."""
+    (places, codes), (new_places, new_codes) = cell, new_cell
     after, n_left = (i + 1) % len(slave), 0
     along, across = slave[after, 0] - slave[i, 0], slave[after, 1] - slave[i, 1]
     tie = width * np.sqrt(along * along + across * across)
@@ -316,40 +288,20 @@ def cut_by_edge(
             new_codes[n_left, 0], new_codes[n_left, 1], new_codes[n_left, 2] = codes[v, 0], codes[v, 1], label
             n_left += 1
         if min(here, there) < -tie and max(here, there) > tie:
-            share = here / (here - there)
+            share, label = here / (here - there), codes[v, 2]
             new_places[n_left, 0] = places[v, 0] + share * (places[w, 0] - places[v, 0])
             new_places[n_left, 1] = places[v, 1] + share * (places[w, 1] - places[v, 1])
-            set_crossing(new_codes[n_left], i, codes[v, 2], len(slave))
-            new_codes[n_left, 2] = -1 - i if here > tie else codes[v, 2]
+            if label >= 0:
+                new_codes[n_left, 0], new_codes[n_left, 1] = i, label
+            else:  # Two slave edges cross at a corner.
+                new_codes[n_left, 0], new_codes[n_left, 1] = i if -label % len(slave) == i else after, -1
+            new_codes[n_left, 2] = -1 - i if here > tie else label
             n_left += 1
     return n_left
 
 
 @compile_part
-def is_thin(places: FloatArray, count: int, width: float) -> bool:
-    """Return whether a cell of so many corners encloses less than their longest distance × a width."""
-    area, longest = 0.0, 0.0
-    for v in range(1, count):
-        w = v + 1 if v + 1 < count else v
-        x, y = places[v, 0] - places[0, 0], places[v, 1] - places[0, 1]
-        area += (x * (places[w, 1] - places[0, 1]) - y * (places[w, 0] - places[0, 0])) / 2
-        longest = max(longest, x * x + y * y)
-    return bool(area <= np.sqrt(longest) * width)
-
-
-@compile_part
-def set_crossing(code: IntArray, i: int, label: int, n_corners: int) -> None:
-    """Write the code of the crossing of slave edge i and the edge with a label: two slave edges cross at a corner."""
-    if label >= 0:
-        code[0], code[1] = i, label
-    else:
-        other = -1 - label
-        code[0] = i if (other + 1) % n_corners == i else (i + 1) % n_corners
-        code[1] = -1
-
-
-@compile_part
-def set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArray) -> None:
+def _set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArray) -> None:
     """Write the middle of a cell, the mean of its corners, and the plane of its master face, seen from the slave.
 
     The plane of a warped quadrilateral is that of its diagonals, through the mean of its corners.
@@ -370,45 +322,33 @@ def set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArra
 
 
 @compile_part
-def height_at(row: FloatArray, x: float, y: float) -> float:
-    """Return the height of the plane of a master face over a place in the plane of the slave face."""
+def _height_at(row: FloatArray, x: float, y: float) -> float:
     return float(row[HEIGHT] + row[SLOPE_X] * x + row[SLOPE_Y] * y)
 
 
 @compile_part
-def drop_hidden(
-    x: FloatArray,
-    master: IntArray,
-    origin: FloatArray,
-    axes: FloatArray,
-    faces: IntArray,
-    corners: IntArray,
-    first: int,
-    count: int,
-    table: FloatArray,
-    on_master: FloatArray,
-) -> int:
+def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, table: FloatArray, seen: Fields) -> int:
     """Keep the cells, from the first one of a slave face on, in whose middle no other master face is nearer."""
+    x, master, origin, axes, on_master = seen
     for other in range(first, count):
         view_face(on_master, x, master[faces[other, 1]], origin, axes, True)
         for cell in range(first, count):
             row = table[cell - first]
             x_m, y_m = row[MIDDLE_X], row[MIDDLE_Y]
-            if other == cell or not holds_place(on_master, x_m, y_m):
+            if other == cell or not _holds_place(on_master, x_m, y_m):
                 continue
-            if abs(height_at(table[other - first], x_m, y_m)) < abs(height_at(row, x_m, y_m)):
+            if abs(_height_at(table[other - first], x_m, y_m)) < abs(_height_at(row, x_m, y_m)):
                 faces[cell, 0] = -1
     n_left = first
     for cell in range(first, count):
         if faces[cell, 0] >= 0:
-            copy_cell(faces, corners, n_left, faces, corners, cell)
+            _copy_cell(faces, corners, n_left, faces, corners, cell)
             n_left += 1
     return n_left
 
 
 @compile_part
-def holds_place(face: FloatArray, x: float, y: float) -> bool:
-    """Return whether a place lies inside a face, both seen in the plane of the slave face."""
+def _holds_place(face: FloatArray, x: float, y: float) -> bool:
     for j in range(len(face)):
         k = (j + 1) % len(face)
         along, across = face[k, 0] - face[j, 0], face[k, 1] - face[j, 1]
@@ -417,34 +357,19 @@ def holds_place(face: FloatArray, x: float, y: float) -> bool:
     return True
 
 
-class Tree(NamedTuple):
-    """A tree: box 1 holds everything, and box i is halved into 2i and 2i + 1. The second half are the leaves."""
-
-    order: IntArray  # (n,) The numbers of the boxes along the curve.
-    boxes: FloatArray  # (2 n_leaves, 2, 3) The lower and the upper corner of each box.
-
-
 def grow_tree(boxes: FloatArray) -> Tree:
     """Return the tree of boxes (n, 2, 3), lower and upper corner each."""
     middle = boxes.mean(axis=1)
     size = float((middle.max(axis=0) - middle.min(axis=0)).max())
     scale = (2**BITS - 1) / size if size > 0 else 0.0
-    keys = np.empty(len(boxes), np.int64)
-    _write_keys(keys, ((middle - middle.min(axis=0)) * scale).astype(np.int64))
+    places, keys = ((middle - middle.min(axis=0)) * scale).astype(np.int64), np.zeros(len(boxes), np.int64)
+    for bit in range(BITS - 1, -1, -1):
+        for axis in range(3):
+            keys = 2 * keys + ((places[:, axis] >> bit) & 1)
     order = np.argsort(keys, kind="stable")
-    tree = Tree(order, np.empty((2 << max(0, (len(boxes) - 1) // LEAF).bit_length(), 2, 3)))
-    _write_boxes(*tree, boxes)
-    return tree
-
-
-@compile_kernel
-def _write_keys(keys: IntArray, places: IntArray) -> None:
-    for i in range(len(keys)):
-        key = 0
-        for bit in range(BITS - 1, -1, -1):
-            for axis in range(3):
-                key = 2 * key + ((places[i, axis] >> bit) & 1)
-        keys[i] = key
+    nodes = np.empty((2 << max(0, (len(boxes) - 1) // LEAF).bit_length(), 2, 3))
+    _write_boxes(order, nodes, boxes)
+    return order, nodes
 
 
 @compile_kernel
@@ -466,9 +391,7 @@ def _write_boxes(order: IntArray, nodes: FloatArray, boxes: FloatArray) -> None:
 
 
 @compile_part
-def collect_boxes(
-    members: IntArray, tree: tuple[IntArray, FloatArray], origin: FloatArray, axes: FloatArray, question: FloatArray
-) -> int:
+def _collect_boxes(members: IntArray, tree: Tree, origin: FloatArray, axes: FloatArray, question: FloatArray) -> int:
     """Write the numbers of boxes into `members`, all that meet a question and some more; return how many.
 
     The question (2, 3) holds the points whose components along the `axes` (3, 3), seen from the origin, are between its
@@ -512,15 +435,15 @@ def _meets(box: FloatArray, origin: FloatArray, axes: FloatArray, question: Floa
 
 
 @compile_maker
-def find_boxes_at(points: FloatArray, order: IntArray, boxes: FloatArray) -> tuple[IntArray, IntArray]:
+def find_boxes_at(points: FloatArray, tree: Tree) -> tuple[IntArray, IntArray]:
     """Return pairs of points (n, 3) and boxes by their numbers, all where the point lies in the box and some more."""
-    axes, question, members = np.eye(3), np.zeros((2, 3)), np.empty(len(order), np.int64)
+    axes, question, members = np.eye(3), np.zeros((2, 3)), np.empty(len(tree[0]), np.int64)
     counts = np.empty(len(points), np.int64)
     for i in range(len(points)):
-        counts[i] = collect_boxes(members, (order, boxes), points[i], axes, question)
+        counts[i] = _collect_boxes(members, tree, points[i], axes, question)
     point, box, count = np.empty(counts.sum(), np.int64), np.empty(counts.sum(), np.int64), 0
     for i in range(len(points)):
-        for place in range(collect_boxes(members, (order, boxes), points[i], axes, question)):
+        for place in range(_collect_boxes(members, tree, points[i], axes, question)):
             point[count], box[count] = i, members[place]
             count += 1
     return point, box

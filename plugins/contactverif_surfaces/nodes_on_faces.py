@@ -26,11 +26,11 @@ from contactverif_surfaces.cell_points import (
     add_blocks,
     add_rows,
     axes_of,
-    cross_plane,
     differentiate,
     evaluate_shapes,
     first_faces,
     flatten_pushes,
+    plane_areas,
     positions_of,
     unknowns_of,
 )
@@ -51,7 +51,11 @@ class NodesOnFaces:
         edge, reach = np.zeros(interface.n_slave_nodes), REACH * longest_edges(interface.master, x)
         edge[faces] = longest_edges(interface.slave, x)[:, None]
         reach += REACH * edge.max()
-        node, face = find_boxes_at(x[: len(edge)], *grow_tree(_prisms(x[interface.master.faces], reach)))
+        corners = x[interface.master.faces]
+        # The boxes that hold all that a face reaches along its normal, and a little more for feet past the border.
+        more = reach[:, None] * (np.abs(axes_of(corners)[2]) + 2 * PAST_BORDER)
+        prisms = np.stack([corners.min(axis=1) - more, corners.max(axis=1) + more], axis=1)
+        node, face = find_boxes_at(x[: len(edge)], grow_tree(prisms))
         points = _feet(positions_of(x.reshape(-1), _nodes_and_faces(interface, node, face)))
         gap = points.gap[:, 0]
         near = np.abs(gap) <= reach[face] - REACH * (edge.max() - edge[node])
@@ -127,16 +131,6 @@ def _feet(corners: Array) -> CellPoints:
     return CellPoints(shape, whole[..., None], whole, gap, view.normal)
 
 
-def _prisms(corners: FloatArray, reach: FloatArray) -> FloatArray:
-    """Return the boxes (n, 2, 3) that hold all that a face (n, n_corners, 3) reaches along its normal, either way.
-
-    They are a little larger, since a foot may lie past the border by `PAST_BORDER`.
-    """
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    more = reach[:, None] * (np.abs(axes_of(corners)[2]) + 2 * PAST_BORDER)
-    return np.stack([low - more, high + more], axis=1)
-
-
 def _forces(penalty: float, corners: Array) -> Array:
     """Return the residuals (..., n, (n_corners + 1) · 3) of springs with a stiffness, for a unit area."""
     points = _feet(corners)
@@ -146,9 +140,7 @@ def _forces(penalty: float, corners: Array) -> Array:
 def _corner_areas(corners: Array) -> Array:
     """Return the area (..., n_faces, n_corners) of each corner of faces (..., n_faces, n_corners, 3): equal shares."""
     n_corners = corners.shape[-2]
-    plane = SlaveView.of_corners(corners, corners[..., :1, :]).slave
-    arms = plane[..., 1:, :] - plane[..., :1, :]
-    area = cross_plane(arms[..., :-1, :], arms[..., 1:, :]).sum(axis=-1) / 2
+    area = plane_areas(SlaveView.of_corners(corners, corners[..., :1, :]).slave)
     return np.repeat(area[..., None] / n_corners, n_corners, axis=-1)
 
 

@@ -27,9 +27,7 @@ def edges_of(interface: Interface, x: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def cells_by(tree: Tree, interface: Interface, x: FloatArray) -> Cells:
-    return find_face_cells(
-        x, interface.slave.faces, interface.master.faces, *edges_of(interface, x), (tree.order, tree.boxes)
-    )
+    return find_face_cells(x, interface.slave.faces, interface.master.faces, edges_of(interface, x), tree)
 
 
 def everywhere(count: int) -> Tree:
