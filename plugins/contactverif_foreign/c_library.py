@@ -15,13 +15,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contactverif.compiler import compile_kernel
+from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import Handle, Pairing, check_penalty
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
-from contactverif.geometry.projection import PointOnSegment, nearest_segment, node, search_tree
+from contactverif.geometry.projection import PointOnSegment, Tree, nearest_segment, node, search_tree
 from contactverif_foreign.element_pairs import walk_chains
 from contactverif_foreign.shared_library import (
     Argument,
@@ -93,17 +93,6 @@ def _arguments_of(shape: tuple[int, ...], n_props: int, n_decisions: int, *, pai
     return arguments
 
 
-def _whole_interface(interface: Interface) -> list[Views]:
-    arrays = {
-        "slave": interface.slave.segments,
-        "master": interface.master.segments,
-        "slave_neighbours": interface.slave.neighbours,
-        "master_neighbours": interface.master.neighbours,
-    }
-    label: IntArray = np.array([-1])
-    return [Views(label + 1, label, np.arange(interface.n_nodes)[None], interface.n_slave_nodes, arrays)]
-
-
 def find_windows(interface: Interface, x: FloatArray) -> dict[str, IntArray]:
     """Return the slave segments of elements at x (n_nodes, 2), and the master segments that each is shown.
 
@@ -111,8 +100,7 @@ def find_windows(interface: Interface, x: FloatArray) -> dict[str, IntArray]:
     side, in the order of a walk along their chain. If they belong to several chains, there are several elements.
     """
     slave, master = interface.slave, interface.master
-    nearest = np.empty((len(slave), len(_PLACES)), dtype=np.int64)
-    _find_nearest(nearest, x, slave.segments, master.segments, *search_tree(master, x), _PLACES)
+    nearest = _find_nearest(x, slave.segments, master.segments, search_tree(master, x), _PLACES)
     chains = [(segments, is_closed) for segments, _, is_closed in walk_chains(master)]
     chain_of, place_of = np.empty(len(master), dtype=np.int64), np.empty(len(master), dtype=np.int64)
     for number, (segments, _) in enumerate(chains):
@@ -130,29 +118,20 @@ def find_windows(interface: Interface, x: FloatArray) -> dict[str, IntArray]:
             windows.append(segments[_window_on_ring(places[element == number], len(segments))])
         else:
             windows.append(segments[max(first - 1, 0) : last + 2])
-    starts = np.cumsum([0, *map(len, windows)])
-    return {
-        "slave_segment": every // len(chains),
-        "master_segment": np.concatenate(windows),
-        "master_start": starts,
-    }
+    starts, segments = np.cumsum([0, *map(len, windows)]), np.concatenate(windows)
+    return {"slave_segment": every // len(chains), "master_segment": segments, "master_start": starts}
 
 
-@compile_kernel
-def _find_nearest(
-    nearest: IntArray,
-    x: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    order: IntArray,
-    boxes: FloatArray,
-    places: FloatArray,
-) -> None:
-    """Write the nearest master segment of each place on each slave segment."""
+@compile_maker
+def _find_nearest(x: FloatArray, slave: IntArray, master: IntArray, tree: Tree, places: FloatArray) -> IntArray:
+    """Return the nearest master segment of each place on each slave segment."""
+    order, boxes = tree
+    nearest = np.empty((len(slave), len(places)), dtype=np.int64)
     for s in range(len(slave)):
         for i in range(len(places)):
             v = PointOnSegment(node(x, slave[s, 0]), node(x, slave[s, 1]), places[i])
             nearest[s, i] = max(nearest_segment(v, x, master, order, boxes), 0)
+    return nearest
 
 
 def _window_on_ring(places: IntArray, length: int) -> IntArray:
@@ -198,7 +177,6 @@ def segment_views(interface: Interface, pairing: Any) -> list[Views]:
 
 
 def _hide(neighbours: IntArray) -> IntArray:
-    """Return −1 for a free end and −2 for a neighbour outside of the element."""
     hidden: IntArray = np.where(neighbours < 0, -1, OUTSIDE)
     return hidden
 
@@ -259,7 +237,13 @@ class LibraryForces:
         return forces
 
     def _views(self, interface: Interface, windows: Mapping[str, Any]) -> list[Views]:
-        return segment_views(interface, windows) if self.elements == "segment" else _whole_interface(interface)
+        if self.elements == "segment":
+            return segment_views(interface, windows)
+        label: IntArray = np.array([-1])
+        sides = {"slave": interface.slave, "master": interface.master}
+        arrays = {name: side.segments for name, side in sides.items()}
+        arrays |= {f"{name}_neighbours": side.neighbours for name, side in sides.items()}
+        return [Views(label + 1, label, np.arange(interface.n_nodes)[None], interface.n_slave_nodes, arrays)]
 
     def _groups(self, interface: Interface, pairing: Pairing) -> list[tuple[Views, IntArray]]:
         """Return elements with as many nodes and decisions together, and their decisions (n, n_decisions)."""
@@ -382,7 +366,6 @@ def c(
 
 @lru_cache(maxsize=16)  # A formulation is made anew for the penalty of each case.
 def _load_functions(path: Path) -> _Functions:
-    """Return the functions of a library of this version."""
     library = load_library(path)
     version = find_function(library, path, "cv_version")()
     if version != VERSION:

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.compiler import compile_kernel
+from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, Surface
 from contactverif.geometry.projection import (
     PointOnSegment,
+    Tree,
     arm,
     dot,
     foot_on_surface,
@@ -42,38 +43,32 @@ def pair_nodes(interface: Interface, x: FloatArray, tau: float) -> list[Elements
 
     A slave node gets its nearest closed master segment. Its foot may lie past a free end by τ × the segment's length.
     """
-    master, n_slave = interface.master, interface.n_slave_nodes
-    nearest, is_over = np.empty(n_slave, dtype=np.int64), np.empty(n_slave, dtype=np.bool_)
-    _find_segments(nearest, is_over, x, master.segments, master.neighbours, *search_tree(master, x), tau)
+    master, areas = interface.master, np.zeros(interface.n_slave_nodes)
+    nearest, is_over = _find_segments(x, len(areas), master.segments, master.neighbours, search_tree(master, x), tau)
     lengths = np.repeat(interface.slave.lengths(interface.nodes) / 2, 2)
-    areas = np.zeros(n_slave)
     np.add.at(areas, interface.slave.segments.ravel(), lengths)
     number = np.flatnonzero(is_over)
     nodes = np.column_stack([number, master.segments[nearest[number]]])
     return [Elements(number, nodes, areas[number], (1, 2, 0, 0))]
 
 
-@compile_kernel
+@compile_maker
 def _find_segments(
-    nearest: IntArray,
-    is_over: BoolArray,
-    x: FloatArray,
-    master: IntArray,
-    neighbours: IntArray,
-    order: IntArray,
-    boxes: FloatArray,
-    tau: float,
-) -> None:
-    """Write the nearest master segment of each slave node, and whether the foot is on the surface."""
-    for i in range(len(nearest)):
+    x: FloatArray, n_nodes: int, master: IntArray, neighbours: IntArray, tree: Tree, tau: float
+) -> tuple[IntArray, BoolArray]:
+    """Return the nearest master segment of each slave node, and whether the foot is on the surface."""
+    order, boxes = tree
+    nearest, is_over = np.empty(n_nodes, dtype=np.int64), np.zeros(n_nodes, dtype=np.bool_)
+    for i in range(n_nodes):
         v = PointOnSegment(node(x, i), node(x, i), -1.0)
         m = nearest_segment(v, x, master, order, boxes)
-        nearest[i], is_over[i] = m, False
+        nearest[i] = m
         if m >= 0:
             x_1 = node(x, master[m, 0])
             length, t, _ = frame(x_1, node(x, master[m, 1]))
             s = dot(arm(x_1, v), t)
             is_over[i] = foot_on_surface(s, length, neighbours[m, 0] < 0, neighbours[m, 1] < 0, tau)
+    return nearest, is_over
 
 
 def pair_segments(interface: Interface, x: FloatArray, tau: float) -> list[Elements]:
@@ -113,8 +108,8 @@ def pair_chains(interface: Interface, x: FloatArray, tau: float) -> list[Element
     An element has all nodes of both chains, each in the order of a walk along its chain.
     """
     master, slave = interface.master, interface.slave
-    nearest, is_over = np.empty(interface.n_slave_nodes, dtype=np.int64), np.empty(interface.n_slave_nodes, np.bool_)
-    _find_segments(nearest, is_over, x, master.segments, master.neighbours, *search_tree(master, x), tau)
+    arrays = master.segments, master.neighbours, search_tree(master, x)
+    nearest, _ = _find_segments(x, interface.n_slave_nodes, *arrays, tau)
     lengths, masters = slave.lengths(interface.nodes), walk_chains(master)
     chain_of = np.empty(len(master), dtype=np.int64)
     for number, (segments, _, _) in enumerate(masters):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import isfinite
@@ -32,17 +32,14 @@ _FORBIDDEN = ("batched", "takes_complex", "takes_longdouble")  # A library takes
 _PROJECT = "pyproject.toml"
 _GUARD = np.uint64(0x7FF8C0DEC0DEC0DE)  # Not a number, so what reads it shows.
 _LEAST_GUARD = 8  # Words around an array.
-_DTYPES: dict[str, np.dtype[Any]] = {"real": np.dtype(np.float64), "integer": np.dtype(np.int32)}
 
 
-def find_file(file: str, needed: str = "a shared library, such as gcc -shared or gfortran -shared makes") -> Path:
-    """Return the absolute path of a file; a relative one is looked for in the working folder."""
-    path = Path(file).expanduser()
-    if not path.is_absolute():
-        path = Path.cwd() / path
+def find_file(file: str) -> Path:
+    """Return the absolute path of a shared library; a relative one is looked for in the working folder."""
+    path = Path.cwd() / Path(file).expanduser()
     if not path.is_file():
-        kind = "a folder" if path.is_dir() else "no such file"
-        raise MisuseError("option file", f"{kind}: {path}", needed)
+        found = f"{'a folder' if path.is_dir() else 'no such file'}: {path}"
+        raise MisuseError("option file", found, "a shared library, such as gcc -shared or gfortran -shared makes")
     return path
 
 
@@ -93,34 +90,29 @@ def traits_beside(library: Path, file: str = "") -> Traits:
     Beside `LIBRARY.so` the file `LIBRARY.toml` counts. Without it the table `[tool.contactverif.traits.LIBRARY]`
     counts, of the `pyproject.toml` in the library's folder or in the nearest one above it.
     """
-    if file:
-        path = Path.cwd() / Path(file).expanduser()
-        return parse_traits(_read(path), str(path))
-    beside = library.with_suffix(".toml")
-    if beside.is_file():
-        return parse_traits(_read(beside), str(beside))
+    beside = Path.cwd() / Path(file).expanduser() if file else library.with_suffix(".toml")
+    if file or beside.is_file():
+        return parse_traits_text(_read(beside), str(beside))
     project = next((folder / _PROJECT for folder in library.parents if (folder / _PROJECT).is_file()), None)
     if project is not None:
-        tables = _read(project).get("tool", {}).get("contactverif", {}).get("traits", {})
+        tables = _parse(_read(project), str(project)).get("tool", {}).get("contactverif", {}).get("traits", {})
         if isinstance(tables, dict) and library.stem in tables:
-            return parse_traits(tables[library.stem], f"[tool.contactverif.traits.{library.stem}] of {project}")
+            return _to_traits(tables[library.stem], f"[tool.contactverif.traits.{library.stem}] of {project}")
     return Traits()
 
 
 def parse_traits_text(text: str, place: str) -> Traits:
-    """Return the traits of a text of TOML."""
-    return parse_traits(_parse(text, place), place)
-
-
-def parse_traits(table: Any, place: str) -> Traits:
-    """Return the traits of a table at a place; those that it does not name promise nothing.
+    """Return the traits of a text of TOML; those that it does not name promise nothing.
 
     Examples
     --------
-    >>> table = {"rules": {"penalty": "nodal"}, "promises": {"symmetric": True, "patch": {"flat": None}}}
-    >>> parse_traits(table, "a table").promises.symmetric
+    >>> parse_traits_text("symmetric = true", "a text").promises.symmetric
     True
     """
+    return _to_traits(_parse(text, place), place)
+
+
+def _to_traits(table: Any, place: str) -> Traits:
     if not isinstance(table, dict):
         raise MisuseError(place, f"a {type(table).__name__}", "a table of traits")
     values = dict(_flatten(table))
@@ -143,16 +135,14 @@ def _flatten(table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
-def _read(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file."""
+def _read(path: Path) -> str:
     try:
-        return _parse(path.read_text(encoding="utf-8"), str(path))
+        return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(str(path), " ".join(str(error).split()), "a TOML file with traits") from None
 
 
 def _parse(text: str, place: str) -> dict[str, Any]:
-    """Return the tables of a text of TOML."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -173,6 +163,15 @@ class Argument:
         """The number of values."""
         return int(np.prod(self.shape, dtype=np.int64))
 
+    @property
+    def n_halves(self) -> int:
+        """The number of half words that a value takes."""
+        return 1 if self.kind == "integer" else 2
+
+    def values(self, halves: Array) -> Array:
+        """Return half words (…, n) as numbers of this argument."""
+        return halves if self.kind == "integer" else halves.view(np.float64)
+
 
 class GuardedSlot:
     """The memory of one call. Scalars share their guards, an array has its own.
@@ -181,60 +180,38 @@ class GuardedSlot:
     """
 
     def __init__(self, arguments: Sequence[Argument], guard: int = _LEAST_GUARD) -> None:
-        self._arguments = {argument.name: argument for argument in arguments}
+        self.arguments = {argument.name: argument for argument in arguments}
         self.spans: dict[str, slice] = {}  # The halves of words in a row that the values of each argument take.
         guard, place, is_behind_scalar = 2 * max(guard, _LEAST_GUARD), 0, False
         for argument in sorted(arguments, key=lambda argument: bool(argument.shape)):
             if argument.shape or not is_behind_scalar:
                 place += guard
             is_behind_scalar = not argument.shape
-            n_halves = argument.size * _DTYPES[argument.kind].itemsize // 4
+            n_halves = argument.size * argument.n_halves
             self.spans[argument.name] = slice(place, place + n_halves)
             place += n_halves + n_halves % 2
-        self._empty = np.full((place + guard) // 2, _GUARD)
+        self.empty = np.full((place + guard) // 2, _GUARD)
+        self.fixed = np.full_like(self.empty, ~np.uint64(0))  # The bits that a call must not change.
         for argument in arguments:
-            self._empty.view(np.int32)[self.spans[argument.name]] = 0
-        self._memory = self._empty.copy()
-        self.addresses = {name: self._memory.ctypes.data + 4 * span.start for name, span in self.spans.items()}
-        self._fixed = np.full_like(self._empty, ~np.uint64(0))  # The bits that a call must not change.
-        for argument in arguments:
+            self.empty.view(np.int32)[self.spans[argument.name]] = 0
             if not argument.is_input:
-                self._fixed.view(np.int32)[self.spans[argument.name]] = 0
+                self.fixed.view(np.int32)[self.spans[argument.name]] = 0
+        self.memory = self.empty.copy()
+        self.addresses = {name: self.memory.ctypes.data + 4 * span.start for name, span in self.spans.items()}
 
-    def preset(self, values: dict[str, Any]) -> None:
+    def preset(self, values: Mapping[str, Any]) -> None:
         """Set arguments that are the same in all calls."""
-        for name, value in values.items():
-            argument = self._arguments[name]
-            view: Array = self._empty.view(np.int32)[self.spans[argument.name]]
-            (view if argument.kind == "integer" else view.view(np.float64))[...] = value
+        SlotRows(self, self.empty[None]).fill(values)
 
     def rows(self, n_rows: int) -> SlotRows:
         """Return the memory of so many calls, zero but for the guards."""
-        return SlotRows(self, np.tile(self._empty, (n_rows, 1)), self._arguments)
+        return SlotRows(self, np.tile(self.empty, (n_rows, 1)))
 
-    def sweep(self, rows: NDArray[np.uint64], function: Callable[..., Any], values: Sequence[Any]) -> list[Any]:
-        """Call the function once for each row, and return what it returned."""
-        memory, answers = self._memory, []
-        for row in rows:
-            memory[:] = row
-            answers.append(function(*values))
-            row[:] = memory
-        return answers
-
-    def find_write(self, before: NDArray[np.uint64], after: NDArray[np.uint64]) -> tuple[int, str] | None:
-        """Return the first row with a guard or an input that changed, and what was written there; None if none has."""
-        changed = before ^ after
-        changed &= self._fixed
-        if not changed.any():
-            return None
-        row, half = np.argwhere(changed.view(np.int32))[0]
-        return int(row), self._describe(int(half))
-
-    def _describe(self, half: int) -> str:
+    def describe(self, half: int) -> str:
         """Return what lies at a half of a word: an input, or what is before or behind an array."""
         name, span = min(self.spans.items(), key=lambda item: max(item[1].start - half, half - item[1].stop + 1, 0))
-        argument = self._arguments[name]
-        number = (half - span.start) * 4 // _DTYPES[argument.kind].itemsize + 1
+        argument = self.arguments[name]
+        number = (half - span.start) // argument.n_halves + 1
         if span.start <= half < span.stop:
             return f"the input {name}{f', number {number} of {argument.size}' if argument.shape else ''}"
         if half < span.start:
@@ -246,16 +223,14 @@ class GuardedSlot:
 class SlotRows:
     """The memory of a sweep: for each element a row, of which the arguments are views."""
 
-    def __init__(self, slot: GuardedSlot, memory: NDArray[np.uint64], arguments: dict[str, Argument]) -> None:
-        self._slot, self._memory, self._arguments = slot, memory, arguments
+    def __init__(self, slot: GuardedSlot, memory: NDArray[np.uint64]) -> None:
+        self._slot, self._memory = slot, memory
 
     def __getitem__(self, name: str) -> Array:
         """Return the values (n_rows, size) of an argument, which may be written."""
-        argument = self._arguments[name]
-        view: Array = self._memory.view(np.int32)[:, self._slot.spans[name]]
-        return view if argument.kind == "integer" else view.view(np.float64)
+        return self._slot.arguments[name].values(self._memory.view(np.int32)[:, self._slot.spans[name]])
 
-    def fill(self, values: dict[str, Any]) -> None:
+    def fill(self, values: Mapping[str, Any]) -> None:
         """Write the values of arguments: scalars, arrays (size,) for all rows, or arrays (n_rows, size)."""
         for name, value in values.items():
             self[name][...] = value
@@ -264,9 +239,14 @@ class SlotRows:
         self, function: Callable[..., Any], values: Sequence[Any], describe_row: Callable[[int], str]
     ) -> list[Any]:
         """Call the function once for each row, and return what it returned; refuse a guard or an input that changed."""
-        before = self._memory.copy()
-        answers = self._slot.sweep(self._memory, function, values)
-        if (write := self._slot.find_write(before, self._memory)) is not None:
-            row, place = write
-            raise ContractError(f"{describe_row(row)}: wrote to {place}; needed no write there")
+        slot, before, answers = self._slot, self._memory.copy(), []
+        for row in self._memory:
+            slot.memory[:] = row
+            answers.append(function(*values))
+            row[:] = slot.memory
+        before ^= self._memory
+        before &= slot.fixed
+        if before.any():  # Bits changed that are fixed.
+            number, half = np.argwhere(before.view(np.int32))[0].tolist()
+            raise ContractError(f"{describe_row(number)}: wrote to {slot.describe(half)}; needed no write there")
         return answers

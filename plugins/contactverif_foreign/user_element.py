@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import ctypes
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy import sparse
@@ -72,27 +72,22 @@ class Routine:
     library: ctypes.CDLL
     function: Any
     state_variables: int
-    slots: dict[tuple[int, int], tuple[GuardedSlot, list[Any]]] = field(default_factory=dict)
+    slots: dict[tuple[int, int], GuardedSlot] = field(default_factory=dict)
 
-    def slot(self, n_nodes: int, n_properties: int) -> tuple[GuardedSlot, list[Any]]:
-        """Return the memory of a call for elements of so many nodes, and the arguments of the call."""
-        key = n_nodes, n_properties
+    def slot(self, n_nodes: int, n_properties: int) -> GuardedSlot:
+        """Return the memory of a call for elements of so many nodes."""
+        key, numbers, convention = (
+            (n_nodes, n_properties),
+            (n_nodes, n_properties, self.state_variables),
+            self.convention,
+        )
         if key not in self.slots:
-            numbers = n_nodes, n_properties, self.state_variables
-            convention, shapes = self.convention, self.convention.shapes(*numbers)
-            arguments = [
-                Argument(
-                    name,
-                    shapes.get(name, ()),
-                    "integer" if name in convention.integers else "real",
-                    name not in convention.outputs,
-                )
-                for name in convention.order
-            ]
-            slot = GuardedSlot(arguments, 2 * n_nodes)
-            slot.preset(convention.constants(*numbers))
-            values = [ctypes.c_void_p(slot.addresses[name]) for name in convention.order]
-            self.slots[key] = slot, values
+            shapes, arguments = convention.shapes(*numbers), []
+            for name in convention.order:
+                kind: Literal["integer", "real"] = "integer" if name in convention.integers else "real"
+                arguments.append(Argument(name, shapes.get(name, ()), kind, name not in convention.outputs))
+            self.slots[key] = GuardedSlot(arguments, 2 * n_nodes)
+            self.slots[key].preset(convention.constants(*numbers))
         return self.slots[key]
 
 
@@ -133,7 +128,8 @@ class UserElement:
         convention, size = self.routine.convention, 2 * elements.nodes.shape[1]
         properties = np.empty((len(elements.nodes), 2 + len(self.properties)))
         properties[:, 0], properties[:, 1], properties[:, 2:] = self.penalty, elements.lengths, self.properties
-        slot, values = self.routine.slot(elements.nodes.shape[1], properties.shape[1])
+        slot = self.routine.slot(elements.nodes.shape[1], properties.shape[1])
+        values = [ctypes.c_void_p(slot.addresses[name]) for name in convention.order]
         rows = slot.rows(len(elements.nodes))
         rows.fill(convention.fill(elements, reference[elements.nodes], displacements[elements.nodes], properties))
 
@@ -172,10 +168,9 @@ def assemble(
     return total, sparse.coo_array((np.concatenate(entries), places), shape=(size, size)).tocsr()
 
 
-def load_element(
+def _load_element(
     convention: Convention,
-    names: Sequence[str],
-    *,
+    name: str,
     penalty: float,
     file: str,
     nodes: int | str,
@@ -184,14 +179,13 @@ def load_element(
     traits: str,
     tau: float,
 ) -> UserElement:
-    """Return the formulation of a user element that a library has under one of these names, its options checked."""
     check_penalty(penalty)
     check_tau(tau)
     check_count(svars, "svars", 0)
     if isinstance(nodes, bool) or nodes not in RULES:
         raise MisuseError("option nodes", repr(nodes), f"one of {', '.join(map(str, RULES))}")
     path = find_file(file)
-    routine = _load_routine(convention, path, tuple(names), svars)
+    routine = _load_routine(convention, path, fortran_names(name), svars)
     properties = parse_numbers("option props", props)
     return UserElement(_read_traits(path, traits), float(penalty), routine, nodes, properties, tau)
 
@@ -202,7 +196,6 @@ _read_traits = lru_cache(maxsize=16)(traits_beside)
 
 @lru_cache(maxsize=16)
 def _load_routine(convention: Convention, path: Path, names: tuple[str, ...], state_variables: int) -> Routine:
-    """Return the subroutine of a library, with its memory."""
     library = load_library(path)
     function = find_function(library, path, *names)
     function.restype = None
@@ -224,26 +217,11 @@ _UEL_FLAGS = (1, 1, 1, 0, 0)  # Static analysis, large displacements, forces and
 
 def _uel_shapes(n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
     size = 2 * n_nodes
-    return {
-        "RHS": (size, 1),
-        "AMATRX": (size, size),
-        "SVARS": (n_state,),
-        "ENERGY": (8,),
-        "PROPS": (n_properties,),
-        "COORDS": (2, n_nodes),
-        "U": (size,),
-        "DU": (size, 1),
-        "V": (size,),
-        "A": (size,),
-        "TIME": (2,),
-        "PARAMS": (3,),
-        "JDLTYP": (1, 1),
-        "ADLMAG": (1, 1),
-        "PREDEF": (2, 1, n_nodes),
-        "LFLAGS": (len(_UEL_FLAGS),),
-        "DDLMAG": (1, 1),
-        "JPROPS": (4,),
-    }
+    vectors = dict.fromkeys(("U", "V", "A"), (size,)) | dict.fromkeys(("RHS", "DU"), (size, 1))
+    matrices = {"AMATRX": (size, size), "COORDS": (2, n_nodes), "PREDEF": (2, 1, n_nodes)}
+    loads = dict.fromkeys(("JDLTYP", "ADLMAG", "DDLMAG"), (1, 1))
+    sizes = {"SVARS": n_state, "ENERGY": 8, "PROPS": n_properties, "TIME": 2, "PARAMS": 3, "JPROPS": 4}
+    return vectors | matrices | loads | {"LFLAGS": (len(_UEL_FLAGS),)} | {name: (n,) for name, n in sizes.items()}
 
 
 def _uel_constants(n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
@@ -320,17 +298,7 @@ def uel(
     tau : float
         The part of a master segment by which a foot may lie past its free end and still count.
     """
-    return load_element(
-        _UEL,
-        fortran_names("uel"),
-        penalty=penalty,
-        file=file,
-        nodes=nodes,
-        svars=svars,
-        props=props,
-        traits=traits,
-        tau=tau,
-    )
+    return _load_element(_UEL, "uel", penalty, file, nodes, svars, props, traits, tau)
 
 
 _FEAP_ORDER = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
@@ -422,14 +390,4 @@ def feap(
     """
     if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MOST_ELEMENTS:
         raise MisuseError("option number", repr(number), f"a whole number from 1 to {_MOST_ELEMENTS}")
-    return load_element(
-        _FEAP,
-        fortran_names(f"elmt{number:02d}"),
-        penalty=penalty,
-        file=file,
-        nodes=nodes,
-        svars=0,
-        props=props,
-        traits=traits,
-        tau=tau,
-    )
+    return _load_element(_FEAP, f"elmt{number:02d}", penalty, file, nodes, 0, props, traits, tau)
