@@ -101,7 +101,6 @@ def from_residual(residual: Element, *, pair: Pair, traits: Traits | None = None
 
 
 def _set_up_jax() -> Any:
-    """Import JAX, with double precision and one thread."""
     if _ONE_THREAD not in os.environ.get("XLA_FLAGS", ""):  # JAX reads it when it computes for the first time.
         os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_ONE_THREAD}".strip()
     os.environ.setdefault("NPROC", "1")  # The size of its pool of threads.
@@ -115,7 +114,6 @@ def _set_up_jax() -> Any:
 
 
 def _factory(jax: Any, forces: Element, pair: Pair, traits: Traits | None) -> Callable[..., JaxFormulation]:
-    """Return the factory of the formulations whose elements have these forces."""
     traits = traits or Traits()
     if traits.abilities != Abilities(dimensions=traits.abilities.dimensions):
         raise MisuseError("traits", f"{traits.abilities}", _NEEDED_ABILITIES)
@@ -165,7 +163,6 @@ class JaxFormulation:
         return sparse.coo_array((entries.reshape(-1), places), shape=(z.size, z.size)).tocsr()
 
     def _evaluate(self, function: Element, interface: Interface, pairing: Pairing, z: FloatArray) -> FloatArray:
-        """Return what the function makes of each element, with the elements as the first axis."""
         n_elements = len(pairing["nodes"])
         if n_elements == 0:
             return np.empty(0)

@@ -168,7 +168,6 @@ def compile_stored(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def _usual_files(function: Callable[..., Any], files: Any) -> tuple[CheckedFiles, ...]:
-    """Return the files of a kernel beside its source and in the user's cache."""
     base, stamp = files._index_name.removesuffix(".nbi"), files._source_stamp
     names = ("InTreeCacheLocator", "UserWideCacheLocator")  # Old versions of numba have `_` before them.
     kinds = [getattr(caching, name, None) or getattr(caching, f"_{name}") for name in names]

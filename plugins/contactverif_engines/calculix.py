@@ -134,7 +134,6 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
 
 
 def _elements_and_surfaces(layer: Layer) -> list[str]:
-    """Return the lines of the elements of each body, and of the faces of both surfaces."""
     lines, number, faces = [], 1, dict[frozenset[int], tuple[int, int]]()
     for cells, bodies in layer.solids:
         corners = cells.shape[1]
@@ -152,7 +151,6 @@ def _elements_and_surfaces(layer: Layer) -> list[str]:
 
 
 def _materials(layer: Layer) -> list[str]:
-    """Return the lines of the material of each body."""
     lines = []
     for body, (young, poisson) in enumerate(layer.plane.materials):
         lines += [f"*MATERIAL, NAME=M{body}", "*ELASTIC", f"{_number(young)}, {_number(poisson)}"]
@@ -173,7 +171,6 @@ def _springs_across(layer: Layer) -> list[str]:
 
 
 def _supports_and_loads(layer: Layer, kind: Kind) -> list[str]:
-    """Return the lines of all imposed displacements, those across the layer among them, and of the loads."""
     sprung = set(np.unique(layer.slave).tolist()) if kind in ("mortar", "linmortar") else set[int]()
     lines = ["*BOUNDARY", *(f"{node + 1}, 3, 3" for node in range(len(layer.nodes)) if node not in sprung)]
     for node, part in np.argwhere(layer.fixed).tolist():
@@ -184,7 +181,6 @@ def _supports_and_loads(layer: Layer, kind: Kind) -> list[str]:
 
 
 def _turned_nodes(layer: Layer) -> list[str]:
-    """Return the lines that give the nodes of inclined bodies axes of their own."""
     lines: list[str] = []
     turned = np.flatnonzero((layer.frames != np.eye(2)).any(axis=(1, 2)))
     axes, groups = np.unique(layer.frames[turned].reshape(-1, 4), axis=0, return_inverse=True)
@@ -219,7 +215,6 @@ def read_displacements(text: str, n_nodes: int) -> tuple[FloatArray, float]:
 
 
 def _complaint(text: str) -> str:
-    """Return the line in which ccx says what went wrong."""
     lines = [line.strip() for line in text.splitlines()]
     wrong = next((i for i, line in enumerate(lines) if "*ERROR" in line), None)
     return " ".join(lines[wrong : wrong + 2]) if wrong is not None else (lines or ["no words"])[-1]

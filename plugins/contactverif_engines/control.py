@@ -118,7 +118,6 @@ def assemble(scene: SceneArrays) -> sparse.csr_array:
 
 
 def _one_body(scene: SceneArrays, cells: Any, young: float, poisson: float) -> sparse.csr_array:
-    """Return the stiffness of some cells of one material, in global axes."""
     from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri, asm
     from skfem.models.elasticity import lame_parameters, linear_elasticity
 

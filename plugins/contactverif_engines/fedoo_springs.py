@@ -85,7 +85,6 @@ class Fedoo:
 
 
 def _make_bodies(fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
-    """Return an assembly of each body and kind of cells, all of them on the same nodes."""
     assemblies = []
     for body, material in enumerate(plane.materials):
         for kind, (cells, bodies) in zip(("tri3", "quad4"), plane.cells, strict=True):
@@ -98,7 +97,6 @@ def _make_bodies(fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
 
 
 def _add_supports_and_loads(problem: Any, plane: PlaneScene) -> None:
-    """Add what is held, moved and loaded."""
     for axis, name in enumerate(_AXES):
         if (supported := np.flatnonzero(plane.fixed[:, axis])).size:
             problem.bc.add("Dirichlet", supported, name, plane.imposed[supported, axis])
@@ -107,6 +105,5 @@ def _add_supports_and_loads(problem: Any, plane: PlaneScene) -> None:
 
 
 def _lengths(scene: SceneArrays, edges: IntArray) -> FloatArray:
-    """Return the lengths of edges."""
     lengths: FloatArray = np.linalg.norm(np.diff(scene.nodes[edges], axis=1)[:, 0], axis=1)
     return lengths

@@ -70,7 +70,6 @@ class GetFEM:
         return EngineAnswer(moves[: len(scene.nodes)].copy(), converged, n_steps, message)
 
     def _add_contact(self, model: Any, slave: _Side, scene: SceneArrays) -> None:
-        """Add the brick of contact."""
         import getfem as gf
 
         if self.kind == "penalty":
@@ -122,7 +121,6 @@ class _Side:
         self.node_numbers = np.flatnonzero(self.unknowns[:, 0] >= 0)
 
     def _set_regions(self, faces: list[tuple[int, set[int]]]) -> None:
-        """Set the region of each body, and that of the contact faces."""
         for body, numbers in self.bodies.items():
             self.mesh.set_region(body + 1, np.array([numbers, [-1] * len(numbers)]))
         of_shape = {3: _corners_of_faces("GT_PK(2,1)"), 4: _corners_of_faces("GT_QK(2,1)")}
@@ -179,7 +177,6 @@ def _augmentation(scene: SceneArrays) -> float:
 
 
 def _corners_of_faces(shape: str) -> list[set[int]]:
-    """Return the corners of each face of a cell, as GetFEM numbers both."""
     return [{1, 2}, {0, 2}, {0, 1}] if "PK" in shape else [{1, 3}, {0, 2}, {2, 3}, {0, 1}]
 
 

@@ -99,7 +99,6 @@ class Kratos:
         return EngineAnswer(moves, converged, iterations, message, pressures=pressures)
 
     def _settings(self, scene: SceneArrays) -> dict[str, Any]:
-        """Return the parameters of the analysis."""
         module, name, mortar = _PROCESSES[self.kind]
         contact: dict[str, Any] = {
             "model_part_name": "Structure",
@@ -160,7 +159,6 @@ def _roundoff(scene: SceneArrays, kind: str) -> float:
 
 @contextmanager
 def _working_in(folder: str) -> Iterator[None]:
-    """Open a block in which this process works in a folder."""
     before = os.getcwd()
     os.chdir(folder)
     try:
@@ -190,7 +188,6 @@ def write_model(plane: PlaneScene) -> list[str]:
 
 
 def _elements(plane: PlaneScene) -> tuple[list[str], list[str]]:
-    """Return the lines of all elements, and those of a part for each body."""
     lines, parts, first = list[str](), list[str](), 1
     for body in range(len(plane.scene.axes)):
         begin, corners = first, list[Any]()
@@ -210,7 +207,6 @@ def _words(numbers: Any) -> str:
 
 
 def _part(name: str, nodes: Sequence[int], elements: Sequence[int], conditions: Sequence[int]) -> list[str]:
-    """Return the lines of a part of the model."""
     lines = [f"Begin SubModelPart {name}"]
     for kind, numbers in (("Nodes", nodes), ("Elements", elements), ("Conditions", conditions)):
         lines += [f"Begin SubModelPart{kind}", *map(str, numbers), f"End SubModelPart{kind}"]
@@ -218,7 +214,6 @@ def _part(name: str, nodes: Sequence[int], elements: Sequence[int], conditions: 
 
 
 def _materials(plane: PlaneScene) -> dict[str, Any]:
-    """Return the material of each body."""
     materials = []
     for body, (young, poisson) in enumerate(plane.materials):
         values = {"YOUNG_MODULUS": young, "POISSON_RATIO": poisson}

@@ -78,7 +78,6 @@ class NGSolve:
 
 
 def _make_mesh(plane: PlaneScene) -> Any:
-    """Return a mesh, whose domains are the bodies and whose boundaries have names."""
     import ngsolve as ng
     from netgen.meshing import Element1D, Element2D, FaceDescriptor, MeshPoint, Pnt
     from netgen.meshing import Mesh as NetgenMesh

@@ -54,7 +54,7 @@ class OpenSees:
 
     def _add_contact(self, ops: Any, plane: PlaneScene) -> None:
         """Add an element for each pair of a slave's and a master's chain of edges."""
-        scene, number = plane.scene, len(plane.triangles) + len(plane.quads)
+        scene, number = plane.scene, sum(len(cells) for cells, _ in plane.cells)
 
         def mean_length(chain: list[int]) -> float:
             return float(np.linalg.norm(np.diff(scene.nodes[chain], axis=0), axis=1).mean())
@@ -83,7 +83,6 @@ def find_chains(edges: IntArray) -> list[list[int]]:
 
 
 def _add_bodies(ops: Any, plane: PlaneScene) -> None:
-    """Add all nodes, materials and elements."""
     for number, (x, y) in enumerate(plane.nodes.tolist(), start=1):
         ops.node(number, x, y)
     for body, material in enumerate(plane.materials, start=1):
@@ -96,7 +95,6 @@ def _add_bodies(ops: Any, plane: PlaneScene) -> None:
 
 
 def _add_supports_and_loads(ops: Any, plane: PlaneScene) -> None:
-    """Add what is held, moved and loaded."""
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     supports = plane.fixed & (plane.imposed == 0)
@@ -117,7 +115,6 @@ def _choose_handler(plane: PlaneScene) -> str:
 
 
 def _run(ops: Any, tolerance: float, handler: str) -> tuple[bool, int]:
-    """Solve a static step, and return whether it converged, and the number of its iterations."""
     ops.constraints(handler)
     ops.numberer("RCM")
     ops.system("UmfPack")

@@ -19,20 +19,13 @@ class PlaneScene:
 
     scene: SceneArrays
     nodes: FloatArray  # (n, 2)
-    triangles: IntArray  # (n_triangles, 3), counter-clockwise.
-    quads: IntArray  # (n_quads, 4), counter-clockwise.
-    body_of_triangle: IntArray
-    body_of_quad: IntArray
+    # Triangles (n, 3), then quadrilaterals (n, 4), counter-clockwise, each kind with the body of each cell.
+    cells: tuple[tuple[IntArray, IntArray], ...]
     frames: FloatArray  # (n, 2, 2): from the axes of each node's body to the global ones.
     fixed: BoolArray  # (n, 2), in the axes of the body.
     imposed: FloatArray  # (n, 2)
     load: FloatArray  # (n, 2)
     start: FloatArray  # (n, 2), a first guess of the displacements, in global axes.
-
-    @property
-    def cells(self) -> tuple[tuple[IntArray, IntArray], ...]:
-        """The triangles, then the quadrilaterals, each kind with the body of each cell."""
-        return (self.triangles, self.body_of_triangle), (self.quads, self.body_of_quad)
 
     @property
     def materials(self) -> list[tuple[float, float]]:
@@ -67,10 +60,7 @@ def make_plane(scene: SceneArrays) -> PlaneScene:
     return PlaneScene(
         scene,
         np.vstack(nodes),
-        corners[is_triangle, :3],
-        corners[~is_triangle],
-        body[is_triangle],
-        body[~is_triangle],
+        ((corners[is_triangle, :3], body[is_triangle]), (corners[~is_triangle], body[~is_triangle])),
         np.vstack(frames),
         np.vstack(fixed),
         np.vstack(imposed),

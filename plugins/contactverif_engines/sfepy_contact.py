@@ -110,7 +110,6 @@ class _Model:
         return Conditions(conditions)
 
     def _make_region(self, kind: str, numbers: IntArray, name: str) -> Any:
-        """Return the region of some vertices, facets or cells."""
         from sfepy.discrete.common.region import Region
 
         make = {"vertex": Region.from_vertices, "facet": Region.from_facets, "cell": Region.from_cells}[kind]
@@ -120,7 +119,6 @@ class _Model:
         return region
 
     def _contact_edges(self) -> IntArray:
-        """Return the numbers of the contact edges of both sides."""
         ends = self.domain.cmesh.get_conn(1, 0).indices.reshape(-1, 2).tolist()
         number = {frozenset(pair): index for index, pair in enumerate(ends)}
         edges = np.vstack([self.plane.scene.slave, self.plane.scene.master]).tolist()

@@ -75,7 +75,6 @@ class Views:
 
 
 def _arguments_of(shape: tuple[int, ...], n_props: int, n_decisions: int, *, pairs: bool) -> list[Argument]:
-    """Return the arguments of a call: those of `cv_pair`, or of `cv_element`."""
     n_slave, n_master, n_slave_segments, n_master_segments = shape
     n_nodes, size = n_slave + n_master, 2 * (n_slave + n_master)
     arguments = [
@@ -124,7 +123,6 @@ def find_windows(interface: Interface, x: FloatArray) -> dict[str, IntArray]:
 
 @compile_maker
 def _find_nearest(x: FloatArray, slave: IntArray, master: IntArray, tree: Tree, places: FloatArray) -> IntArray:
-    """Return the nearest master segment of each place on each slave segment."""
     order, boxes = tree
     nearest = np.empty((len(slave), len(places)), dtype=np.int64)
     for s in range(len(slave)):
@@ -260,7 +258,6 @@ class LibraryForces:
         return groups
 
     def _rows(self, slot: GuardedSlot, interface: Interface, views: Views, x: FloatArray) -> SlotRows:
-        """Return the memory of a sweep over elements, with all that they are shown."""
         n_elements = len(views.nodes)
         rows = slot.rows(n_elements)
         content = {"reference": interface.nodes[views.nodes], "x": x[views.nodes], **views.arrays}
@@ -292,7 +289,6 @@ class LibraryForces:
     def _call(
         self, interface: Interface, views: Views, decisions: IntArray, x: FloatArray, *, with_tangent: bool
     ) -> SlotRows:
-        """Call `cv_element` for each element, and return its memory with the answers."""
         slot = self.functions.slot(views.shape, len(self.props), decisions.shape[1], pairs=False)
         rows = self._rows(slot, interface, views, x)
         rows.fill({"decisions": decisions})

@@ -56,7 +56,6 @@ def pair_nodes(interface: Interface, x: FloatArray, tau: float) -> list[Elements
 def _find_segments(
     x: FloatArray, n_nodes: int, master: IntArray, neighbours: IntArray, tree: Tree, tau: float
 ) -> tuple[IntArray, BoolArray]:
-    """Return the nearest master segment of each slave node, and whether the foot is on the surface."""
     order, boxes = tree
     nearest, is_over = np.empty(n_nodes, dtype=np.int64), np.zeros(n_nodes, dtype=np.bool_)
     for i in range(n_nodes):

@@ -66,7 +66,6 @@ class IpcBarrier:
         return self._ipctk.BarrierPotential(self._range(interface), self.penalty, True)
 
     def _range(self, interface: Interface) -> float:
-        """Return the activation distance d̂."""
         sides = interface.slave, interface.master
         return self.activation * min(float(side.lengths(interface.nodes).min()) for side in sides)
 
@@ -97,5 +96,4 @@ def ipctk(*, penalty: float, kind: str, activation: float = 0.5, areas: bool = T
 
 
 def _vertices(z: FloatArray) -> Any:
-    """Return the positions (n_nodes, 2) as the library reads them."""
     return np.asfortranarray(z.reshape(-1, 2))

@@ -59,7 +59,6 @@ class OpenSeesContact:
         return tangent
 
     def _build(self, interface: Interface, z: FloatArray) -> list[tuple[int, IntArray]]:
-        """Build the model at a state; return the tag of each element and the numbers of its unknowns."""
         self._ops.wipe()
         self._ops.model("basic", "-ndm", 2, "-ndf", 2)
         for number, place in enumerate(z.reshape(-1, 2).tolist()):

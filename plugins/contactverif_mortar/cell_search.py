@@ -181,7 +181,6 @@ def _find_candidates(
 
 @compile_inline
 def _hides(table: FloatArray, count: int, depth: float) -> bool:
-    """Return whether the candidates that lie no deeper than `depth` leave no part of the slave segment open."""
     reached = -1.0
     for i in range(count):
         if table[i, DEPTH] <= depth:

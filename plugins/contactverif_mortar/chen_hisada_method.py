@@ -104,7 +104,6 @@ class ChenHisada:
         return report_points(interface, cells, points, z, pressure, active)
 
     def _node_pressures(self, interface: Interface, pairing: Pairing, x: Array) -> Array:
-        """Return pressures (n_states, n_slave_nodes) at positions x (n_states, n_nodes, 2)."""
         gaps = _node_gaps(x, interface.master.segments, pairing["nearest"])
         return np.where(pairing["active"], -self.penalty * gaps, 0.0)
 
@@ -155,7 +154,6 @@ def _pair_nodes(
 
 @compile_maker
 def _node_gaps(x: Array, master: IntArray, nearest: IntArray) -> Array:
-    """Return the gaps (n_states, n_slave_nodes) of the slave nodes to the lines of their master segments."""
     gaps = np.empty((x.shape[0], len(nearest)), dtype=x.dtype)
     for state in range(x.shape[0]):
         for number in range(len(nearest)):

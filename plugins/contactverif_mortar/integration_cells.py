@@ -267,7 +267,6 @@ def _points_of_part(slot: IntArray, part: int, n_q: int) -> tuple[int, int]:
 
 @compile_maker
 def _points(x: Array, segments: Fields, parts: Fields, rule: Fields) -> Array:
-    """Compute the points (n_states, n_points, 6) at positions x (n_states, n_nodes, 2)."""
     reference_length, slave, master = segments
     carrier, partner, low_node, high_node, before, behind, slot = parts
     places, weights, current = rule
@@ -298,7 +297,6 @@ def _points(x: Array, segments: Fields, parts: Fields, rule: Fields) -> Array:
 def _variations(
     x: FloatArray, segments: Fields, parts: Fields, local: tuple[int, int, int], rule: Fields
 ) -> FloatArray:
-    """Compute the Δ (n_points, 5, n_local, 2) of the points at positions x (n_nodes, 2)."""
     reference_length, slave, master = segments
     carrier, partner, low_node, high_node, before, behind, slot = parts
     n_local, cutting_low, cutting_high = local

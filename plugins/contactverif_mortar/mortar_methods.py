@@ -155,7 +155,6 @@ class Mortar:
     def _rows(
         self, interface: Interface, pairing: Pairing, z: FloatArray, choose_pattern: Callable[[RowGroups], Couplings]
     ) -> NodeRows:
-        """Compute forces and factors on the cells that carry pressures."""
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         cells = Cells.from_pairing(pairing).near(active, interface)
         areas, with_gap, shapes = self.weighting.weigh(interface, cells, x)

@@ -133,7 +133,6 @@ def _segments_of_rows(active: BoolArray, slave: IntArray, dual: bool) -> IntArra
 
 @compile_inline
 def _sort(numbers: NumberArray, start: int, stop: int) -> None:
-    """Sort a part of an array in place, by Shell's method."""
     step = _FIRST_STEP
     while 3 * step < stop - start:
         step = 3 * step + 1

@@ -240,7 +240,6 @@ def _add_points(
 def _add_block_of_point(
     block: FloatArray, n_pushed: int, point: FloatArray, d: FloatArray, p: float, p_c: float
 ) -> None:
-    """Add ΔR_k of a point to a block (4 nodes, 2, n_local, 2)."""
     c, xi, w = point[C], point[XI], point[WEIGHT]
     n = (point[NORMAL_X], point[NORMAL_Y])
     tau, f = (-n[1], n[0]), w * p

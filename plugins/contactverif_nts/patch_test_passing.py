@@ -164,7 +164,6 @@ class PatchTestPassing:
         )
 
     def _arguments(self, interface: Interface, pairing: Pairing, z: Array) -> tuple[Fields, Fields, Fields]:
-        """Return the fields of `Surfaces`, `Areas` and `Options`."""
         (reference,) = match_precision(z, interface.nodes)
         areas = tuple([pairing[name] for name in Areas._fields])
         return surfaces_of(interface, reference), areas, (self.n, self.transmission, self.current_area, self.penalty)

@@ -195,7 +195,6 @@ class PointContact:
         return segment, other, slot
 
     def _arguments(self, interface: Interface, pairing: Pairing, z: Array) -> tuple[Fields, Fields, Fields]:
-        """Return the fields of `nts_force.Surfaces`, `nts_force.Points` and `nts_force.Options`."""
         reference, c, weight = match_precision(z, interface.nodes, self.c, self.weight)
         points = tuple([pairing[name] for name in nts_force.Points._fields])
         return surfaces_of(interface, reference), points, (c, weight, self.area_from, self.penalty)
@@ -381,7 +380,6 @@ def add_locking(traits: Traits, n: int) -> Traits:
 def _points_at(
     c: ArrayLike, weight: ArrayLike, traits: Traits, penalty: float, tau: float, area_from: int, at_nodes: bool = False
 ) -> PointContact:
-    """Return the formulation with points at c on each slave segment, its options checked."""
     return PointContact(
         traits=traits,
         penalty=check_penalty(penalty),

@@ -163,7 +163,6 @@ def _insert_segment(nodes: NumberArray, start: int, place: int, segments: IntArr
 def _bound_couplings(
     neighbours: IntArray, first: IntArray, last: IntArray, active: BoolArray, has_multipliers: bool
 ) -> tuple[int, int]:
-    """Return bounds of the number of couplings and of the number of their entries."""
     n_couplings, n_entries, most = 0, MOST_NODES + 2, MOST_NODES + 2
     for i in range(len(active)):
         if not active[i]:

@@ -318,7 +318,6 @@ class FaceQuarters:
         return flatten_pushes(points.push(-self.penalty * points.gap * points.weight)[0])
 
     def _pressure(self, corners: Array, shares: FloatArray) -> Array:
-        """Return the pressures (..., n, 1) of parts."""
         return -self.penalty * _centre_points(corners, shares).gap
 
 

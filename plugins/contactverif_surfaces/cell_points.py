@@ -283,7 +283,6 @@ def _dot(arms: Array, axis: Array) -> Array:
 
 
 def _take(corners: Array, numbers: IntArray) -> Array:
-    """Return corners (..., n_cells, k, 2) by their numbers (n_cells, k)."""
     cells = np.arange(len(numbers))[:, None]
     selection: Array = corners[..., cells, numbers, :]
     return selection

@@ -150,7 +150,6 @@ def _crossing_of(room: Array, edge: int, j: int) -> tuple[float, float]:
 
 @compile_inline
 def _place_corners(room: Array, codes: IntArray) -> int:
-    """Write the corners of the cell, and return how many there are."""
     n_corners = 1
     while n_corners < len(codes) and (
         codes[n_corners, 0] != codes[n_corners - 1, 0] or codes[n_corners, 1] != codes[n_corners - 1, 1]
@@ -198,7 +197,6 @@ def _set_slopes(room: Array) -> None:
 
 @compile_inline
 def _master_shape(room: Array, j: int, s: float, t: float) -> float:
-    """Return the shape function of master corner j > 0 at a place."""
     shape: float = room[SLOPES + j, S] * (s - room[MASTER, S]) + room[SLOPES + j, T] * (t - room[MASTER, T])
     return shape
 
@@ -227,7 +225,6 @@ def _write_points(
 
 @compile_kernel
 def _add_forces(forces: Array, rooms: Fields, x: Array, cells: Fields, penalty: float) -> None:
-    """Add the forces (n_states, n_nodes, 3) of the active points of states x (n_states, n_nodes, 3)."""
     (room, shapes), ((slave, master), codes, active) = rooms, cells
     for state in range(len(x)):
         for cell in range(len(codes)):
@@ -245,7 +242,6 @@ def _add_forces(forces: Array, rooms: Fields, x: Array, cells: Fields, penalty: 
 
 @compile_kernel
 def _add_springs(forces: FloatArray, csr: Csr, rooms: Fields, x: FloatArray, cells: Fields, penalty: float) -> None:
-    """Add the forces (n_nodes, 3) of some cells, and their derivative."""
     (room, shapes, slopes, row), (members, codes, numbers) = rooms, cells
     for i in range(len(numbers)):
         nodes, code = members[i], codes[numbers[i]]

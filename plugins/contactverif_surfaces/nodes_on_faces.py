@@ -109,7 +109,6 @@ class NodesOnFaces:
         )
 
     def _in_contact(self, interface: Interface, pairing: Pairing) -> tuple[IntArray, IntArray]:
-        """Return the slave nodes in contact, and for each the nodes of its master face, then itself."""
         active = np.flatnonzero(pairing["active"])
         return active, _nodes_and_faces(interface, active, pairing["home"][active])
 
