@@ -25,12 +25,11 @@ from scipy import sparse
 
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.contract.traits import Traits
 from contactverif_surfaces.cell_points import (
     PAST_BORDER,
     SURFACE_TRAITS,
-    TRIANGLE,
     CellPoints,
     FacePairs,
     SlaveView,
