@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from contactverif.compiler import compile_inline, compile_kernel, compile_part
+from contactverif.compiler import compile_inline, compile_kernel
 from contactverif.contract.arrays import FloatArray, IntArray, compressed_matrix
 
 NumberArray = NDArray[np.int32]
@@ -64,7 +64,7 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings, per_node
     """
     sizes, latest = (n_nodes, n_multipliers, per_node), _latest[0] if _latest else None
     if latest is None or latest[:3] != sizes or not _are_equal(latest.couplings, couplings):
-        latest = _Pattern(*sizes, couplings, *_make_pattern(*sizes, couplings))
+        latest = _Pattern(*sizes, couplings, *_make_pattern(*sizes, tuple(couplings)))
         _latest[:] = [latest]
     indptr, indices = latest.indptr.copy(), latest.indices.copy()  # A caller may change its matrix.
     matrix = compressed_matrix("csr", len(indptr) - 1, np.zeros(len(indices)), indices, indptr)
@@ -72,25 +72,22 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings, per_node
     return matrix
 
 
-def _are_equal(couplings: Couplings, others: Couplings) -> bool:
-    (nodes, starts, rows), (other_nodes, other_starts, other_rows) = couplings, others
-    same_nodes = np.array_equal(nodes, other_nodes)
-    return same_nodes and np.array_equal(starts, other_starts) and np.array_equal(rows, other_rows)
+def _are_equal(couplings: Fields, others: Fields) -> bool:
+    return all(np.array_equal(first, second) for first, second in zip(couplings, others, strict=True))
 
 
 def _make_pattern(
-    n_nodes: int, n_multipliers: int, per_node: int, couplings: Couplings
+    n_nodes: int, n_multipliers: int, per_node: int, couplings: Fields
 ) -> tuple[AnyIntArray, AnyIntArray]:
-    size, n_numbers = per_node * n_nodes + n_multipliers, n_nodes + n_multipliers
+    n_numbers, sizes = n_nodes + n_multipliers, (n_nodes, per_node)
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
-    members, ends = np.empty(len(couplings.nodes), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
-    of_columns = member_starts, members
-    _write_members(begins, ends, of_columns, tuple(couplings))
+    members, ends = np.empty(len(couplings[0]), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
+    _write_members(begins, ends, (member_starts, members), couplings)
     columns = np.empty(begins[-1], dtype=np.int32)
-    n_entries = _write_columns(columns, begins, ends, of_columns, tuple(couplings), n_nodes, per_node)
+    n_entries = _write_columns((begins, ends, columns), (member_starts, members), couplings, sizes)
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
-    indptr, indices = np.empty(size + 1, dtype=number), np.empty(n_entries, dtype=number)
-    _write_pattern(indptr, indices, n_nodes, per_node, begins, ends, columns)
+    indptr, indices = np.empty(per_node * n_nodes + n_multipliers + 1, dtype=number), np.empty(n_entries, dtype=number)
+    _write_pattern(indptr, indices, (begins, ends, columns), sizes)
     return indptr, indices
 
 
@@ -118,20 +115,13 @@ def _write_members(begins: IntArray, ends: IntArray, of_columns: Fields, couplin
 
 
 @compile_kernel
-def _write_columns(
-    columns: NumberArray,
-    begins: IntArray,
-    ends: IntArray,
-    of_columns: Fields,
-    couplings: Fields,
-    n_nodes: int,
-    per_node: int,
-) -> int:
+def _write_columns(rows: Fields, of_columns: Fields, couplings: Fields, sizes: tuple[int, int]) -> int:
     """Write the columns of each row, nodes and multipliers by number: columns[begins[row]:ends[row]], ascending.
 
     Return the number of entries. Columns are visited in ascending order, so they are sorted as they come, and one that
     comes twice was the last.
     """
+    (begins, ends, columns), (n_nodes, per_node) = rows, sizes
     (member_starts, members), (nodes, starts, first_row) = of_columns, couplings
     n_entries = 0
     for row in range(len(ends)):
@@ -151,15 +141,8 @@ def _write_columns(
 
 
 @compile_kernel
-def _write_pattern(
-    indptr: AnyIntArray,
-    indices: AnyIntArray,
-    n_nodes: int,
-    per_node: int,
-    begins: IntArray,
-    ends: IntArray,
-    columns: NumberArray,
-) -> None:
+def _write_pattern(indptr: AnyIntArray, indices: AnyIntArray, rows: Fields, sizes: tuple[int, int]) -> None:
+    (begins, ends, columns), (n_nodes, per_node) = rows, sizes
     at, unknown = 0, 0
     indptr[0] = 0
     for row in range(len(ends)):
@@ -191,9 +174,9 @@ def find_node(indices: AnyIntArray, first: int, last: int, column: int) -> int:
     return first
 
 
-@compile_part
+@compile_inline
 def find_entry(indices: AnyIntArray, first: int, last: int, column: int) -> int:
-    """Return the place of a column among indices[first:last], the ascending columns of a row; it must be there."""
+    """Return the place of a number among indices[first:last], such as the columns of a row; they ascend."""
     count = last - first
     while count > 1:
         half = count >> 1
@@ -234,7 +217,7 @@ def add_column(csr: Csr, row: int, unknown: int, x: float, y: float) -> None:
     data[place + second - first] += y
 
 
-@compile_part
+@compile_inline
 def add_entry(csr: Csr, row: int, column: int, value: float) -> None:
     """Add a number to one entry, whose row and column are unknowns."""
     indptr, indices, data = csr
@@ -267,23 +250,17 @@ def find_runs(runs: NumberArray, nodes: NumberArray, start: int, n_nodes: int) -
 
 @compile_inline
 def add_local_matrix(
-    csr: Csr,
-    nodes: NumberArray,
-    start: int,
-    n_nodes: int,
-    runs: NumberArray,
-    local: FloatArray,
-    owner: NumberArray,
-    part: int,
+    csr: Csr, members: Fields, runs: NumberArray, local: FloatArray, owner: NumberArray, part: int
 ) -> None:
     """Add the matrix `local` of a coupling to the rows and columns of its nodes, nodes[start:start + n_nodes].
 
+    `members` are `nodes`, `start` and `n_nodes`.
     Node q of the coupling has the rows and columns 2 q and 2 q + 1 of `local`, a multiplier behind the nodes the last
     one. Where numbers of nodes, which ascend, follow each other, so do their columns in each row. So a place in a row
     is looked for once for each run of numbers; `runs` is what `find_runs` wrote. Only rows whose node has the owner
     `part` are written: threads share a matrix, and no row.
     """
-    indptr, indices, data = csr
+    (indptr, indices, data), (nodes, start, n_nodes) = csr, members
     for q in range(n_nodes):
         row = nodes[np.uint64(start + q)]
         if owner[row] != part:

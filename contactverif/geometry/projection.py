@@ -38,9 +38,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.interface import Surface
 
 Vector = tuple[float, float]
-Tree = tuple[
-    IntArray, FloatArray
-]  # The segments along their chains, −1 for padding; boxes, of which `_write_boxes` says more.
+Tree = tuple[IntArray, FloatArray]  # The segments along their chains, −1 for padding; the boxes of `_write_boxes`.
 _Searched = tuple[FloatArray, IntArray, IntArray, FloatArray]  # Positions, segments, and a tree.
 
 ZERO = (0.0, 0.0)

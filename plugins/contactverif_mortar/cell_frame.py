@@ -33,15 +33,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from contactverif.compiler import compile_inline, compile_maker
-from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.compiler import compile_inline
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, add_block, zero_matrix
+from contactverif.geometry.block_rows import Csr, Fields, add_block
 from contactverif.geometry.projection import Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import NODE_1, NODE_2, A, B, SlaveView, facing_point, seen_from, slave_view
 from contactverif_mortar.integration_cells import Cells, Quadrature, read_only
 
 ForcesAndTangent = tuple[FloatArray, sparse.csr_array]  # (n_unknowns,) and (n_unknowns, n_unknowns)
+Slopes = tuple[float, float, float, float]  # α, β, γ and δ of Eq. (6)
 
 # The twelve numbers of a row; the first two stand for four, one for each node A, B, 1, 2.
 ALONG_TAU, ALONG_N, BY_LOW, BY_HIGH, BY_OMEGA, BY_SIGMA, N_NUMBERS = 0, 4, 8, 9, 10, 11, 12
@@ -123,18 +124,9 @@ def place_point(cell: CellFrame, place: float, share: float) -> CellPoint:
 
 
 @compile_inline
-def add_to_row(
-    rows: FloatArray,
-    row: int,
-    cell: CellFrame,
-    point: CellPoint,
-    by_weight: float,
-    by_c: float,
-    by_xi: float,
-    by_gap: float,
-) -> None:
+def add_to_row(rows: FloatArray, row: int, cell: CellFrame, point: CellPoint, by: Slopes) -> None:
     """Add α Δw + β Δc + γ Δξ + δ Δg of a point, Eqs. (2)–(6), to a row of `rows` (n_rows, 12)."""
-    place, share, c, xi, gap, _ = point
+    (place, share, c, xi, gap, _), (by_weight, by_c, by_xi, by_gap) = point, by
     slope = (by_xi + by_gap * cell.lean) / cell.along  # for L Δξ
     along_c = by_c + slope * cell.length / 2
     spread = by_weight * share * cell.measured / 2
@@ -171,86 +163,6 @@ def turn_row(rows: FloatArray, row: int, m: int, cell: CellFrame) -> Vector:
     return a * cell.tau[0] + b * cell.n[0], a * cell.tau[1] + b * cell.n[1]
 
 
-@compile_maker
-def touching_points(x: FloatArray, segments_and_cells: Fields, rule: Fields) -> BoolArray:
-    """Return the points (n_points,) of cells whose gap is zero or negative, at the positions x (n_nodes, 2)."""
-    places, weights = rule
-    n_q, n_cells = len(places), len(segments_and_cells[3])
-    touching = np.empty(n_cells * n_q, dtype=np.bool_)
-    for i in range(n_cells):
-        cell = cell_at(x, segments_and_cells, i)
-        for q in range(n_q):
-            touching[i * n_q + q] = place_point(cell, places[q], weights[q]).gap <= 0
-    return touching
-
-
-def springs_at_points(
-    interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, penalty: float, active: BoolArray
-) -> ForcesAndTangent:
-    """Compute forces (n_unknowns,) and tangent of springs p = −ε̂ g at the `active` points (n_points,).
-
-    The cells have no averaged normals. The pattern of the tangent holds the nodes of all cells that have a spring.
-    """
-    segments_and_cells, places_and_weights = cell_arguments(interface, cells, rule)
-    nodes = _nodes_of_cells(segments_and_cells, active)
-    starts = np.arange(0, len(nodes) + 1, 4)
-    matrix = zero_matrix(interface.n_nodes, 0, Couplings(nodes, starts, starts[:-1]))
-    forces: FloatArray = np.zeros(interface.n_unknowns)
-    csr = matrix.indptr, matrix.indices, matrix.data
-    _add_springs(forces, csr, x, segments_and_cells, places_and_weights, penalty, active)
-    return forces, matrix
-
-
-@compile_maker
-def _nodes_of_cells(segments_and_cells: Fields, active: BoolArray) -> NumberArray:
-    """Return the nodes A, B, 1, 2 of each cell that has an active point, one cell after the other."""
-    _, slave, master, cell_slave, cell_master, _, _ = segments_and_cells
-    nodes, count = np.empty(4 * len(cell_slave), dtype=np.int32), 0
-    n_q = len(active) // max(len(cell_slave), 1)
-    for cell in range(len(cell_slave)):
-        if not _any_active(active, cell * n_q, n_q):
-            continue
-        s, m = cell_slave[cell], cell_master[cell]
-        nodes[count], nodes[count + 1] = slave[s, 0], slave[s, 1]
-        nodes[count + 2], nodes[count + 3] = master[m, 0], master[m, 1]
-        count += 4
-    return nodes[:count]
-
-
-@compile_inline
-def _any_active(active: BoolArray, begin: int, count: int) -> bool:
-    for i in range(begin, begin + count):  # noqa: SIM110 - a compiled kernel knows no generators
-        if active[i]:
-            return True
-    return False
-
-
-@compile_maker
-def _add_springs(
-    forces: FloatArray,
-    csr: Csr,
-    x: FloatArray,
-    segments_and_cells: Fields,
-    rule: Fields,
-    penalty: float,
-    active: BoolArray,
-) -> None:
-    places, weights = rule
-    n_q = len(places)
-    rows, pushes = np.empty((4, N_NUMBERS)), np.empty(4)
-    for i in range(len(active) // n_q):
-        if not _any_active(active, i * n_q, n_q):
-            continue
-        cell = cell_at(x, segments_and_cells, i)
-        rows[:], pushes[:] = 0.0, 0.0
-        for q in range(n_q):
-            if active[i * n_q + q]:
-                point = place_point(cell, places[q], weights[q])
-                push_point(rows, pushes, cell, point, -penalty * point.gap, 0.0, -penalty)
-        finish_rows(rows, 4, cell)
-        add_cell(forces, csr, rows, pushes, cell)
-
-
 @compile_inline
 def push_point(
     rows: FloatArray, pushes: FloatArray, cell: CellFrame, point: CellPoint, p: float, p_c: float, p_g: float
@@ -262,7 +174,7 @@ def push_point(
         (((1 - c) / 2, -0.5, 0.0), ((1 + c) / 2, 0.5, 0.0), (xi - 1, 0.0, 1.0), (-xi, 0.0, -1.0))
     ):
         pushes[k] += shape * f
-        add_to_row(rows, k, cell, point, shape * p, shape * w * p_c + f * by_c, f * by_xi, shape * w * p_g)
+        add_to_row(rows, k, cell, point, (shape * p, shape * w * p_c + f * by_c, f * by_xi, shape * w * p_g))
 
 
 @compile_inline

@@ -29,6 +29,7 @@ import numpy as np
 from contactverif.compiler import compile_inline, compile_maker, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Surface
+from contactverif.geometry.block_rows import Fields
 from contactverif.geometry.projection import LEAF, Tree, Vector, dot, frame, minus, node
 from contactverif_mortar.cell_geometry import SlaveView, facing_point, seen_from, slave_view, turn
 
@@ -80,23 +81,19 @@ def averaging(x: FloatArray, slave: IntArray, neighbours: IntArray) -> tuple[Int
 
 @compile_maker
 def find_cells(
-    x: FloatArray,
-    slave: IntArray,
-    master: IntArray,
-    before: IntArray,
-    behind: IntArray,
-    slave_longest: FloatArray,
-    master_longest: FloatArray,
-    tree: Tree,
+    x: FloatArray, slaves: Fields, masters: Fields, tree: Tree
 ) -> tuple[IntArray, IntArray, BoolArray, BoolArray]:
     """Return the slave and the master segment of each cell, and whether master nodes cut its lower and its upper end.
 
-    The second node of the master segment cuts the lower end, the first node the upper end. Cells are in the order of
-    the slave segments, and on one slave segment in the order in which one meets them along it.
+    `slaves` are segments, those before and behind with which normals are averaged, and the answer of
+    `longest_of_chain`; `masters` are segments and that answer. The second node of the master segment cuts the lower
+    end, the first node the upper end. Cells are in the order of the slave segments, and on one slave segment in the
+    order in which one meets them along it.
 
     A search begins with the depth of the cells on the last slave segment. It is done as soon as it saw what hides all
     that lies deeper; otherwise it looks farther, up to the reach of rule 4. The cells are the same.
     """
+    (slave, before, behind, slave_longest), (master, master_longest) = slaves, masters
     room = len(slave) + len(master)
     cell_slave, cell_master = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     cut_low, cut_high = np.empty(room, dtype=np.bool_), np.empty(room, dtype=np.bool_)
@@ -111,10 +108,10 @@ def find_cells(
         reach = min(farthest, max(length / 16, 4 * depth))
         while True:
             strip = make_strip(view, reach)
-            if not holds(region, strip):
-                region = make_region(strip, tree[1])
+            if not _holds(region, strip):
+                region = _make_region(strip, tree[1])
             count = collect_segments(strip, region.box, tree, waiting, members)
-            count = _find_candidates(x, master, view, count, slave_longest[s], master_longest, members, table)
+            count = _find_candidates(x, masters, view, count, slave_longest[s], members, table)
             if reach >= farthest or _hides(table, count, reach / 2):
                 break
             reach = min(farthest, 4 * reach)
@@ -130,8 +127,8 @@ def find_cells(
                 n_cells += 1
                 depth = max(depth, table[i, DEPTH])
             reached = max(reached, table[i, HIGH])
-    slaves, masters = cell_slave[:n_cells].copy(), cell_master[:n_cells].copy()
-    return slaves, masters, cut_low[:n_cells].copy(), cut_high[:n_cells].copy()
+    segment, partner = cell_slave[:n_cells].copy(), cell_master[:n_cells].copy()
+    return segment, partner, cut_low[:n_cells].copy(), cut_high[:n_cells].copy()
 
 
 @compile_maker
@@ -144,11 +141,10 @@ def _lengthen(values: Array, room: int) -> Array:
 @compile_inline
 def _find_candidates(
     x: FloatArray,
-    master: IntArray,
+    masters: Fields,
     view: SlaveView,
     n_members: int,
-    slave_longest: float,
-    master_longest: FloatArray,
+    longest: float,
     members: IntArray,
     table: FloatArray,
 ) -> int:
@@ -157,7 +153,7 @@ def _find_candidates(
     They and their overlaps are written into `members` and `table`, sorted by the lower ends of their overlaps, then by
     number.
     """
-    count = 0
+    (master, master_longest), count = masters, 0
     for place in range(n_members):
         m = members[place]
         x_1, x_2 = node(x, master[m, 0]), node(x, master[m, 1])
@@ -165,7 +161,7 @@ def _find_candidates(
         if high - low <= ROUNDOFF:
             continue
         _, gap, _ = facing_point(view, x_1, x_2, (low + high) / 2)
-        if abs(gap) > 2 * (slave_longest + master_longest[m]):
+        if abs(gap) > 2 * (longest + master_longest[m]):
             continue
         i = count
         while i > 0 and (table[i - 1, LOW] > low or (table[i - 1, LOW] == low and members[i - 1] > m)):
@@ -294,21 +290,19 @@ class Region(NamedTuple):
 
 
 @compile_inline
-def holds(region: Region, strip: Strip) -> bool:
+def _holds(region: Region, strip: Strip) -> bool:
     """Return whether a strip lies in a region, by more than roundoff."""
     d = minus(strip.a, region.origin)
     doubt = 16 * UNIT_ROUNDOFF * (abs(d[0]) + abs(d[1]) + strip.reach)
     for axis in range(2):
-        if (
-            d[axis] + strip.low[axis] - doubt < region.low[axis]
-            or d[axis] + strip.high[axis] + doubt > region.high[axis]
-        ):
+        low, high = d[axis] + strip.low[axis] - doubt, d[axis] + strip.high[axis] + doubt
+        if low < region.low[axis] or high > region.high[axis]:
             return False
     return True
 
 
 @compile_part
-def make_region(strip: Strip, boxes: FloatArray) -> Region:
+def _make_region(strip: Strip, boxes: FloatArray) -> Region:
     """Return the region that is `AHEAD` times as large as the box around a strip, on each side of it.
 
     One goes down the tree as long as one half of the box alone meets the rectangle.
@@ -328,7 +322,7 @@ def make_region(strip: Strip, boxes: FloatArray) -> Region:
 
 @compile_inline
 def _in_rectangle(origin: Vector, low: Vector, high: Vector, box: FloatArray) -> bool:
-    """Return whether a box meets a rectangle; `holds` leaves room for the roundoff of both."""
+    """Return whether a box meets a rectangle; `_holds` leaves room for the roundoff of both."""
     for axis in range(2):
         if box[axis] - origin[axis] > high[axis] or box[2 + axis] - origin[axis] < low[axis]:
             return False

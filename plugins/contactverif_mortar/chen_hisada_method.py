@@ -33,7 +33,7 @@ from contactverif.geometry.projection import (
     search_tree,
 )
 from contactverif_mortar.cell_frame import ForcesAndTangent
-from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, C, Cells, Quadrature, forces, report_points
+from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, C, Cells, Quadrature, forces, near, report_points
 from contactverif_mortar.node_factors import group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 
@@ -62,7 +62,7 @@ class ChenHisada:
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
         x = np.array(z).reshape(-1, interface.n_nodes, 2)
-        cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
+        cells = near(Cells.from_pairing(pairing), pairing["active"], interface)
         ends = interface.slave.segments[cells.carriers(len(self.quadrature))]
         points = self.quadrature.points(interface, cells, x)
         pressure = self._node_pressures(interface, pairing, x)[:, ends]  # (n_states, n_points, 2)
@@ -77,7 +77,7 @@ class ChenHisada:
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
         x, active, nearest = np.array(z).reshape(-1, 2), pairing["active"], pairing["nearest"]
-        cells = Cells.from_pairing(pairing).near(active, interface)
+        cells = near(Cells.from_pairing(pairing), active, interface)
         groups = group_nodes(
             interface.n_nodes, interface.slave.segments, cells.slave, cells.local_nodes(interface), active, dual=False
         )

@@ -16,7 +16,7 @@ the time.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -84,30 +84,6 @@ class Sides(NamedTuple):
         return len(self.nodes)
 
 
-class Parts(Protocol):
-    """Parts of slave segments, each with a master segment and some or all points of a rule: `Cells`, for example."""
-
-    @property
-    def slave(self) -> IntArray:
-        """The slave segment of each part (n_parts,), ascending."""
-
-    def select(self, selection: Any, /) -> Parts:
-        """Return some of the parts, selected by mask or range."""
-
-    def carriers(self, n_q: int) -> IntArray:
-        """Return the slave segment of each point (n_points,) of a rule with n_q points."""
-
-    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
-        """Return the local nodes of each part; A, B, 1, 2 come first."""
-
-    def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
-        """Return the arrays that kernels unpack, n_local, and the local nodes that cut the lower and the upper end.
-
-        The arrays are slave and master segment of each part, the nodes that cut its ends (−1 for none), the segments
-        with which normals are averaged, and the one point of the rule that each part has; none where it has all.
-        """
-
-
 class Cells(NamedTuple):
     """Pairs of a slave and a master segment, in the order of the slave segments."""
 
@@ -126,9 +102,9 @@ class Cells(NamedTuple):
         before = behind = np.full(len(slave), -1)
         if averaged:
             before, behind = averaging(x, slave.segments, slave.neighbours)
-        longest = longest_of_chain(slave, x), longest_of_chain(master, x)
-        segments = slave.segments, master.segments
-        return cls(*find_cells(x, *segments, before, behind, *longest, search_tree(master, x)), before, behind)
+        slaves = slave.segments, before, behind, longest_of_chain(slave, x)
+        masters = master.segments, longest_of_chain(master, x)
+        return cls(*find_cells(x, slaves, masters, search_tree(master, x)), before, behind)
 
     @classmethod
     def from_pairing(cls, pairing: Pairing, prefix: str = "") -> Cells:
@@ -140,11 +116,6 @@ class Cells(NamedTuple):
         slave, master = self.slave[selection], self.master[selection]
         return Cells(slave, master, self.cut_low[selection], self.cut_high[selection], self.before, self.behind)
 
-    def near(self, nodes: BoolArray, interface: Interface) -> Cells:
-        """Return the cells whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""
-        carrying = any_end(nodes, interface.slave.segments, self.slave)
-        return self if carrying.all() else self.select(carrying)
-
     def carriers(self, n_q: int) -> IntArray:
         """Return the slave segment of each point (n_cells × n_q,)."""
         return np.repeat(self.slave, n_q)
@@ -155,7 +126,11 @@ class Cells(NamedTuple):
         return _local_nodes(sides.slave.segments, sides.master.segments, arrays, self.averaged)
 
     def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
-        """Return what `Parts.cuts` says."""
+        """Return the arrays that kernels unpack, n_local, and the local nodes that cut the lower and the upper end.
+
+        The arrays are slave and master segment of each part, the nodes that cut its ends (−1 for none), the segments
+        with which normals are averaged, and the one point of the rule that each part has; none where it has all.
+        """
         cells = tuple(map(read_only, (self.master, self.cut_low, self.cut_high)))
         low, high = _cutting_nodes(sides.master.segments, *cells)
         arrays = self.slave, self.master, low, high, self.before, self.behind, np.empty(0, np.int64)
@@ -165,6 +140,61 @@ class Cells(NamedTuple):
     def averaged(self) -> bool:
         """True if any normals are averaged."""
         return bool((self.before >= 0).any() or (self.behind >= 0).any())
+
+
+class Ranges(NamedTuple):
+    """The Gauss points of all covered ranges, in the order of the slave segments.
+
+    Cells that follow each other on a slave segment, and meet at one master node, make a range: the slave looks at one
+    unbroken surface. A range ends at an end of the segment, or where the slave sees an end of that surface.
+    """
+
+    slave: IntArray  # (n_points,) The segment that carries the point, and the one that it sees.
+    master: IntArray
+    slot: IntArray  # (n_points,) The number of the point in the quadrature rule.
+    # (n_points,) The master nodes that cut the lower and the upper end of its range, −1 where the segment ends there.
+    low: IntArray
+    high: IntArray
+
+    @classmethod
+    def find(cls, sides: Interface | Sides, x: FloatArray, cells: Cells, rule: Quadrature) -> Ranges:
+        """Return the points of the ranges that the cells make at the positions x (n_nodes, 2)."""
+        return cls(*_find_ranges(x, sides.slave.segments, sides.master.segments, cells[:4], rule.places))
+
+    @classmethod
+    def from_pairing(cls, pairing: Pairing, prefix: str) -> Ranges:
+        """Return the points of a pairing, whose names begin with a prefix."""
+        return cls(*(pairing[prefix + name] for name in cls._fields))
+
+    def select(self, selection: BoolArray | slice) -> Ranges:
+        """Return some of the points, selected by mask or range."""
+        return Ranges(*(array[selection] for array in self))
+
+    def carriers(self, n_q: int) -> IntArray:
+        """Return the slave segment of each point: each has one point of the rule."""
+        return self.slave
+
+    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
+        """Return the nodes (n_points, 6): A, B, 1, 2, and those that cut the range (any node where none does)."""
+        ends = sides.slave.segments[self.slave]
+        cuts = [np.where(cut >= 0, cut, ends[:, 0]) for cut in (self.low, self.high)]  # Their Δ is zero.
+        return np.column_stack([ends, sides.master.segments[self.master], *cuts]).astype(np.int32)
+
+    def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
+        """Return what `Cells.cuts` says: behind A, B, 1 and 2 the nodes 4 and 5 cut a range."""
+        not_averaged = np.full(len(sides.slave), -1)
+        arrays = self.slave, self.master, self.low, self.high, not_averaged, not_averaged, self.slot
+        return tuple(map(read_only, arrays)), (6, 4, 5)
+
+
+Parts = Cells | Ranges  # Parts of slave segments, each with a master segment and some or all points of a rule.
+_Parts = TypeVar("_Parts", Cells, Ranges)
+
+
+def near(parts: _Parts, nodes: BoolArray, sides: Interface | Sides) -> _Parts:
+    """Return the parts whose slave segment has at least one of some slave nodes, given by mask (n_slave_nodes,)."""
+    carrying = _any_end(nodes, sides.slave.segments, parts.slave)
+    return parts if carrying.all() else parts.select(carrying)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -204,19 +234,49 @@ class Quadrature:
 
 
 def read_only(array: Any) -> Any:
-    """Return a view of an array that nobody writes to: a kernel is compiled once for all of them."""
+    """Return a view that nobody writes to: a kernel is compiled once for all arrays."""
     view = array.view()
     view.flags.writeable = False
     return view
 
 
 @compile_maker
-def any_end(nodes: BoolArray, slave: IntArray, carrier: IntArray) -> BoolArray:
+def _any_end(nodes: BoolArray, slave: IntArray, carrier: IntArray) -> BoolArray:
     """Return for each carrying slave segment whether one of its ends is among some nodes, given by mask."""
     selection = np.empty(len(carrier), dtype=np.bool_)
     for i in range(len(carrier)):
         selection[i] = nodes[slave[carrier[i], 0]] or nodes[slave[carrier[i], 1]]
     return selection
+
+
+@compile_maker
+def _find_ranges(
+    x: FloatArray, slave: IntArray, master: IntArray, cells: Fields, places: FloatArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
+    """Return the arrays of `Ranges`. A point between two cells belongs to the first that reaches it."""
+    cell_slave, cell_master, cut_low, cut_high = cells
+    table = np.empty((5, len(cell_slave) * len(places)), dtype=np.int64)
+    begin, count = 0, 0
+    while begin < len(cell_slave):
+        s, end = cell_slave[begin], begin + 1
+        while end < len(cell_slave) and cell_slave[end] == s and cut_high[end - 1] and cut_low[end]:
+            if master[cell_master[end - 1], 0] != master[cell_master[end], 1]:
+                break
+            end += 1
+        low = master[cell_master[begin], 1] if cut_low[begin] else -1
+        high = master[cell_master[end - 1], 0] if cut_high[end - 1] else -1
+        view = slave_view(x, slave, s, -1, -1)
+        bottom, top = ends_of_part(view, x, low, high)
+        cell = begin
+        for q in range(len(places)):
+            c = (bottom + top) / 2 + (top - bottom) / 2 * places[q]
+            while cell < end - 1 and seen_from(node(x, master[cell_master[cell], 0]), view) < c:
+                cell += 1
+            table[0, count], table[1, count], table[2, count] = s, cell_master[cell], q
+            table[3, count], table[4, count] = low, high
+            count += 1
+        begin = end
+    return table[0, :count], table[1, :count], table[2, :count], table[3, :count], table[4, :count]
 
 
 @compile_maker

@@ -24,7 +24,7 @@ from contactverif.contract.interface import Interface, join_rows, split_state, s
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif_mortar.cell_frame import ForcesAndTangent
-from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Quadrature, report_nodes
+from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Quadrature, near, report_nodes
 from contactverif_mortar.node_factors import Factors, NodeRows, RowGroups, check_product, group_nodes
 from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 from contactverif_mortar.shape_rows import (
@@ -62,7 +62,7 @@ class Weighting:
 
         They lie on the cells whose slave segment has an active node; the others carry no pressure.
         """
-        cells = Cells.from_pairing(pairing).near(pairing["active"], interface)
+        cells = near(Cells.from_pairing(pairing), pairing["active"], interface)
         return weigh_points(interface, cells, self.quadrature, x, self.dual)
 
     def weigh(self, interface: Interface, cells: Cells, x: FloatArray) -> StateWeights:
@@ -156,7 +156,7 @@ class Mortar:
         self, interface: Interface, pairing: Pairing, z: FloatArray, choose_pattern: Callable[[RowGroups], Couplings]
     ) -> NodeRows:
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
-        cells = Cells.from_pairing(pairing).near(active, interface)
+        cells = near(Cells.from_pairing(pairing), active, interface)
         areas, with_gap, shapes = self.weighting.weigh(interface, cells, x)
         areas = np.where(active, areas, 1.0)
         gaps = np.where(active, with_gap / areas, 0.0)
@@ -205,7 +205,7 @@ class MortarMultipliers:
         """Compute the derivative of all rows, sparse: [[Σ λ_j ΔB_j, B], [−Δ∫φ_j g, 0]]; lengths if not active."""
         x, multipliers = split_state(interface, z)
         active = pairing["active"]
-        cells = Cells.from_pairing(pairing).near(active, interface)
+        cells = near(Cells.from_pairing(pairing), active, interface)
         n_nodes, zeros, ones = len(active), np.zeros(len(active)), np.ones(len(active))
         state = NodeState(np.where(active, multipliers, 0.0), ones, zeros, ones)
 

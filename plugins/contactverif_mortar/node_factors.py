@@ -146,17 +146,6 @@ def _sort(numbers: NumberArray, start: int, stop: int) -> None:
         step //= 3
 
 
-@compile_inline
-def find_member(nodes: NumberArray, first: int, last: int, number: int) -> int:
-    """Return the place of a node in a group nodes[first:last]; it must be there."""
-    count = last - first
-    while count > 1:
-        half = count >> 1
-        first += half if nodes[first + half] <= number else 0
-        count -= half
-    return first
-
-
 class Factors(NamedTuple):
     """A tangent K = rest + leftᵀ diag(weights) right.
 

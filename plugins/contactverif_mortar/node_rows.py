@@ -23,7 +23,8 @@ import numpy as np
 from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, zero_matrix
+from contactverif.geometry.block_rows import Couplings, Fields, NumberArray, find_entry, zero_matrix
+from contactverif.geometry.projection import Vector
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     CellFrame,
@@ -39,7 +40,7 @@ from contactverif_mortar.cell_frame import (
 )
 from contactverif_mortar.cell_geometry import A, B
 from contactverif_mortar.integration_cells import Cells, Quadrature
-from contactverif_mortar.node_factors import NodeRows, RowGroups, find_member
+from contactverif_mortar.node_factors import NodeRows, RowGroups
 
 # What is known of the shapes on a slave segment: a place c_0 on it, c̄ − c_0, κ, v and ∫1.
 ORIGIN, MEAN, KAPPA, VARIANCE, EXTENT, N_SHAPE = range(6)
@@ -151,19 +152,14 @@ def node_rows(
 
 @compile_maker
 def _add_rows(
-    written: tuple[FloatArray, Csr, Fields],
-    x: FloatArray,
-    segments_and_cells: Fields,
-    rule: Fields,
-    shapes: FloatArray,
-    at_nodes: Fields,
+    written: Fields, x: FloatArray, segments_and_cells: Fields, rule: Fields, shapes: FloatArray, at_nodes: Fields
 ) -> None:
     """Add what all cells give to the forces, to compressed rows, and to the rows of the factors."""
     forces, csr, factors = written
     slave, cell_slave = segments_and_cells[1], segments_and_cells[3]
     places, weights = rule
     pressure, gaps, divisor = at_nodes
-    nodes, starts, _, right = factors
+    nodes, starts, left, right = factors
     n_nodes, n_segments = len(pressure), len(slave)
     dual = len(starts) - 1 > n_nodes
     n_rows = 4 if dual else 2
@@ -181,15 +177,25 @@ def _add_rows(
             push_point(rows, pushes, cell, point, p, difference * kappa, 0.0)
             for end, (shape, slope, j) in enumerate(((first, -kappa, a), (second, kappa, b))):
                 above, w = point.gap - gaps[j], point.weight
-                add_to_row(rows, 4 + end, cell, point, above * shape, above * w * slope, 0.0, w * shape)
+                add_to_row(rows, 4 + end, cell, point, (above * shape, above * w * slope, 0.0, w * shape))
                 _add_unit(units, end, point, shape)
             if dual:
-                _add_moments(rows, units, chain, cell, point, shapes, s, difference, (gaps[a], gaps[b]))
+                _add_moments((rows, units, chain), cell, point, shapes, s, difference, (gaps[a], gaps[b]))
         finish_rows(rows, 4 + n_rows, cell)
         add_cell(forces, csr, rows, pushes, cell)
-        share = (1 / divisor[a], 1 / divisor[b], 1.0, 1.0)
+        shares = (1 / divisor[a], 1 / divisor[b], 1.0, 1.0)  # Those of the rows of `right`
         numbers = (a, b, n_nodes + s, n_nodes + n_segments + s)
-        _write_rows(factors, numbers, share, rows, units, cell)
+        for row in range(n_rows):
+            j, share = numbers[row], shares[row]
+            if starts[j + 1] == starts[j]:
+                continue
+            for k in range(4):
+                place = 2 * find_entry(nodes, starts[j], starts[j + 1], cell.nodes[k])
+                d_x, d_y = turn_row(rows, 4 + row, k, cell)
+                left[place] += units[row, k] * cell.n[0]
+                left[place + 1] += units[row, k] * cell.n[1]
+                right[place] += share * d_x
+                right[place + 1] += share * d_y
     if dual:
         add_chains(slave, chain, divisor, nodes, starts, right)
 
@@ -203,52 +209,21 @@ def _add_unit(units: FloatArray, row: int, point: CellPoint, pressure: float) ->
 
 @compile_inline
 def _add_moments(
-    rows: FloatArray,
-    units: FloatArray,
-    chain: FloatArray,
-    cell: CellFrame,
-    point: CellPoint,
-    shapes: FloatArray,
-    s: int,
-    difference: float,
-    gaps: tuple[float, float],
+    sums: Fields, cell: CellFrame, point: CellPoint, shapes: FloatArray, s: int, difference: float, gaps: Vector
 ) -> None:
-    """Add what a point gives to the rows of c̄ and v of its segment; `difference` is p_B − p_A."""
+    """Add what a point gives to the rows of c̄ and v of its segment; `difference` is p_B − p_A, `gaps` are G_A, G_B."""
+    rows, units, chain = sums
     kappa, variance, extent = shapes[s, KAPPA], shapes[s, VARIANCE], shapes[s, EXTENT]
     centred = (point.c - shapes[s, ORIGIN]) - shapes[s, MEAN]
     by_mean = 0.5 - kappa - (shapes[s, ORIGIN] + shapes[s, MEAN]) / variance * centred
     by_variance, w = -kappa / variance * centred, point.weight
-    add_to_row(rows, 6, cell, point, centred / extent, w / extent, 0.0, 0.0)
-    add_to_row(rows, 7, cell, point, (centred * centred - variance) / extent, 2 * w * centred / extent, 0.0, 0.0)
+    add_to_row(rows, 6, cell, point, (centred / extent, w / extent, 0.0, 0.0))
+    add_to_row(rows, 7, cell, point, ((centred * centred - variance) / extent, 2 * w * centred / extent, 0.0, 0.0))
     _add_unit(units, 2, point, difference * by_mean)
     _add_unit(units, 3, point, difference * by_variance)
     for end, sign in enumerate((-1.0, 1.0)):
         chain[s, end, 0] += sign * (point.gap - gaps[end]) * w * by_mean
         chain[s, end, 1] += sign * (point.gap - gaps[end]) * w * by_variance
-
-
-@compile_inline
-def _write_rows(
-    factors: Fields,
-    numbers: tuple[int, int, int, int],
-    shares: tuple[float, float, float, float],
-    rows: FloatArray,
-    units: FloatArray,
-    cell: CellFrame,
-) -> None:
-    """Add what a cell gives to the rows of both factors that have a group; `shares` multiply those of `right`."""
-    nodes, starts, left, right = factors
-    for row in range(len(units)):
-        j, share = numbers[row], shares[row]
-        if starts[j + 1] == starts[j]:
-            continue
-        for k in range(4):
-            place = 2 * find_member(nodes, starts[j], starts[j + 1], cell.nodes[k])
-            x, y = turn_row(rows, 4 + row, k, cell)
-            left[place] += units[row, k] * cell.n[0]
-            left[place + 1] += units[row, k] * cell.n[1]
-            right[place] += share * x
-            right[place + 1] += share * y
 
 
 @compile_maker

@@ -31,7 +31,7 @@ from scipy import sparse
 from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.geometry.block_rows import Csr, Fields, NumberArray, add_block
+from contactverif.geometry.block_rows import Fields, NumberArray, add_block, find_entry
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import (
     GAP,
@@ -45,7 +45,7 @@ from contactverif_mortar.integration_cells import (
     Sides,
     forces,
 )
-from contactverif_mortar.node_factors import NodeRows, RowGroups, find_member
+from contactverif_mortar.node_factors import NodeRows, RowGroups
 from contactverif_mortar.node_rows import NodeState, add_chains
 
 PIECE = 4096  # Points.
@@ -178,7 +178,7 @@ def add_shaped_rows(
     size = max(PIECE // max(n_q, 1), 1)
     for begin in range(0, n_cells, size):
         variations = rule.variations(weighted.sides, weighted.parts.select(slice(begin, begin + size)), x)
-        _add_points(written, begin * n_q, n_q, n_pushed, places, at_points, variations, at_nodes)
+        _add_points(written, (begin * n_q, n_q, n_pushed), places, at_points, variations, at_nodes)
     if dual:
         add_chains(slave, chain, state.divisor, groups.nodes, groups.starts, right)
     return NodeRows(total, rest, groups, left, right, state.weights)
@@ -186,16 +186,10 @@ def add_shaped_rows(
 
 @compile_maker
 def _add_points(
-    written: tuple[FloatArray, Csr, Fields, FloatArray],
-    first_point: int,
-    n_q: int,
-    n_pushed: int,
-    places: Fields,
-    shapes: Fields,
-    variations: FloatArray,
-    at_nodes: Fields,
+    written: Fields, counts: Fields, places: Fields, shapes: Fields, variations: FloatArray, at_nodes: Fields
 ) -> None:
-    """Add what the points from `first_point` on give, one for each of their Δ."""
+    """Add what the points from the first one on give, one for each of their Δ."""
+    first_point, n_q, n_pushed = counts
     total, csr, factors, chain = written
     points, segment, slave, local = places
     values, slope, by_mean, by_variance, centred, extent, variance = shapes
@@ -228,12 +222,23 @@ def _add_points(
                 chain[s, end, 0] += sign * above * w * by_mean[number]
                 chain[s, end, 1] += sign * above * w * by_variance[number]
         if len(chain):
-            numbers = (len(pressure) + s, len(pressure) + len(slave) + s)
-            by_moment = (difference * by_mean[number], difference * by_variance[number])
-            spread = (centred[number], extent[number], variance[number])
-            _add_moments(factors, numbers, by_moment, spread, d, row, cell, n_pushed, point)
+            off = centred[number]  # c − c̄
+            mean_row = (len(pressure) + s, off, 1.0, difference * by_mean[number])
+            by_weight, by_slope = off * off - variance[number], difference * by_variance[number]
+            variance_row = (len(pressure) + len(slave) + s, by_weight, 2 * off, by_slope)
+            for j, by_w, by_c, by_moment in (mean_row, variance_row):
+                for k in range(n_local):
+                    for axis in range(2):
+                        change = by_w * d[D_WEIGHT, k, axis] + w * by_c * d[D_C, k, axis]
+                        row[k, axis] = change / extent[number]
+                _add_row(factors, j, cell, row, n_pushed, point, by_moment)
         if (number + 1) % n_q == 0:
-            _write_block(csr, block, n_pushed, cell)
+            for k in range(n_pushed):
+                for column in range(n_local):
+                    xx, xy = block[k, 0, column, 0], block[k, 0, column, 1]
+                    yx, yy = block[k, 1, column, 0], block[k, 1, column, 1]
+                    add_block(csr, cell[k], cell[column], xx, xy, yx, yy)
+            block[:] = 0.0
 
 
 @compile_inline
@@ -256,38 +261,6 @@ def _add_block_of_point(
 
 
 @compile_inline
-def _write_block(csr: Csr, block: FloatArray, n_pushed: int, cell: NumberArray) -> None:
-    for k in range(n_pushed):
-        for column in range(len(cell)):
-            xx, xy = block[k, 0, column, 0], block[k, 0, column, 1]
-            yx, yy = block[k, 1, column, 0], block[k, 1, column, 1]
-            add_block(csr, cell[k], cell[column], xx, xy, yx, yy)
-    block[:] = 0.0
-
-
-@compile_inline
-def _add_moments(
-    factors: Fields,
-    numbers: tuple[int, int],
-    by_moment: tuple[float, float],
-    spread: tuple[float, float, float],
-    d: FloatArray,
-    row: FloatArray,
-    cell: NumberArray,
-    n_pushed: int,
-    point: FloatArray,
-) -> None:
-    """Add what a point gives to the rows of c̄ and v; `spread` is c − c̄, ∫1 and v, `by_moment` the pressure by both."""
-    off, extent, variance = spread
-    for moment, (by_weight, by_c) in enumerate(((off, 1.0), (off * off - variance, 2 * off))):
-        for k in range(len(cell)):
-            for axis in range(2):
-                change = by_weight * d[D_WEIGHT, k, axis] + point[WEIGHT] * by_c * d[D_C, k, axis]
-                row[k, axis] = change / extent
-        _add_row(factors, numbers[moment], cell, row, n_pushed, point, by_moment[moment])
-
-
-@compile_inline
 def _add_row(
     factors: Fields, j: int, cell: NumberArray, row: FloatArray, n_pushed: int, point: FloatArray, pressure: float
 ) -> None:
@@ -296,7 +269,7 @@ def _add_row(
     f = point[WEIGHT] * pressure
     transmit = ((1 - point[C]) / 2, (1 + point[C]) / 2, point[XI] - 1, -point[XI])
     for k in range(len(cell)):
-        place = 2 * find_member(nodes, starts[j], starts[j + 1], cell[k])
+        place = 2 * find_entry(nodes, starts[j], starts[j + 1], cell[k])
         right[place] += row[k, 0]
         right[place + 1] += row[k, 1]
         if k < n_pushed:

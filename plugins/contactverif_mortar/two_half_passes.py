@@ -9,10 +9,8 @@ The other half pass does the same with the roles exchanged. No force is handed t
 integrated over the meshes of both, and a uniform pressure comes out exactly without cutting one mesh at the nodes of
 the other. The price: forces balance only as well as both surfaces see the same gap.
 
-Cells that follow each other on a slave segment, and meet at one master node, make a range: the slave looks at one
-unbroken surface. A range ends at an end of the segment, or where the slave sees an end of that surface. Gauss points
-are spread over the range as a whole. So a gap that is smooth is integrated well, and one with a bend inside is not
-integrated exactly.
+Gauss points are spread over the `Ranges` of a segment as a whole. So a gap that is smooth is integrated well, and one
+with a bend inside is not integrated exactly.
 
 Our choices: gaps and forces along the normal of a half pass's own segment; one cut where the covered part ends; and a
 segment that is seen at more than 60° counts as unseen. Else roundoff would let a side face of a body, at 90° to the
@@ -24,7 +22,6 @@ Source: Duong, De Lorenzis & Sauer (2018), arXiv 1712.01179, after Sauer & De Lo
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -34,20 +31,17 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, choose
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, Fields, NumberArray, zero_matrix
-from contactverif.geometry.projection import node
+from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
 from contactverif_mortar.cell_frame import ForcesAndTangent
-from contactverif_mortar.cell_geometry import seen_from, slave_view
 from contactverif_mortar.integration_cells import (
     AREAS,
     CELL_TRAITS,
     LOCKING_WITNESSES,
     Cells,
     Quadrature,
+    Ranges,
     Sides,
-    any_end,
-    ends_of_part,
-    read_only,
+    near,
     report_nodes,
 )
 from contactverif_mortar.node_factors import RowGroups, group_nodes
@@ -57,52 +51,6 @@ from contactverif_mortar.shape_rows import Weighted, add_shaped_rows, divide_cov
 STEEPEST = -0.5  # The cosine between two segments that see each other; −1 where they are parallel.
 PREFIXES = ("slave.", "master.")  # The surface that is pushed in each half pass.
 _SOURCE = "Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179"
-
-
-class Ranges(NamedTuple):
-    """The Gauss points of all covered ranges, in the order of the slave segments."""
-
-    slave: IntArray  # (n_points,) The segment that carries the point, and the one that it sees.
-    master: IntArray
-    slot: IntArray  # (n_points,) The number of the point in the quadrature rule.
-    # (n_points,) The master nodes that cut the lower and the upper end of its range, −1 where the segment ends there.
-    low: IntArray
-    high: IntArray
-
-    @classmethod
-    def find(cls, sides: Interface | Sides, x: FloatArray, cells: Cells, rule: Quadrature) -> Ranges:
-        """Return the points of the ranges that the cells make at the positions x (n_nodes, 2)."""
-        return cls(*_find_ranges(x, sides.slave.segments, sides.master.segments, cells[:4], rule.places))
-
-    @classmethod
-    def from_pairing(cls, pairing: Pairing, prefix: str) -> Ranges:
-        """Return the points of a pairing, whose names begin with a prefix."""
-        return cls(*(pairing[prefix + name] for name in cls._fields))
-
-    def near(self, nodes: BoolArray, sides: Interface | Sides) -> Ranges:
-        """Return the points whose slave segment has one of some slave nodes, given by mask (n_slave_nodes,)."""
-        carrying = any_end(nodes, sides.slave.segments, self.slave)
-        return self if carrying.all() else self.select(carrying)
-
-    def select(self, selection: BoolArray | slice) -> Ranges:
-        """Return some of the points, selected by mask or range."""
-        return Ranges(*(array[selection] for array in self))
-
-    def carriers(self, n_q: int) -> IntArray:
-        """Return the slave segment of each point: each has one point of the rule."""
-        return self.slave
-
-    def local_nodes(self, sides: Interface | Sides) -> NumberArray:
-        """Return the nodes (n_points, 6): A, B, 1, 2, and those that cut the range (any node where none does)."""
-        ends = sides.slave.segments[self.slave]
-        cuts = [np.where(cut >= 0, cut, ends[:, 0]) for cut in (self.low, self.high)]  # Their Δ is zero.
-        return np.column_stack([ends, sides.master.segments[self.master], *cuts]).astype(np.int32)
-
-    def cuts(self, sides: Interface | Sides) -> tuple[Fields, tuple[int, int, int]]:
-        """Return what `Parts.cuts` says: behind A, B, 1 and 2 the nodes 4 and 5 cut a range."""
-        not_averaged = np.full(len(sides.slave), -1)
-        arrays = self.slave, self.master, self.low, self.high, not_averaged, not_averaged, self.slot
-        return tuple(map(read_only, arrays)), (6, 4, 5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,7 +130,7 @@ class TwoHalfPasses:
         """Compute the points on the segments with an active node; the others carry no pressure."""
         active = pairing["active"]
         return [
-            weigh_points(sides, Ranges.from_pairing(pairing, prefix).near(active, sides), self.rule, x, dual=False)
+            weigh_points(sides, near(Ranges.from_pairing(pairing, prefix), active, sides), self.rule, x, dual=False)
             for prefix, sides in _both_sides(interface)
         ]
 
@@ -217,38 +165,6 @@ def _couple(active: BoolArray, half_passes: list[Weighted], groups: list[RowGrou
     shift = len(parts[0][0])
     starts = np.concatenate([parts[0][1][:-1], parts[1][1] + shift])
     return Couplings(nodes, starts, np.concatenate([parts[0][2], parts[1][2] + shift]))
-
-
-@compile_maker
-def _find_ranges(
-    x: FloatArray, slave: IntArray, master: IntArray, cells: Fields, places: FloatArray
-) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
-    """Return the arrays of `Ranges`. A point between two cells belongs to the first that reaches it."""
-    cell_slave, cell_master, cut_low, cut_high = cells
-    rows = [(0, 0, 0, 0, 0) for _ in range(0)]
-    begin = 0
-    while begin < len(cell_slave):
-        s, end = cell_slave[begin], begin + 1
-        while end < len(cell_slave) and cell_slave[end] == s and cut_high[end - 1] and cut_low[end]:
-            if master[cell_master[end - 1], 0] != master[cell_master[end], 1]:
-                break
-            end += 1
-        low = master[cell_master[begin], 1] if cut_low[begin] else -1
-        high = master[cell_master[end - 1], 0] if cut_high[end - 1] else -1
-        view = slave_view(x, slave, s, -1, -1)
-        bottom, top = ends_of_part(view, x, low, high)
-        cell = begin
-        for q in range(len(places)):
-            c = (bottom + top) / 2 + (top - bottom) / 2 * places[q]
-            while cell < end - 1 and seen_from(node(x, master[cell_master[cell], 0]), view) < c:
-                cell += 1
-            rows.append((s, cell_master[cell], q, low, high))
-        begin = end
-    table = np.empty((5, len(rows)), dtype=np.int64)
-    for number in range(len(rows)):
-        s, m, q, low, high = rows[number]
-        table[0, number], table[1, number], table[2, number], table[3, number], table[4, number] = s, m, q, low, high
-    return table[0], table[1], table[2], table[3], table[4]
 
 
 @compile_maker

@@ -22,7 +22,7 @@ from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Handle, Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import Subject
-from contactverif.contract.traits import Fractions, Traits, format_forces, parse_forces
+from contactverif.contract.traits import Traits, format_forces, parse_forces
 
 NAMES = ("pass_1.", "pass_2.")  # The prefixes of the names in a pairing.
 _EXCHANGED = "-swapped"  # The end of the name of a flat case whose slave and master have exchanged their lengths.
@@ -102,18 +102,18 @@ class TwoPass:
     def _passes(self, interface: Interface) -> tuple[Pass, Pass]:
         """Return both passes. The last ones are kept, because exchanging the roles costs far more than a residual."""
         if self._last_passes is None or self._last_passes[0] is not interface:
-            self._last_passes = interface, self._new_passes(interface)
+            swapped, positions = interface.swap_roles(), np.arange(interface.n_unknowns)
+            swapped_positions = np.roll(positions, -interface.dim * interface.n_slave_nodes)
+            first, second = (self._inner.n_multipliers(side) for side in (interface, swapped))
+            multipliers = interface.n_unknowns + np.arange(first + second)
+            self._last_passes = (
+                interface,
+                (
+                    Pass(interface, np.concatenate([positions, multipliers[:first]]), NAMES[0]),
+                    Pass(swapped, np.concatenate([swapped_positions, multipliers[first:]]), NAMES[1]),
+                ),
+            )
         return self._last_passes[1]
-
-    def _new_passes(self, interface: Interface) -> tuple[Pass, Pass]:
-        swapped, positions = interface.swap_roles(), np.arange(interface.n_unknowns)
-        n_slave_unknowns = interface.dim * interface.n_slave_nodes
-        first, second = (self._inner.n_multipliers(side) for side in (interface, swapped))
-        multipliers = interface.n_unknowns + np.arange(first + second)
-        return (
-            Pass(interface, np.concatenate([positions, multipliers[:first]]), NAMES[0]),
-            Pass(swapped, np.concatenate([np.roll(positions, -n_slave_unknowns), multipliers[first:]]), NAMES[1]),
-        )
 
 
 def two_pass(*, penalty: float, inner: Callable[..., Any]) -> TwoPass:
@@ -202,11 +202,7 @@ def _add_exchanged(forces: Mapping[str, str]) -> dict[str, str]:
     for name, text in forces.items():
         other = name.removesuffix(_EXCHANGED) if name.endswith(_EXCHANGED) else name + _EXCHANGED
         if other in forces:
-            slave, master = parse_forces(text)
-            master_2, slave_2 = parse_forces(forces[other])
-            both[name] = format_forces(_add(slave, slave_2), _add(master, master_2))
+            passes = zip(parse_forces(text), reversed(parse_forces(forces[other])), strict=True)
+            slave, master = (tuple(a + b for a, b in zip(*sides, strict=True)) for sides in passes)
+            both[name] = format_forces(slave, master)
     return both
-
-
-def _add(first: Fractions, second: Fractions) -> Fractions:
-    return tuple(a + b for a, b in zip(first, second, strict=True))

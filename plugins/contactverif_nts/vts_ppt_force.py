@@ -31,10 +31,10 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.compiler import compile_kernel, compile_part
-from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import Array, IntArray
 from contactverif.geometry.block_rows import Fields
 from contactverif.geometry.projection import PointOnSegment, Vector, arm, cross, dot, frame, minus, node
-from contactverif_nts.nts_force import push
+from contactverif_nts.nts_force import area_length, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
 
 PRINTED, BALANCED = 0, 1  # How the master side gets its share.
@@ -99,9 +99,10 @@ def _add_residual(
     has_multipliers = multipliers.shape[1] > 0
     for state in range(x.shape[0]):
         now, r = x[state], forces[state]
-        _fill_idle_rows(rows[state], multipliers[state], reference, slave, active, n)
         for i in range(len(active)):  # FOR each virtual slave node
             if not active[i]:
+                if has_multipliers:
+                    rows[state, i] = multipliers[state, i] * area_length(reference, slave, i // n, -1) / n
                 continue
             area = Area(partner[i], first[i], last[i], cutting[i], cut_p[i], cut_q[i], clip_p[i], clip_q[i])
             node_a, node_b = slave[i // n, 0], slave[i // n, 1]
@@ -132,16 +133,6 @@ def _add_residual(
                 if j == area.last:
                     break
                 j = neighbours[j, 1]
-
-
-@compile_part
-def _fill_idle_rows(
-    rows: Array, multipliers: Array, reference: FloatArray, slave: IntArray, active: BoolArray, n: int
-) -> None:
-    """Write the rows of the multipliers whose points are not active: λ × a share of the reference length."""
-    for i in range(len(multipliers)):
-        if not active[i]:
-            rows[i] = multipliers[i] * segment_length(reference, slave, i // n) / n
 
 
 @compile_part
@@ -231,10 +222,3 @@ def area_of_competence(
 def _cut_at(x_a: Vector, x_b: Vector, x_e: Vector, t: Vector) -> float:
     """Return where the slave segment A B meets the master node e, both projected along t, as c."""
     return -dot(arm(x_e, PointOnSegment(x_a, x_b, 0.0)), t) / (dot(minus(x_b, x_a), t) / 2)
-
-
-@compile_part
-def segment_length(x: FloatArray, slave: IntArray, segment: int) -> float:
-    """Return the length of a slave segment at the positions x (n_nodes, 2)."""
-    length, _, _ = frame(node(x, slave[segment, 0]), node(x, slave[segment, 1]))
-    return length

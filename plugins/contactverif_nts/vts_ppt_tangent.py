@@ -49,6 +49,7 @@ from contactverif.geometry.block_rows import (
     insert_node,
 )
 from contactverif.geometry.projection import ZERO, PointOnSegment, Vector, arm, dot, frame, minus, node, times
+from contactverif_nts.nts_force import area_length
 from contactverif_nts.vts_ppt_force import (
     BALANCED,
     Area,
@@ -56,7 +57,6 @@ from contactverif_nts.vts_ppt_force import (
     across_parts,
     area_of_competence,
     length_of_area,
-    segment_length,
     sum_of_parts,
     virtual_slave_node,
 )
@@ -451,11 +451,14 @@ def _sweep(
         width = 2 * n_coupled
         for q in range(n_coupled):
             slots[nodes[start + q]] = 2 * q
-        _clear(local, push, width + has_multipliers)
+        for u in range(width + has_multipliers):
+            push[u] = 0.0
+            for w in range(width + has_multipliers):
+                local[u, w] = 0.0
         for i in range(first_point[coupling], end_point[coupling]):
             if not active[i]:
                 if has_multipliers:
-                    local[width, width] = segment_length(reference, slave, i // n) / n
+                    local[width, width] = area_length(reference, slave, i // n, -1) / n
                     push[width] = local[width, width] * multipliers[i]
                 continue
             area = Area(partner[i], first[i], last[i], cutting[i], cut_p[i], cut_q[i], clip_p[i], clip_q[i])
@@ -487,35 +490,26 @@ def _sweep(
                     _add_part_forces(local, push, point, pressure, part_j, slots[f], slots[m], free_ends)
                     j = neighbours[j, 1] if j != j_last else NO_NODE
         find_runs(runs, nodes, start, n_coupled)
-        add_local_matrix(csr, nodes, start, n_coupled, runs, local, owner, part)
+        add_local_matrix(csr, (nodes, start, n_coupled), runs, local, owner, part)
         multiplier = nodes[start + n_coupled] if has_multipliers else NO_NODE
-        _add_push_and_multiplier(rows, csr, nodes, start, n_coupled, multiplier, local, push, owner, part, len(x))
-
-
-@compile_inline
-def _clear(local: FloatArray, push: FloatArray, width: int) -> None:
-    for u in range(width):
-        push[u] = 0.0
-        for w in range(width):
-            local[u, w] = 0.0
+        members = nodes, start, n_coupled, multiplier
+        _add_push_and_multiplier(rows, csr, members, local, push, owner, part, len(x) + multiplier)
 
 
 @compile_inline
 def _add_push_and_multiplier(
     rows: FloatArray,
     csr: Csr,
-    nodes: NumberArray,
-    start: int,
-    n_coupled: int,
-    multiplier: int,
+    members: Fields,
     local: FloatArray,
     push: FloatArray,
     owner: NumberArray,
     part: int,
-    n_nodes: int,
+    unknown: int,
 ) -> None:
-    """Add the forces of a coupling, and row, column and constraint of its `multiplier` unless that is NO_NODE."""
-    width, unknown = 2 * n_coupled, n_nodes + multiplier
+    """Add the forces of a coupling, and row, column and constraint of its multiplier unless that is NO_NODE."""
+    nodes, start, n_coupled, multiplier = members
+    width = 2 * n_coupled
     is_mine = multiplier != NO_NODE and owner[multiplier] == part
     for q in range(n_coupled):
         row = nodes[start + q]

@@ -146,7 +146,10 @@ def _pair_points(
             continue
         first[i], last[i] = _walk(x, p, q, m, t, master, neighbours)
         if free_end == TRUNCATE and first[i] != last[i]:
-            clip_p[i], clip_q[i] = _truncate(x, p, q, first[i], last[i], t, master, neighbours)
+            if neighbours[first[i], 0] < 0 and dot(arm(node(x, master[first[i], 0]), p), t) < 0:
+                clip_p[i] = 0
+            if neighbours[last[i], 1] < 0 and dot(arm(node(x, master[last[i], 1]), q), t) > 0:
+                clip_q[i] = 1
 
 
 @compile_inline
@@ -183,26 +186,6 @@ def _lies_past_one_end(
 def _projected_length(x: FloatArray, master: IntArray, segment: int, t: Vector) -> float:
     """Return the length of a master segment along t, negative where the segment runs backwards."""
     return dot(minus(node(x, master[segment, 1]), node(x, master[segment, 0])), t)
-
-
-@compile_inline
-def _truncate(
-    x: FloatArray,
-    p: PointOnSegment,
-    q: PointOnSegment,
-    first: int,
-    last: int,
-    t: Vector,
-    master: IntArray,
-    neighbours: IntArray,
-) -> tuple[int, int]:
-    """Return `clip_p` and `clip_q`: where P and Q overhang a free end of the first and the last master segment."""
-    clip_p = clip_q = NOT_CUT
-    if neighbours[first, 0] < 0 and dot(arm(node(x, master[first, 0]), p), t) < 0:
-        clip_p = 0
-    if neighbours[last, 1] < 0 and dot(arm(node(x, master[last, 1]), q), t) > 0:
-        clip_q = 1
-    return clip_p, clip_q
 
 
 @compile_inline

@@ -86,9 +86,9 @@ def test_a_search_that_stops_early_finds_the_cells_of_one_that_looks_at_all(
     cells = Cells.find(interface, x, averaged)
     order, n = interface.master.chain_order, len(interface.master)
     one_box = (np.append(order, [-1] * (4 - n % 4)) if n % 4 else order, np.tile([-10.0, -10.0, 10.0, 10.0], (256, 1)))
-    lengths = [longest_of_chain(surface, x) for surface in (interface.slave, interface.master)]
-    segments = (interface.slave.segments, interface.master.segments, cells.before, cells.behind)
-    everything = find_cells(x, *segments, *lengths, one_box)
+    slaves = interface.slave.segments, cells.before, cells.behind, longest_of_chain(interface.slave, x)
+    masters = interface.master.segments, longest_of_chain(interface.master, x)
+    everything = find_cells(x, slaves, masters, one_box)
     assert len(cells.slave) > 60
     for computed, expected in zip((cells.slave, cells.master, cells.cut_low, cells.cut_high), everything, strict=True):
         assert np.array_equal(computed, expected)

@@ -10,9 +10,8 @@ from contactverif import Interface, Surface
 from contactverif.oracle import uniform_pressure_weights
 from contactverif_mortar import integration_cells as cells_module
 from contactverif_mortar import mortar, mortar_two_half_pass
-from contactverif_mortar.integration_cells import WEIGHT, Cells, Quadrature
+from contactverif_mortar.integration_cells import WEIGHT, Cells, Quadrature, Ranges
 from contactverif_mortar.shape_rows import Shapes
-from contactverif_mortar.two_half_passes import Ranges
 
 CASE_C = [2.0, 2.0, 4.0, 4.0], [3.0, 3.0, 3.0, 3.0]
 TWO, FIVE = (Quadrature.gauss(n, current=True) for n in (2, 5))

@@ -185,9 +185,10 @@ line(
     "share of an interior segment cut where the foot lies past its end",
     "free_end.interior",
     "walk",
-    "    return clip_p, clip_q",
-    "    if dot(arm(node(x, master[last, 0]), q), t) < 0:\n        clip_q = 0\n"
-    "    if dot(arm(node(x, master[first, 1]), p), t) > 0:\n        clip_p = 1\n    return clip_p, clip_q",
+    "                clip_q[i] = 1\n",
+    "                clip_q[i] = 1\n"
+    "            if dot(arm(node(x, master[last[i], 0]), q), t) < 0:\n                clip_q[i] = 0\n"
+    "            if dot(arm(node(x, master[first[i], 1]), p), t) > 0:\n                clip_p[i] = 1\n",
     factory="vts_ppt",
     into=SURVIVORS,
 )
