@@ -11,7 +11,6 @@ Source: Puso & Laursen (2004); dual shapes: Popp, Gitterle, Gee & Wall (2010).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,23 +84,25 @@ class Weighting:
         _, gaps = self.gaps(interface, cells, x)
         return Pairing({**cells._asdict(), "active": multipliers - penalty * gaps >= 0})  # false where the gap is NaN
 
+    def groups(self, interface: Interface, cells: Cells, active: BoolArray) -> RowGroups:
+        """Return the nodes of the rows of factors on some cells."""
+        local = cells.local_nodes(interface)
+        return group_nodes(interface.n_nodes, interface.slave.segments, cells.slave, local, active, self.dual)
+
     def rows(
         self,
         interface: Interface,
         cells: Cells,
-        active: BoolArray,
         x: FloatArray,
         shapes: FloatArray | Weighted,
         state: NodeState,
-        choose_pattern: Callable[[RowGroups], Couplings],
+        groups: RowGroups,
+        pattern: Couplings,
     ) -> NodeRows:
         """Compute forces and factors on the cells that carry pressures, with the shapes of `weigh` there.
 
-        The pattern of the rest depends on the groups of the rows.
+        The rest gets a pattern.
         """
-        slave, local = interface.slave.segments, cells.local_nodes(interface)
-        groups = group_nodes(interface.n_nodes, slave, cells.slave, local, active, self.dual)
-        pattern = choose_pattern(groups)
         if not isinstance(shapes, Weighted):
             return node_rows(interface, cells, self.quadrature, x, shapes, state, groups, pattern)
         total, rest = np.zeros(interface.n_unknowns), zero_matrix(interface.n_nodes, 0, pattern)
@@ -134,13 +135,7 @@ class Mortar:
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        n_nodes = interface.n_slave_nodes
-
-        def choose_pattern(groups: RowGroups) -> Couplings:
-            check_product(groups.starts[: n_nodes + 1])
-            return groups.pattern(0, n_nodes)
-
-        rows = self._rows(interface, pairing, z, choose_pattern)
+        rows = self._rows(interface, pairing, z, assembled=True)
         rows.multiply(0, len(rows.groups.starts) - 1)
         return rows.forces, rows.rest
 
@@ -150,11 +145,9 @@ class Mortar:
         The assembled tangent is dense on all nodes that face the segments at a slave node. A solver that multiplies by
         the tangent, or that knows the pressures as unknowns of their own, does not need it.
         """
-        return self._rows(interface, pairing, z, RowGroups.pattern_of_cells).factors()
+        return self._rows(interface, pairing, z, assembled=False).factors()
 
-    def _rows(
-        self, interface: Interface, pairing: Pairing, z: FloatArray, choose_pattern: Callable[[RowGroups], Couplings]
-    ) -> NodeRows:
+    def _rows(self, interface: Interface, pairing: Pairing, z: FloatArray, *, assembled: bool) -> NodeRows:
         x, active = np.array(z).reshape(-1, 2), pairing["active"]
         cells = near(Cells.from_pairing(pairing), active, interface)
         areas, with_gap, shapes = self.weighting.weigh(interface, cells, x)
@@ -162,7 +155,11 @@ class Mortar:
         gaps = np.where(active, with_gap / areas, 0.0)
         weights = np.where(active, -self.penalty, 0.0)
         state = NodeState(weights * gaps, weights, gaps, areas)
-        return self.weighting.rows(interface, cells, active, x, shapes, state, choose_pattern)
+        groups = self.weighting.groups(interface, cells, active)
+        if assembled:
+            check_product(groups.starts[: len(active) + 1])
+        pattern = groups.pattern(0, len(active)) if assembled else groups.pattern_of_cells()
+        return self.weighting.rows(interface, cells, x, shapes, state, groups, pattern)
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the slave nodes with weighted gap and nodal pressure, ∫N_j as weight."""
@@ -209,14 +206,11 @@ class MortarMultipliers:
         n_nodes, zeros, ones = len(active), np.zeros(len(active)), np.ones(len(active))
         state = NodeState(np.where(active, multipliers, 0.0), ones, zeros, ones)
 
-        def choose_pattern(groups: RowGroups) -> Couplings:
-            if self.weighting.dual:
-                return groups.pattern(n_nodes, len(groups.starts) - 1)
-            return groups.pattern_of_cells()
-
-        shapes = self.weighting.weigh(interface, cells, x)[2]
-        rows = self.weighting.rows(interface, cells, active, x, shapes, state, choose_pattern)
-        rows.multiply(n_nodes, len(rows.groups.starts) - 1)
+        shapes, groups = self.weighting.weigh(interface, cells, x)[2], self.weighting.groups(interface, cells, active)
+        n_rows = len(groups.starts) - 1
+        pattern = groups.pattern(n_nodes, n_rows) if self.weighting.dual else groups.pattern_of_cells()
+        rows = self.weighting.rows(interface, cells, x, shapes, state, groups, pattern)
+        rows.multiply(n_nodes, n_rows)
         derivative, left, _, right = rows.factors()
         influence, d_gaps = left[:n_nodes], right[:n_nodes]
         idle = sparse.diags_array(np.where(active, 0.0, own_lengths(interface, interface.nodes)), format="csr")

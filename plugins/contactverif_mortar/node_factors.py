@@ -35,7 +35,6 @@ class RowGroups(NamedTuple):
     # For dual shapes the slave segments come behind them, and once more.
     starts: IntArray
     local: NumberArray  # (n_cells, n_local) The nodes of each cell, or of each point.
-    first: IntArray  # (n_slave_segments + 1,) Where the cells of each slave segment begin.
 
     def pattern(self, first_row: int, end_row: int) -> Couplings:
         """Return the groups of some rows as the pattern of a matrix."""
@@ -57,7 +56,7 @@ def group_nodes(
     """
     first = _first_cells(read_only(carrier), len(slave))
     nodes, starts = _group_nodes(n_nodes, active, slave, local, first, dual)
-    return RowGroups(nodes, starts, local, first)
+    return RowGroups(nodes, starts, local)
 
 
 def check_product(starts: IntArray) -> None:

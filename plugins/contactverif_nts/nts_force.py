@@ -17,8 +17,10 @@ Rules for the next editor:
 
 1. `pair` makes all decisions and returns integers and booleans. `residual` decides nothing.
 2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
-3. A kernel gets the fields of `Surfaces`, `Points` and `Options` as plain tuples and unpacks them in its first lines.
-   numba reads a plain tuple in half the time of a named one. Named tuples of numbers, such as `Contact`, are free.
+3. A kernel gets plain tuples and unpacks them in its first lines: numba reads them in half the time of named ones.
+   `surfaces` are the reference positions (n_nodes, 2), slave and master segments (n, 2), and the master's neighbours
+   (n, 2), −1 at a free end. `points` are the fields of `Points`. `options` are places c on a slave segment and shares
+   of its length, (n_slots,) each, NODAL, CURRENT or REFERENCE, and the penalty. Named tuples of numbers are free.
 4. `add_tangent` differentiates the residual line by line: change both. It writes no block that `list_couplings` does
    not list, and allocates nothing for a point.
 
@@ -61,32 +63,14 @@ OTHER_A, OTHER_B, B, NODE_1, NODE_2, A = range(6)
 N_LOCAL = 6
 
 
-class Surfaces(NamedTuple):
-    """The arrays of an interface that the kernels read, in this order."""
-
-    reference: FloatArray  # (n_nodes, 2), positions in the reference configuration
-    slave: IntArray  # (n_slave_segments, 2), nodes
-    master: IntArray  # (n_master_segments, 2), nodes
-    neighbours: IntArray  # (n_master_segments, 2), the previous and the next master segment, −1 at a free end
-
-
 class Points(NamedTuple):
     """The pairing of points, each array of shape (n_points,), in this order."""
 
     segment: IntArray  # the slave segment that carries the point
     other: IntArray  # the other slave segment at a slave node, −1 if there is none
-    slot: IntArray  # the entry of `Options.c` and `Options.weight` that belongs to the point
+    slot: IntArray  # its entry of the places and shares in `options`
     master: IntArray  # the nearest master segment
     active: BoolArray  # the point is in contact
-
-
-class Options(NamedTuple):
-    """The numbers that make a method of this family, in this order."""
-
-    c: FloatArray  # (n_slots,), places on a slave segment in [−1, 1]
-    weight: FloatArray  # (n_slots,), shares of the length of a slave segment
-    area_from: int  # NODAL, CURRENT or REFERENCE
-    penalty: float
 
 
 class Contact(NamedTuple):

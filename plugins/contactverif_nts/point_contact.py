@@ -201,7 +201,7 @@ class PointContact:
 
 
 def surfaces_of(interface: Interface, reference: FloatArray) -> Fields:
-    """Return the fields of `nts_force.Surfaces`."""
+    """Return the arrays of an interface as kernels unpack them."""
     master = interface.master
     return reference, interface.slave.segments, master.segments, master.neighbours
 

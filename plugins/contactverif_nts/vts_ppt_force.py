@@ -17,8 +17,9 @@ Rules for the next editor:
 
 1. All decisions are in the pairing (`walk.Areas`). Nothing here compares real numbers.
 2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
-3. A kernel gets the fields of `Surfaces`, `Areas` and `Options` as plain tuples and unpacks them first; `nts_force`
-   says why.
+3. A kernel gets plain tuples and unpacks them first; `nts_force` says why, and what `surfaces` are. `areas` are the
+   fields of `walk.Areas`. `options` are n, the number of virtual slave nodes on a slave segment, PRINTED or BALANCED,
+   whether lengths are measured in the current configuration, and the penalty.
 4. `vts_ppt_tangent` differentiates this file line by line. Change both.
 
 Source: Zavarise & De Lorenzis (2009), Box 3, Eqs. 6, 8, 9.
@@ -38,15 +39,6 @@ from contactverif_nts.nts_force import area_length, push
 from contactverif_nts.walk import NOT_CUT, middle_of_part
 
 PRINTED, BALANCED = 0, 1  # How the master side gets its share.
-
-
-class Options(NamedTuple):
-    """The options of a preset, in this order."""
-
-    n: int  # virtual slave nodes on a slave segment
-    transmission: int  # PRINTED or BALANCED
-    current_area: bool  # lengths of areas are measured in the current configuration, else in the reference
-    penalty: float
 
 
 class Area(NamedTuple):

@@ -67,20 +67,12 @@ _BEGIN = constant(0)
 _FEW = 2  # The nodes of a point over so many master segments always fit: A, B, four that cut, and three.
 
 
-class Couplings(NamedTuple):
-    """The couplings of a sweep, in this order."""
-
-    nodes: NumberArray  # (n_entries,), ascending within a coupling, its multiplier last
-    starts: IntArray  # (n_couplings + 1,)
-    first_point: IntArray  # (n_couplings,), the virtual slave nodes of each coupling
-    end_point: IntArray
-    segment: IntArray  # (n_couplings,), the master segment, or WHOLE
-
-
 def list_couplings(surfaces: Fields, areas: Fields, n: int, group: int, first_multiplier: int) -> Fields:
-    """List the couplings of all virtual slave nodes, n on each slave segment, as the fields of `Couplings`.
+    """List the couplings of all virtual slave nodes, n on each slave segment, at most `group` in a coupling.
 
-    A coupling has at most `group` of them. The number of the first multiplier is NO_NODE for a penalty.
+    Return their nodes (n_entries,), ascending within a coupling, its multiplier last; where each begins
+    (n_couplings + 1,); from which to which virtual slave node each goes; and its master segment, or WHOLE. The number
+    of the first multiplier is NO_NODE for a penalty.
     """
     _, first, last, _, _, _, _, _, active = areas
     n_most, n_entries = _bound_couplings(surfaces[3], first, last, active, first_multiplier != NO_NODE)
@@ -94,7 +86,7 @@ def list_couplings(surfaces: Fields, areas: Fields, n: int, group: int, first_mu
 def _write_couplings(
     written: Fields, surfaces: Fields, areas: Fields, n: int, group: int, first_multiplier: int
 ) -> tuple[int, int]:
-    """Write the fields of `Couplings`; return the number of couplings, and of the entries of `nodes`."""
+    """Write the answers; return the number of couplings, and of the entries of `nodes`."""
     _, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     nodes, starts, first_point, end_point, segment = written
