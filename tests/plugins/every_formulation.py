@@ -1,10 +1,12 @@
 """The built-in formulations with their options, for tests that ask all of them the same question."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
+from surfaces import make_bent
 
-from contactverif import Interface
+from contactverif import Interface, load_formulation
 
 FORMULATIONS = (
     *("nts", "nts-ar", "nts-ar:area=reference", "vts-g:n=3", "vts-g:area=reference"),
@@ -21,7 +23,19 @@ FORMULATIONS = (
 )
 
 
-def draw_multipliers(formulation: Any, interface: Interface, seed: int) -> Any:
-    """Return random multipliers, most of which press."""
-    n_multipliers = formulation.n_multipliers(interface)
-    return np.random.default_rng(seed).uniform(-0.1, 1, n_multipliers)
+@cache
+def load(name: str, penalty: float = 8.0) -> Any:
+    """Return the formulation of that name, options included."""
+    return load_formulation(name).with_penalty(penalty).plugin
+
+
+def draw_multipliers(formulation: Any, interface: Interface, seed: int, low: float = -0.1, high: float = 1.0) -> Any:
+    """Return random multipliers, most of which press; none of a formulation that has none."""
+    n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
+    return np.random.default_rng(seed).uniform(low, high, n)
+
+
+def bent_state(formulation: Any, seed: int, low: float = -1.0, high: float = 1.0) -> tuple[Interface, Any]:
+    """Return bent surfaces, and z with random multipliers where the formulation has any."""
+    interface, z = make_bent(seed)
+    return interface, np.append(z, draw_multipliers(formulation, interface, seed, low, high))

@@ -1,16 +1,16 @@
 """All formulations answer alike on random bent surfaces: exact tangents, declared balance, batches, plain kernels."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from every_formulation import FORMULATIONS
-from subjects import load_subject
-from surfaces import make_bent
+from every_formulation import FORMULATIONS, bent_state, load
 
-from contactverif import Interface
+import contactverif_mortar
+import contactverif_nts
+from contactverif import Interface, MisuseError
 from contactverif.compiler import python_function
 
 NAMES = (
@@ -31,16 +31,9 @@ UNCOMPILED = NAMES[len(FORMULATIONS) * (np.finfo(np.longdouble).nmant > np.finfo
 KERNELS = ("contactverif.geometry.", "contactverif_nts.", "contactverif_mortar.")
 
 
-def load(name: str) -> Any:
-    return load_subject(name).with_penalty(8.0).plugin
-
-
 def states(formulation: Any, count: int) -> Iterator[tuple[Interface, Any]]:
     """Yield bent scenes; half of the multipliers are negative, so that some points let go."""
-    for seed in range(count):
-        interface, z = make_bent(seed)
-        n = formulation.n_multipliers(interface) if hasattr(formulation, "n_multipliers") else 0
-        yield interface, np.append(z, np.random.default_rng(seed).uniform(-1, 1, n))
+    yield from (bent_state(formulation, seed) for seed in range(count))
 
 
 @EACH
@@ -119,3 +112,30 @@ def test_a_batch_is_a_loop_bitwise(name: str) -> None:
     assert answers.shape == batch.shape
     for place in np.ndindex(3, 2):
         assert np.array_equal(answers[place], formulation.residual(interface, pairing, batch[place]))
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "named"),
+    [
+        (contactverif_nts.vts_me, {"n": 0}, "n: found 0; needed a whole number from 1 to 1000"),
+        (contactverif_nts.vts_me, {"n": 1.5}, "n: found 1.5"),
+        (contactverif_nts.vts_me_lm, {"n": 0}, "n: found 0"),
+        (contactverif_nts.nts_lm, {"penalty": 0}, "penalty: found 0"),
+        (contactverif_nts.nts_ar, {"area": "old"}, "area: found 'old'"),
+        (contactverif_nts.vts_ppt, {"free_end": "open"}, "free_end: found 'open'"),
+        (contactverif_nts.nts, {"tau": -1}, "tau: found -1"),
+        (contactverif_nts.vts_ppt, {"penalty": 0}, "penalty: found 0"),
+        (contactverif_nts.vts_ppt, {"penalty": float("nan")}, "penalty: found nan"),
+        (contactverif_nts.vts_ppt, {"threads": 0}, "threads: found 0; needed a whole number from 1 to 1000"),
+        (contactverif_mortar.mortar_two_half_pass, {"n": 1}, "n: found 1; needed a whole number from 2 to 1000"),
+        (contactverif_mortar.sts, {"penalty": 0.0}, "penalty: found 0.0"),
+        (contactverif_mortar.sts, {"area": "slave"}, "area: found 'slave'"),
+        (contactverif_mortar.mortar, {"penalty": float("nan")}, "penalty: found nan"),
+        (contactverif_mortar.mortar_dual_lm, {"normals": 3}, "normals: found 3"),
+        (contactverif_mortar.chen_hisada, {"tau": 1.0}, "tau: found 1.0"),
+        (contactverif_mortar.chen_hisada, {"penalty": True}, "penalty: found True"),
+    ],
+)
+def test_options_are_checked(make: Callable[..., Any], options: dict[str, Any], named: str) -> None:
+    with pytest.raises(MisuseError, match=named):
+        make(**{"penalty": 1.0, **options})

@@ -1,68 +1,17 @@
-"""The formulations transmit the forces of the paper's tables exactly; the printed algorithm has its known defects."""
+"""Forces of node-to-segment formulations, and the known defects of the printed algorithm.
 
-from collections.abc import Callable
-from fractions import Fraction
-from typing import Any
+The tables of the paper are asked by `patch.flat.published`, with tables by hand in `tests/properties`.
+"""
 
 import numpy as np
 import pytest
+from every_formulation import load
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
-import contactverif_mortar
-import contactverif_nts
-from contactverif import Interface, MisuseError, Surface
+from contactverif import Interface, Surface
 
 PENALTY = 8.0  # p = ε̂ |g| = 1
-
-TABLE = {  # case: slave lengths, master lengths, {formulation: forces on the master}
-    "A1": ([2, 2], [4], {"nts_ar": "2 2", "vts_g": "2 2", "vts_me": "2 2", "vts_ppt": "2 2"}),
-    "B": (
-        [2, 2, 4, 4],
-        [3, 3, 4, 2],
-        {
-            "nts": "4/3 4/3 5/6 1/2 1",
-            "nts_ar": "5/3 10/3 3 2 2",
-            "vts_me": "3/2 3 7/2 3 1",
-            "vts_ppt": "3/2 3 7/2 3 1",
-            "vts_ppt_balanced": "3/2 3 7/2 3 1",
-        },
-    ),
-    "C": (
-        [2, 2, 4, 4],
-        [3, 3, 3, 3],
-        {
-            "nts": "4/3 4/3 2/3 2/3 1",
-            "nts_ar": "5/3 10/3 7/3 8/3 2",
-            "vts_me": "3/2 3 17/6 10/3 4/3",
-            "vts_ppt": "3/2 3 3 3 3/2",
-            "vts_ppt_basic": "3/2 3 3 3 3/2",
-            "vts_ppt_balanced": "3/2 3 3 3 3/2",
-        },
-    ),
-}
-ON_THE_SLAVE = {"A1": "1 2 1", "B": "1 2 3 4 2", "C": "1 2 3 4 2"}
-EVERY = ("nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_basic", "vts_ppt_balanced")
-
-
-def read_fractions(text: str) -> list[Fraction]:
-    return [Fraction(word) for word in text.split()]
-
-
-@pytest.mark.parametrize(
-    ("case", "name", "expected"),
-    [(case, name, expected) for case, (_, _, rows) in TABLE.items() for name, expected in rows.items()],
-)
-def test_force_tables_come_out_exactly(case: str, name: str, expected: str) -> None:
-    slave, master, _ = TABLE[case]
-    interface, z = make_flat(slave, master)
-    forces = contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
-    n_slave = interface.n_slave_nodes
-    computed = [Fraction(float(value)).limit_denominator(60) for value in -forces[n_slave:, 1][::-1]]
-    assert computed == read_fractions(expected)
-    assert np.abs([float(value) for value in computed] + forces[n_slave:, 1][::-1]).max() < 64 * 2.0**-53
-    on_slave = [1] * n_slave if name == "nts" else read_fractions(ON_THE_SLAVE[case])
-    assert [Fraction(float(value)) for value in forces[:n_slave, 1]] == on_slave
-    assert not forces[:, 0].any()
+EVERY = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
 
 
 @pytest.mark.parametrize("theta", [0.1, 0.3])
@@ -70,12 +19,12 @@ def test_printed_ppt_loses_one_minus_cosine_of_the_slave_force(theta: float) -> 
     interface, z = make_flat([1.0], [1.3, 1.4], shift=-0.8)
     x = z.reshape(-1, 2).copy()
     x[1] = x[0] + [np.cos(theta), -np.sin(theta)]  # penetrates deeper to the right; each area covers both segments
-    forces = contact_forces(contactverif_nts.vts_ppt(penalty=PENALTY, n=1), interface, x.ravel())
-    pairing = contactverif_nts.vts_ppt(penalty=PENALTY, n=1).pair(interface, x.ravel())
+    forces = contact_forces(load("vts-ppt:n=1"), interface, x.ravel())
+    pairing = load("vts-ppt:n=1").pair(interface, x.ravel())
     assert pairing["first"][0] != pairing["last"][0]
     defect = np.linalg.norm(forces.sum(axis=0)) / np.linalg.norm(forces[:2].sum(axis=0))
     assert defect == pytest.approx(1 - np.cos(theta), rel=1e-12)
-    balanced = contact_forces(contactverif_nts.vts_ppt_balanced(penalty=PENALTY, n=1), interface, x.ravel())
+    balanced = contact_forces(load("vts-ppt-balanced:n=1"), interface, x.ravel())
     assert np.linalg.norm(balanced.sum(axis=0)) < 16 * 2.0**-53
 
 
@@ -83,10 +32,7 @@ def test_basic_has_the_residual_of_the_printed_one_and_the_tangent_of_vts_me() -
     differs = 0
     for seed in range(50):
         interface, z = make_bent(seed)
-        printed, basic, me = (
-            make(penalty=8.0)
-            for make in (contactverif_nts.vts_ppt, contactverif_nts.vts_ppt_basic, contactverif_nts.vts_me)
-        )
+        printed, basic, me = map(load, ("vts-ppt", "vts-ppt-basic", "vts-me"))
         pairing, pairing_me = printed.pair(interface, z), me.pair(interface, z)
         assert np.array_equal(printed.residual(interface, pairing, z), basic.residual(interface, pairing, z))
         tangent = basic.tangent(interface, pairing, z).toarray()
@@ -100,9 +46,9 @@ def test_free_ends_truncate_extend_and_cover() -> None:
     """Half of the slave's last quarter overhangs; beside it a short last segment of the master."""
     interface, z = make_flat([4.0], [3.375, 0.125], shift=0.0)
     n_slave = interface.n_slave_nodes
-    truncated = contact_forces(contactverif_nts.vts_ppt(penalty=PENALTY), interface, z)
-    extended = contact_forces(contactverif_nts.vts_ppt(penalty=PENALTY, free_end="extend"), interface, z)
-    covered = contact_forces(contactverif_nts.vts_ppt_balanced(penalty=PENALTY), interface, z)
+    truncated = contact_forces(load("vts-ppt"), interface, z)
+    extended = contact_forces(load("vts-ppt:free_end=extend"), interface, z)
+    covered = contact_forces(load("vts-ppt-balanced"), interface, z)
     assert truncated[:n_slave, 1].sum() == 4
     assert -truncated[n_slave:, 1].sum() == 3.5
     b = 5.0  # the area of competence ends five lengths of the last segment behind its beginning
@@ -118,7 +64,7 @@ def test_free_ends_truncate_extend_and_cover() -> None:
 def test_wholly_past_the_master_open_or_exactly_closed_there_is_no_force(name: str, shift: float, lift: float) -> None:
     interface, z = make_flat([2, 2], [3, 1], shift)
     x = z.reshape(-1, 2) + [0.0, lift] * (np.arange(interface.n_nodes) < interface.n_slave_nodes)[:, None]
-    assert not contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, x.ravel()).any()
+    assert not contact_forces(load(name), interface, x.ravel()).any()
 
 
 @pytest.mark.parametrize("angle", np.linspace(0.1, 6.2, 23))
@@ -126,7 +72,7 @@ def test_wholly_past_the_master_open_or_exactly_closed_there_is_no_force(name: s
 def test_a_node_that_faces_a_free_end_is_not_lost_to_roundoff(name: str, angle: float) -> None:
     interface, z = make_flat([2, 2, 4, 4], [3, 3, 3, 3])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    formulation = getattr(contactverif_nts, name)(penalty=PENALTY)
+    formulation = load(name)
     turned = contact_forces(formulation, interface, (z.reshape(-1, 2) @ turn.T).ravel())
     assert turned @ turn == pytest.approx(contact_forces(formulation, interface, z), abs=1e-13)
 
@@ -134,8 +80,8 @@ def test_a_node_that_faces_a_free_end_is_not_lost_to_roundoff(name: str, angle: 
 @pytest.mark.parametrize("n_master", [1, 2, 7, 100])
 def test_any_number_of_master_segments_under_one_slave_segment(n_master: int) -> None:
     interface, z = make_flat([12.0], [12.0 / n_master] * n_master)
-    for name in ("vts_ppt", "vts_ppt_balanced"):
-        forces = contact_forces(getattr(contactverif_nts, name)(penalty=PENALTY), interface, z)
+    for name in ("vts-ppt", "vts-ppt-balanced"):
+        forces = contact_forces(load(name), interface, z)
         share = 12 / n_master
         expected = [-share / 2, *[-share] * (n_master - 1), -share / 2]
         assert forces[2:, 1] == pytest.approx(expected, rel=1e-12)
@@ -149,30 +95,9 @@ def test_several_and_closed_chains() -> None:
     ring = np.column_stack([numbers, np.roll(numbers, -1)])
     interface = Interface(np.vstack([outer, inner]), Surface(ring), Surface(ring + 4))
     assert (interface.master.neighbours >= 0).all()
-    for name in ("nts_ar", "vts_me", "vts_ppt", "vts_ppt_balanced"):
-        formulation = getattr(contactverif_nts, name)(penalty=PENALTY)
-        forces = contact_forces(formulation, interface, interface.nodes.ravel())
+    for name in ("nts-ar", "vts-me", "vts-ppt", "vts-ppt-balanced"):
+        forces = contact_forces(load(name), interface, interface.nodes.ravel())
         assert np.abs(forces.sum(axis=0)).max() < 1e-14
         radial = (forces[:4] * outer).sum(axis=1)
         assert radial == pytest.approx(radial[0])
         assert radial[0] > 0
-
-
-@pytest.mark.parametrize(
-    ("make", "options", "named"),
-    [
-        (contactverif_nts.vts_me, {"n": 0}, "n: found 0; needed a whole number from 1 to 1000"),
-        (contactverif_nts.vts_me, {"n": 1.5}, "n: found 1.5"),
-        (contactverif_nts.vts_me_lm, {"n": 0}, "n: found 0"),
-        (contactverif_nts.nts_lm, {"penalty": 0}, "penalty: found 0"),
-        (contactverif_mortar.mortar_two_half_pass, {"n": 1}, "n: found 1; needed a whole number from 2 to 1000"),
-        (contactverif_nts.nts_ar, {"area": "old"}, "area: found 'old'"),
-        (contactverif_nts.vts_ppt, {"free_end": "open"}, "free_end: found 'open'"),
-        (contactverif_nts.nts, {"tau": -1}, "tau: found -1"),
-        (contactverif_nts.vts_ppt, {"penalty": 0}, "penalty: found 0"),
-        (contactverif_nts.vts_ppt, {"penalty": float("nan")}, "penalty: found nan"),
-    ],
-)
-def test_options_are_checked(make: Callable[..., Any], options: dict[str, Any], named: str) -> None:
-    with pytest.raises(MisuseError, match=named):
-        make(**{"penalty": 1.0, **options})
