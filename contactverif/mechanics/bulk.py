@@ -148,7 +148,10 @@ def condense(body: Body) -> CondensedBody:
         interior = np.zeros(0, np.int64)
         gradients = np.zeros((0, 1, 4, 2))
         return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none.__matmul__, gradients)
-    matrices = _factorise(_ElasticPart.of_body(body))
+    corners = body.nodes[body.cells] - body.nodes[body.cells[:, :1]]
+    arrays = (corners, body.cells, body.fixed, body.contact_nodes, body.axis)
+    key = (body.cells.shape, body.young, body.poisson, *(array.tobytes() for array in arrays))
+    matrices = _factorise(_ElasticPart(key, body))
     forces = body.load.reshape(-1)
     if imposed.any():
         forces = forces - matrices.whole @ imposed
@@ -171,8 +174,8 @@ def condense(body: Body) -> CondensedBody:
 class _Matrices:
     """The matrices that follow from mesh, material and supports of an elastic body; loads have no part in them."""
 
-    unknowns: IntArray  # The free components on the contact boundary, and all others that are free.
-    interior: IntArray
+    unknowns: IntArray  # The free components on the contact boundary.
+    interior: IntArray  # All others that are free.
     whole: Any  # (2 n_nodes, 2 n_nodes) The stiffness matrix.
     across: Any  # (n_interior, n) The part of it that couples the interior with the unknowns.
     # Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
@@ -184,17 +187,10 @@ class _Matrices:
 
 @dataclass(frozen=True, slots=True)
 class _ElasticPart:
-    """An elastic body seen without its loads and its place: equal ones have the same matrices, bit by bit."""
+    """An elastic body seen without its loads and its place: those of one key have the same matrices, bit by bit."""
 
-    key: tuple[object, ...]
+    key: tuple[object, ...]  # The shape of each cell, material and supports.
     body: Body = field(compare=False)
-
-    @classmethod
-    def of_body(cls, body: Body) -> _ElasticPart:
-        """Return the part, with all that the matrices depend on: the shape of each cell, material and supports."""
-        corners = body.nodes[body.cells] - body.nodes[body.cells[:, :1]]
-        arrays = (corners, body.cells, body.fixed, body.contact_nodes, body.axis)
-        return cls((body.cells.shape, body.young, body.poisson, *(array.tobytes() for array in arrays)), body)
 
 
 @lru_cache(maxsize=SHARED_SIZE)

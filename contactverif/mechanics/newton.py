@@ -171,45 +171,42 @@ class Trace:
 
 
 @dataclass(slots=True)
+class _Iterate:
+    """An entry of each array of a `Trace`."""
+
+    u: FloatArray
+    pairings: Pairing | None
+    changes: int
+    factors: float
+    residuals: float
+    floors: float
+    roundings: float
+    energies: float = np.nan
+    conditions: float = np.nan
+    deficiencies: int = 0
+
+
+@dataclass(slots=True)
 class Record:
     """The trace of a solution that is still running."""
 
-    u: list[FloatArray] = field(default_factory=list)
-    factors: list[float] = field(default_factory=list)
-    residuals: list[float] = field(default_factory=list)
-    energies: list[float] = field(default_factory=list)
-    floors: list[float] = field(default_factory=list)
-    roundings: list[float] = field(default_factory=list)
-    changes: list[int] = field(default_factory=list)
-    conditions: list[float] = field(default_factory=list)
-    deficiencies: list[int] = field(default_factory=list)
-    pairings: list[Pairing | None] = field(default_factory=list)
+    iterates: list[_Iterate] = field(default_factory=list)
     forces: FloatArray = field(default_factory=lambda: np.zeros(0))
-
-    def add(
-        self, u: FloatArray, factor: float, residual: FloatArray, floor: FloatArray, comparable: Any, changes: int
-    ) -> None:
-        """Add an iterate. `comparable` are the factors (n,) of the entries of the residual, or one for all."""
-        self.u.append(u)
-        self.factors.append(factor)
-        self.residuals.append(float(np.abs(comparable * residual).max(initial=0.0)))
-        self.floors.append(float((comparable * floor).max(initial=0.0)))
-        self.roundings.append(largest_rounding(residual, floor))
-        self.changes.append(changes)
-        self.energies.append(np.nan)
-        self.conditions.append(np.nan)
-        self.deficiencies.append(0)
 
     def trace(self, scene: Scene, end: End) -> Trace:
         """Return the trace of the iterates so far."""
-        names = ("factors", "residuals", "energies", "floors", "roundings", "conditions", "forces")
-        arrays: dict[str, Any] = {name: freeze(getattr(self, name), np.float64) for name in names}
-        arrays |= {name: freeze(getattr(self, name), np.int64) for name in ("changes", "deficiencies")}
-        u = freeze(np.array(self.u), np.float64)
-        return Trace(scene, end, u, pairings=tuple(self.pairings), **arrays)
+
+        def column(name: str) -> list[Any]:
+            return [getattr(iterate, name) for iterate in self.iterates]
+
+        reals = ("u", "factors", "residuals", "energies", "floors", "roundings", "conditions")
+        arrays: dict[str, Any] = {name: freeze(np.array(column(name)), np.float64) for name in reals}
+        arrays |= {name: freeze(column(name), np.int64) for name in ("changes", "deficiencies")}
+        forces = freeze(self.forces, np.float64)
+        return Trace(scene, end, pairings=tuple(column("pairings")), forces=forces, **arrays)
 
 
-def largest_rounding(residual: FloatArray, floor: FloatArray) -> float:
+def _largest_rounding(residual: FloatArray, floor: FloatArray) -> float:
     """Return the largest ratio of an entry of the residual (n,) to what roundoff may cause in it."""
     with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
         roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
@@ -313,63 +310,76 @@ def _load_step(
     system: System, record: Record, u: FloatArray, iterations: int, tolerance: float, keep_matrix: bool
 ) -> tuple[End, FloatArray]:
     """Iterate from u (n,) at the system's load factor; return how that ended and the last iterate."""
-    first, before, n_free = len(record.u), None, system.scene.n_free
+    iterates: list[_Iterate] = []  # Those of this load step.
+    before: Pairing | None = None
     contact: Any = None
     last: Any = None
-    floor = np.zeros(system.size)
+    n_free, floor = system.scene.n_free, np.zeros(system.size)
     size = float(np.abs(system.scene.interface.nodes).max())
     for iteration in range(iterations + 1):
         if not np.isfinite(u).all() or np.abs(u[:n_free]).max(initial=0.0) > DIVERGENCE_FACTOR * size:
             return End.DIVERGED, u  # No plugin is called for such a state.
-        pairing = system.pair(u)
+        pairing, tangent = system.pair(u), None
+        comparable: Any = 1.0
         share = tolerance * (iteration > 0)
-        # The last iterate needs no tangent, nor does one that keeps the matrix.
-        forces, tangent = system.forces_and_tangent(u, pairing, later=share > 0 or keep_matrix)
-        record.pairings.append(pairing)
-        record.forces = forces
-        residual = system.balance(u, forces)
-        changes = _count_changes(pairing, before)
-        if system.is_balanced(residual, forces, share):
-            record.add(u, system.factor, residual, floor, 1.0, changes)
-            return End.CONVERGED, u
+        if share > 0 or keep_matrix:  # The last iterate needs no tangent, nor does one that keeps the matrix.
+            forces = system.forces(u, pairing)
+        else:
+            forces, tangent = system.forces_and_tangent(u, pairing)
+        record.forces, residual = forces, system.balance(u, forces)
+        balanced = system.is_balanced(residual, forces, share)
         # The matrix is kept while a residual is small enough against the last one of this load step.
-        falls = len(record.u) > first and largest_rounding(residual, floor) <= record.roundings[-1] / KEPT_FALL
-        keeps = keep_matrix and falls
-        if not keeps:
-            contact = system.contact_stiffness(u, pairing, tangent)
-        matrix, floor = system.stiffness + contact, system.floor(u, contact, forces)
-        comparable = scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
-        record.add(u, system.factor, residual, floor, comparable, changes)
-        end = _end(record, first, n_free, keeps=keeps)
+        keeps = (
+            keep_matrix
+            and bool(iterates)
+            and (_largest_rounding(residual, floor) <= iterates[-1].roundings / KEPT_FALL)
+        )
+        if not balanced:
+            if not keeps:
+                contact = system.contact_stiffness(u, pairing, tangent)
+            matrix, floor = system.stiffness + contact, system.floor(u, contact, forces)
+            comparable = scale_factors(matrix, n_free)[0] if system.n_multipliers else 1.0
+        iterate = _Iterate(
+            u,
+            pairing,
+            _count_changes(pairing, before),
+            system.factor,
+            residuals=float(np.abs(comparable * residual).max(initial=0.0)),
+            floors=float((comparable * floor).max(initial=0.0)),
+            roundings=_largest_rounding(residual, floor),
+        )
+        iterates.append(iterate)
+        record.iterates.append(iterate)
+        end = End.CONVERGED if balanced else _end(iterates, n_free, keeps=keeps)
         if end is not None:
             return end, u
         if iteration == iterations:
             return End.EXHAUSTED, u
         step = system.step(matrix, -residual, floor)
-        if step.change is None and last is not None and record.roundings[-1] <= NEAR_CONVERGENCE:
+        if step.change is None and last is not None and iterate.roundings <= NEAR_CONVERGENCE:
             # Near the solution of a tie, where the residual is some units of its floor, roundoff decides who faces
             # whom. If that leaves a singular matrix, the one before is as right.
             step = system.step(last, -residual, floor)
         else:
             last = matrix
-        record.conditions[-1], record.deficiencies[-1] = step.condition, step.deficiency
+        iterate.conditions, iterate.deficiencies = step.condition, step.deficiency
         if step.change is None:
             return End.SINGULAR, u
-        record.energies[-1] = abs(float(step.change @ residual))
+        iterate.energies = abs(float(step.change @ residual))
         u, before = u + step.change, pairing
     raise AssertionError("the loop returns")
 
 
-def _end(record: Record, first: int, n_free: int, *, keeps: bool) -> End | None:
-    """Return how the load step whose iterates begin at number `first` has ended, None if it goes on."""
-    residuals, roundings = record.residuals[first:], record.roundings[first:]
+def _end(iterates: list[_Iterate], n_free: int, *, keeps: bool) -> End | None:
+    """Return how a load step has ended, None if it goes on."""
+    first, last, roundings = iterates[0], iterates[-1], [iterate.roundings for iterate in iterates]
     # The floor of a matrix that is kept is that of another state, whose forces may be larger. So what still falls fast,
     # `keeps`, is not at rest, however small it is.
-    if roundings[-1] <= (0 if keeps else 1):
+    if last.roundings <= (0 if keeps else 1):
         return End.CONVERGED
-    if not np.isfinite(residuals[-1]) or residuals[-1] > DIVERGENCE_FACTOR * max(residuals[0], record.floors[first]):
+    if not np.isfinite(last.residuals) or last.residuals > DIVERGENCE_FACTOR * max(first.residuals, first.floors):
         return End.DIVERGED
-    q = [u[:n_free] for u in record.u[first:][-5:]]
+    q = [iterate.u[:n_free] for iterate in iterates[-5:]]
     if len(q) > 4 and min(roundings[-4:]) > NEAR_CONVERGENCE:
         returns = [np.abs(q[-1 - k] - q[-3 - k]).max() for k in (0, 1)]
         if max(returns) <= 2.0**-20 * np.abs(q[-1] - q[-2]).max():  # Two states alternate.

@@ -52,18 +52,18 @@ def pack_bodies(bodies: Sequence[Body], slave: Sequence[int]) -> dict[str, Float
         n_cells, n_corners = body.cells.shape
         cells[row : row + n_cells, :n_corners] = body.cells + start
         row += n_cells
-    stacks = {name: np.vstack([getattr(body, name) for body in bodies]) for name in ("nodes", "imposed", "load")}
-    rows = {name: np.array([getattr(body, name) for body in bodies]) for name in ("young", "poisson", "axis", "start")}
+
+    def stack(*names: str) -> dict[str, FloatArray]:
+        return {name: np.vstack([getattr(body, name) for body in bodies]).astype(np.float64) for name in names}
+
     return {
-        "nodes": stacks["nodes"],
+        **stack("nodes"),
         "cells": cells,
         "contact": np.vstack(contact).astype(np.float64),
-        "fixed": np.vstack([body.fixed for body in bodies]).astype(np.float64),
-        "imposed": stacks["imposed"],
-        "load": stacks["load"],
+        **stack("fixed", "imposed", "load"),
         "count": np.array(counts, dtype=np.float64),
         "is_slave": np.array([index in slave for index in range(len(bodies))], dtype=np.float64),
-        **rows,
+        **{name: np.array([getattr(body, name) for body in bodies]) for name in ("young", "poisson", "axis", "start")},
     }
 
 
@@ -91,9 +91,8 @@ def unpack_bodies(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], t
                 name=body_name(packed["is_slave"], index),
             )
         )
-    slave = np.flatnonzero(packed["is_slave"] != 0)
-    master = np.flatnonzero(packed["is_slave"] == 0)
-    return tuple(bodies), tuple(slave.tolist()), tuple(master.tolist())
+    slave, master = (np.flatnonzero((packed["is_slave"] != 0) == side).tolist() for side in (True, False))
+    return tuple(bodies), tuple(slave), tuple(master)
 
 
 def body_name(is_slave: FloatArray, index: int) -> str:
@@ -216,6 +215,10 @@ class Scene:
         return slaves + masters
 
     @property
+    def _reached(self) -> tuple[Body, ...]:
+        return tuple(self.bodies[index] for index in self.bodies_in_reach)
+
+    @property
     def nodes_in_reach(self) -> IntArray:
         """The numbers (n_nodes,) of the interface's nodes among the nodes of all bodies, one body after the other."""
         first = np.cumsum([0, *(len(body.nodes) for body in self.bodies)])
@@ -224,26 +227,23 @@ class Scene:
     @cached_property
     def condensed_bodies(self) -> tuple[CondensedBody, ...]:
         """The bodies within reach, condensed, in the order of `bodies_in_reach`."""
-        return tuple(condense(self.bodies[index]) for index in self.bodies_in_reach)
+        return tuple(map(condense, self._reached))
 
     @cached_property
     def interface(self) -> Interface:
         """The contact boundaries of the bodies within reach."""
         segments: dict[bool, list[IntArray]] = {True: [], False: []}
         first = 0
-        for index in self.bodies_in_reach:
-            body = self.bodies[index]
+        for index, body in zip(self.bodies_in_reach, self._reached, strict=True):
             segments[index in self.slave].append(np.searchsorted(body.contact_nodes, body.contact) + first)
             first += len(body.contact_nodes)
-        nodes = np.vstack(
-            [self.bodies[index].nodes[self.bodies[index].contact_nodes] for index in self.bodies_in_reach]
-        )
+        nodes = np.vstack([body.nodes[body.contact_nodes] for body in self._reached])
         return Interface(nodes, Surface(np.vstack(segments[True])), Surface(np.vstack(segments[False])))
 
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
         """The unknowns of each body within reach: 2 × node + component of what is free on its contact boundary."""
-        return tuple(free_on_contact(self.bodies[index]) for index in self.bodies_in_reach)
+        return tuple(map(free_on_contact, self._reached))
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
@@ -281,8 +281,7 @@ class Scene:
         """
         rows, columns, values = [], [], []
         first = 0
-        for index, unknowns, part in zip(self.bodies_in_reach, self.unknowns, self.slices, strict=True):
-            body = self.bodies[index]
+        for body, unknowns, part in zip(self._reached, self.unknowns, self.slices, strict=True):
             nodes, components = np.divmod(unknowns, 2)
             on_contact = np.flatnonzero(np.isin(nodes, body.contact_nodes))
             row = 2 * (first + np.searchsorted(body.contact_nodes, nodes[on_contact]))
@@ -302,15 +301,14 @@ class Scene:
     @cached_property
     def imposed_displacements(self) -> FloatArray:
         """The change (n_unknowns,) of the positions z by the imposed displacements, a length each."""
-        bodies = [self.bodies[index] for index in self.bodies_in_reach]
-        parts = [(body.imposed @ body.frame.T)[body.contact_nodes] for body in bodies]
+        parts = [(body.imposed @ body.frame.T)[body.contact_nodes] for body in self._reached]
         return np.vstack(parts).reshape(-1)
 
     @cached_property
     def start(self) -> FloatArray:
         """The first guess (n_free,) of q."""
-        pairs = zip(self.bodies_in_reach, self.unknowns, strict=True)
-        return np.concatenate([self.bodies[index].start[unknowns % 2] for index, unknowns in pairs])
+        pairs = zip(self._reached, self.unknowns, strict=True)
+        return np.concatenate([body.start[unknowns % 2] for body, unknowns in pairs])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return the current positions z (n_unknowns,) of the interface's nodes, a length each."""
@@ -413,13 +411,8 @@ class Scene:
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""
         unknowns = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
-        pairs = []
-        for index, body in enumerate(self.bodies):
-            condensed = condense(body)
-            if index not in unknowns:
-                unknowns[index] = _solve_alone(condensed, factor)
-            pairs.append((condensed, unknowns[index]))
-        return pairs
+        condensed = enumerate(map(condense, self.bodies))
+        return [(body, unknowns[n] if n in unknowns else _solve_alone(body, factor)) for n, body in condensed]
 
 
 def has_bodies(case: Case) -> bool:
@@ -433,7 +426,6 @@ _ORIGINS: OrderedDict[Case, Scene] = OrderedDict()
 
 
 def _remember(case: Case, scene: Scene) -> None:
-    """Keep the scene of a case, and let go of the oldest one if there are too many."""
     _ORIGINS[case] = scene
     if len(_ORIGINS) > CACHE_SIZE:
         _ORIGINS.popitem(last=False)
@@ -464,7 +456,6 @@ def scene_of(case: Case) -> Scene:
 
 
 def _box_in_reach(body: Body) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of the box around the contact boundary, widened by its diagonal."""
     nodes, frame = body.nodes[body.contact_nodes], body.frame
     moves = body.start if not body.rigid else body.imposed[body.contact_nodes].mean(axis=0)
     places = np.vstack([nodes, nodes + frame @ moves])
@@ -497,7 +488,7 @@ class WholeScene(Scene):
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
         """The unknowns of each body within reach: 2 × node + component of all that is free."""
-        return tuple(np.flatnonzero(~self.bodies[index].fixed.reshape(-1)) for index in self.bodies_in_reach)
+        return tuple(np.flatnonzero(~body.fixed.reshape(-1)) for body in self._reached)
 
     @cached_property
     def stiffness(self) -> FloatArray | sparse.csr_array:
@@ -509,8 +500,7 @@ class WholeScene(Scene):
     @cached_property
     def load(self) -> FloatArray:
         """The load (n_free,), a force: that of nodal forces and of imposed displacements."""
-        bodies = (self.bodies[index] for index in self.bodies_in_reach)
-        parts = zip(bodies, self._rows, self.unknowns, strict=True)
+        parts = zip(self._reached, self._rows, self.unknowns, strict=True)
         return np.concatenate(
             [body.load.reshape(-1)[free] - rows @ body.imposed.reshape(-1) for body, rows, free in parts]
         )
@@ -519,8 +509,7 @@ class WholeScene(Scene):
     def _rows(self) -> tuple[Any, ...]:
         """The rows (n_unknowns, 2 n_nodes) of the stiffness of each body within reach."""
         rows = []
-        for index, free in zip(self.bodies_in_reach, self.unknowns, strict=True):
-            body = self.bodies[index]
+        for body, free in zip(self._reached, self.unknowns, strict=True):
             nothing = (2 * len(body.nodes),) * 2
             rows.append(sparse.csr_array(nothing if body.rigid else assemble_stiffness(body)[0])[free])
         return tuple(rows)

@@ -184,26 +184,18 @@ class System:
 
     def tangent(self, u: FloatArray, pairing: Pairing | None) -> Any:
         """Return the derivative of `forces` at the unknowns u (n,); differences where it must not ask for a tangent."""
-        z = self.state(u)
         if self._asks_tangent:
-            return self.formulation.tangent(self.scene.interface, pairing, z)
-        return self._differences(pairing, z)
+            return self.formulation.tangent(self.scene.interface, pairing, self.state(u))
+        return self._differences(pairing, self.state(u))
 
-    def forces_and_tangent(
-        self, u: FloatArray, pairing: Pairing | None, *, later: bool = False
-    ) -> tuple[FloatArray, Any]:
-        """Return `forces` and `tangent` at the unknowns u (n,), in one call where the formulation offers that.
-
-        With `later`, the tangent is None: it may not be needed.
-        """
-        if later:
-            return self.forces(u, pairing), None
+    def forces_and_tangent(self, u: FloatArray, pairing: Pairing | None) -> tuple[FloatArray, Any]:
+        """Return `forces` and `tangent` at the unknowns u (n,), in one call where that is offered."""
         return self.forces_and_tangents([u], pairing)[0]
 
     def forces_and_tangents(
         self, states: Sequence[FloatArray], pairing: Pairing | None
     ) -> list[tuple[FloatArray, Any]]:
-        """Return `forces` and `tangent` at each of some unknowns u (n,), all asked for together."""
+        """Return `forces` and `tangent` at each of some unknowns u (n,), in one call where that is offered."""
         if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
             return [(self.forces(u, pairing), self.tangent(u, pairing)) for u in states]
         interface = self.scene.interface

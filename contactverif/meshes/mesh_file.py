@@ -19,7 +19,6 @@ from contactverif.contract.interface import ONE_SIDED, TRIANGLE, Interface, Surf
 from contactverif.meshes.plain_mesh import Group, PlainMesh, groups_of, kinds_in, read_mesh, unknown_group_error
 
 FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
-_CORNERS = {"triangle": 3, "quad": 4}  # Numbers of corners.
 
 
 def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = False) -> Interface:
@@ -53,91 +52,91 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
 
         interface = read_interface("punch.msh", slave="punch", master="base")
     """
-    mesh, groups, in_space = _read_groups(path, slave, master)
-    if in_space:
-        interface = _surfaces_of(mesh, groups, (slave, master), flip=flip)
-    else:
-        sides = _sides_of(mesh, groups, slave=slave, master=master, flip=flip)
-        interface = _renumber(sides.points, sides.slave, sides.master)
-        check_facing(interface)
-    sys.stderr.write(mesh.warnings)
+    sides = read_sides(path, slave=slave, master=master, flip=flip, plane_only=False)
+    interface = _renumber(sides.points, sides.slave, sides.master)
+    check_facing(interface)
+    sys.stderr.write(sides.mesh.warnings)
     return interface
-
-
-def _read_groups(path: str | Path, slave: str, master: str) -> tuple[PlainMesh, dict[str, Group], bool]:
-    """Return a mesh, its groups, and whether that of the slave or of the master consists of faces in space."""
-    if slave == master:
-        raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
-    mesh = read_mesh(path)
-    groups = groups_of(mesh)
-    return mesh, groups, any(_is_in_space(mesh, groups, name) for name in (slave, master))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshSides:
-    """A mesh with the lines of slave and master, each line with its body on the left."""
+    """A mesh with the lines of slave and master, each line with its body on the left; in space with their faces."""
 
     mesh: PlainMesh
-    points: FloatArray  # (n_points, 2) Positions.
+    points: FloatArray  # (n_points, 2) Positions; in space (n_points, 3).
     groups: dict[str, Group]
-    slave: IntArray  # (n_lines, 2) Numbers of points, as in `master`.
+    slave: IntArray  # (n_lines, 2) Numbers of points, as in `master`; in space (n_faces, 3 or 4).
     master: IntArray
 
 
-def read_sides(path: str | Path, *, slave: str, master: str, flip: bool) -> MeshSides:
-    """Read the lines of two groups, oriented; the arguments and errors are those of `read_interface`."""
-    mesh, groups, in_space = _read_groups(path, slave, master)
-    if in_space:
+def read_sides(path: str | Path, *, slave: str, master: str, flip: bool, plane_only: bool = True) -> MeshSides:
+    """Read the lines or faces of two groups, oriented; arguments and errors are those of `read_interface`."""
+    if slave == master:
+        raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
+    mesh = read_mesh(path)
+    groups = groups_of(mesh)
+    in_space = any(_is_in_space(mesh, groups, name) for name in (slave, master))
+    if in_space and plane_only:
         raise MisuseError("--mesh", "faces in space", "lines in a plane: bodies in space are not solved")
-    return _sides_of(mesh, groups, slave=slave, master=master, flip=flip)
-
-
-def _sides_of(mesh: PlainMesh, groups: dict[str, Group], *, slave: str, master: str, flip: bool) -> MeshSides:
-    """Return the lines of two groups, oriented."""
-    points = _planar(mesh)
-    named = [
-        (argument, _lines(mesh, groups, argument, name))
-        for argument, name in (("--slave", slave), ("--master", master))
-    ]
-    shared = np.intersect1d(named[0][1], named[1][1])
+    points = mesh.points if in_space else _planar(mesh)
+    members = _faces if in_space else _lines
+    sides = {option: members(mesh, groups, option, name) for option, name in (("--slave", slave), ("--master", master))}
+    shared = np.intersect1d(sides["--slave"], sides["--master"])
     if len(shared):
         actual = f"a node of the slave surface too, at {describe_place(points, shared[0])}"
-        raise MisuseError("--master", actual, "surfaces without a common node")
-    inside = _directed_edges(mesh, points)
-    oriented = [_orient_lines(argument, lines, inside, points) for argument, lines in named]
-    return MeshSides(mesh, points, groups, *_flip(oriented, flip=flip))
-
-
-def _flip(oriented: list[tuple[IntArray, BoolArray]], *, flip: bool) -> list[IntArray]:
-    """Return the corners of both sides; `flip` turns what has no cells beside it, or all if everything has some."""
+        two_nodes = ": two nodes where the bodies touch" if in_space else ""
+        raise MisuseError("--master", actual, f"surfaces without a common node{two_nodes}")
+    if not np.isfinite(points[np.unique(np.concatenate([side.reshape(-1) for side in sides.values()]))]).all():
+        raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
+    inside = None if in_space else _directed_edges(mesh, points)
+    oriented = []
+    for argument, side in sides.items():
+        if inside is None:
+            neighbours, signs = _neighbours_of_faces(argument, points, side), _outward(argument, mesh, side)
+            words = "a surface", "one body on one side"
+        else:
+            neighbours, signs = _neighbours_of_lines(argument, side, points), _leftward(argument, side, inside, points)
+            words = "a chain", "a body on one side of a chain"
+        oriented.append(_run_one_way(argument, points, side, neighbours, signs, words))
+    # `flip` turns what has no cells beside it, or all if everything has some.
     every = all(by_cells.all() for _, by_cells in oriented)
-    return [np.where((flip & (every | ~by_cells))[:, None], side[:, ::-1], side) for side, by_cells in oriented]
+    turned = [np.where((flip & (every | ~by_cells))[:, None], side[:, ::-1], side) for side, by_cells in oriented]
+    return MeshSides(mesh, points, groups, *turned)
 
 
 def check_facing(interface: Interface) -> None:
-    """Refuse two surfaces whose mean normals, weighted by length, do not oppose each other."""
+    """Refuse two surfaces whose mean normals, weighted by length or area, do not oppose each other."""
     slave, master = (_mean_normal(surface, interface.nodes) for surface in (interface.slave, interface.master))
-    # The normals of a closed chain sum to zero whichever way it runs, so a surface without an open chain shows nothing.
     if slave is None or master is None or slave @ master < 0:
         return
-    raise MisuseError(
-        "--mesh",
-        f"mean normals ({slave[0]:.3g}, {slave[1]:.3g}) of the slave and ({master[0]:.3g}, {master[1]:.3g}) of the "
-        "master, which do not oppose each other",
+    words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in (slave, master)]
+    needed = (
         "surfaces that face each other, each with its body on the left of its lines. Keep the 2-D cells in the file, "
         "they tell the side; or turn the lines of one group in the mesher (Gmsh: a minus sign before its curves); or "
         "give --flip where only one surface has cells beside it (it turns the lines without cells, and both surfaces "
-        "where neither or each has cells)",
+        "where neither or each has cells)"
+        if interface.dim == 2
+        else "surfaces that face each other, each seen from outside its body. Keep the volume cells in the file, they "
+        "tell the side; or give --flip where only one surface has cells beside it (it turns the faces without cells, "
+        "and both surfaces where neither or each has cells)"
     )
+    actual = f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other"
+    raise MisuseError("--mesh", actual, needed)
 
 
 def _mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray | None:
-    """Return the mean normal (2,) out of the body, weighted by length; None if all chains are closed."""
+    """Return the mean normal (dim,) out of the body; None where the surface is closed, or nearly so in space."""
+    if nodes.shape[1] == 3:
+        turns = turns_of(nodes[surface.faces]).sum(axis=1)
+        mean: FloatArray = turns.sum(axis=0) / np.linalg.norm(turns, axis=1).sum()
+        return mean if np.linalg.norm(mean) >= ONE_SIDED else None
+    # The normals of a closed chain sum to zero whichever way it runs. The sum over an open one telescopes.
     starts = surface.segments[surface.neighbours[:, 0] < 0, 0]
     ends = surface.segments[surface.neighbours[:, 1] < 0, 1]
     if not len(starts):
         return None
-    along = nodes[ends].sum(axis=0) - nodes[starts].sum(axis=0)  # The sum over all segments telescopes.
+    along = nodes[ends].sum(axis=0) - nodes[starts].sum(axis=0)
     normal: FloatArray = np.array([along[1], -along[0]]) / surface.lengths(nodes).sum()
     return normal
 
@@ -158,22 +157,29 @@ def _planar(mesh: PlainMesh) -> FloatArray:
     return points[:, :2]
 
 
-def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
-    """Return the nodes (n_lines, 2) of the lines of a group, in the order of the file."""
+def _members(
+    mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str, types: tuple[str, ...]
+) -> tuple[list[str], IntArray]:
+    """Return the types of the cells in a group, and the nodes of those of one of `types`, in the order of the file."""
     if name not in groups:
         raise unknown_group_error(mesh, groups, argument, name)
-    group = groups[name]
-    kinds = kinds_in(mesh, group)
+    kinds = kinds_in(mesh, groups[name])
+    kind = next((kind for kind in kinds if kind in types), "")
+    parts = [
+        np.where(members[:, None] < 0, block.data[:, ::-1], block.data)[members != 0]
+        for block, members in zip(mesh.cells, groups[name], strict=True)
+        if block.type == kind
+    ]
+    return kinds, np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.int64)
+
+
+def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
+    """Return the nodes (n_lines, 2) of the lines of a group, in the order of the file."""
+    kinds, lines = _members(mesh, groups, argument, name, ("line",))
     higher = [kind for kind in kinds if kind != "line" and kind.startswith(("line", "VTK_LAGRANGE_CURVE"))]
     if higher:
         actual = f"{name!r} with elements {', '.join(higher)}"
         raise MisuseError(argument, actual, "2-node lines (mesh at first order)")
-    parts = [np.empty((0, 2), dtype=np.int64)]
-    for block, members in zip(mesh.cells, group, strict=True):
-        if block.type == "line":
-            ends = block.data
-            parts.append(np.where(members[:, None] < 0, ends[:, ::-1], ends)[members != 0])
-    lines = np.concatenate(parts)
     if not len(lines):
         actual = f"{name!r} with elements {', '.join(kinds) or 'none'}, no lines"
         needed = "a group of 2-node lines (by its number, where a group of cells has the same name)"
@@ -202,18 +208,13 @@ def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
     return np.unique(np.concatenate(edges))
 
 
-def _orient_lines(argument: str, lines: IntArray, inside: IntArray, points: FloatArray) -> tuple[IntArray, BoolArray]:
-    """Reverse lines (n_lines, 2) so that each chain runs one way with its body on the left.
-
-    The cells inside show the side, by their directed edges. The second array (n_lines,) says for which lines they do.
-    """
-    neighbours = _neighbours_of_lines(argument, lines, points)
+def _leftward(argument: str, lines: IntArray, inside: IntArray, points: FloatArray) -> IntArray:
+    """Return 1 for each line with a cell on its left, by the directed edges of cells; −1 on its right, 0 without."""
     left, right = (np.isin(ends[:, 0] * len(points) + ends[:, 1], inside) for ends in (lines, lines[:, ::-1]))
     if (left & right).any():
         actual = f"a line with cells on both sides, at {describe_place(points, lines[left & right][0, 0])}"
         raise MisuseError(argument, actual, "lines on the boundary of a body")
-    signs = left.astype(np.int64) - right
-    return _run_one_way(argument, points, lines, neighbours, signs, ("a chain", "a body on one side of a chain"))
+    return left.astype(np.int64) - right
 
 
 def _run_one_way(
@@ -305,45 +306,12 @@ def _is_in_space(mesh: PlainMesh, groups: dict[str, Group], name: str) -> bool:
     return bool(extent[2] > FLAT * extent.max())
 
 
-def _surfaces_of(mesh: PlainMesh, groups: dict[str, Group], names: tuple[str, str], *, flip: bool) -> Interface:
-    """Return the interface of the faces of two groups, slave first, each face seen from outside its body.
-
-    Volume cells beside faces show on which side the body lies. Faces that hang together without any run as the first of
-    them in the file.
-    """
-    arguments = "--slave", "--master"
-    sides = [_faces(mesh, groups, argument, name) for argument, name in zip(arguments, names, strict=True)]
-    shared = np.intersect1d(sides[0], sides[1])
-    if len(shared):
-        actual = f"a node of the slave surface too, at {describe_place(mesh.points, shared[0])}"
-        raise MisuseError("--master", actual, "surfaces without a common node: two nodes where the bodies touch")
-    if not np.isfinite(mesh.points[np.unique(np.concatenate([side.reshape(-1) for side in sides]))]).all():
-        raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
-    oriented = []
-    for argument, faces in zip(arguments, sides, strict=True):
-        neighbours, signs = _neighbours_of_faces(argument, mesh.points, faces), _outward(argument, mesh, faces)
-        words = "a surface", "one body on one side"
-        oriented.append(_run_one_way(argument, mesh.points, faces, neighbours, signs, words))
-    interface = _renumber(mesh.points, *_flip(oriented, flip=flip))
-    _check_facing_in_space(interface)
-    return interface
-
-
 def _faces(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
     """Return the corners (n_faces, 3 or 4) of the faces of a group, in the order of the file."""
-    if name not in groups:
-        raise unknown_group_error(mesh, groups, argument, name)
-    group = groups[name]
-    kinds = kinds_in(mesh, group)
-    if len(kinds) != 1 or kinds[0] not in _CORNERS:
+    kinds, faces = _members(mesh, groups, argument, name, ("triangle", "quad"))
+    if len(kinds) != 1 or not len(faces):
         needed = "triangles alone or quadrilaterals alone, at first order (Gmsh: recombine a whole surface, or none)"
         raise MisuseError(argument, f"{name!r} with elements {', '.join(kinds) or 'none'}", needed)
-    parts = [
-        np.where(members[:, None] < 0, block.data[:, ::-1], block.data)[members != 0]
-        for block, members in zip(mesh.cells, group, strict=True)
-        if block.type == kinds[0]
-    ]
-    faces: IntArray = np.concatenate(parts)
     if len(np.unique(np.sort(faces, axis=1), axis=0)) < len(faces):
         raise MisuseError(argument, "the same face twice", "each face once")
     return faces
@@ -388,22 +356,3 @@ def _outward(argument: str, mesh: PlainMesh, faces: IntArray) -> IntArray:
             way = mesh.points[mesh.cells[number].data[cell]].mean(axis=0) - places.mean(axis=0)
             signs[face] = -int(np.sign(turns_of(places[None]).sum(axis=1)[0] @ way))
     return signs
-
-
-def _check_facing_in_space(interface: Interface) -> None:
-    """Refuse two surfaces whose mean normals, weighted by area, do not oppose each other; a closed one has none."""
-    normals = []
-    for surface in (interface.slave, interface.master):
-        turns = turns_of(interface.nodes[surface.faces]).sum(axis=1)
-        normals.append(turns.sum(axis=0) / np.linalg.norm(turns, axis=1).sum())
-    slave, master = normals
-    if slave @ master < 0 or min(np.linalg.norm(normals, axis=1)) < ONE_SIDED:
-        return
-    words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in normals]
-    raise MisuseError(
-        "--mesh",
-        f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other",
-        "surfaces that face each other, each seen from outside its body. Keep the volume cells in the file, they tell "
-        "the side; or give --flip where only one surface has cells beside it (it turns the faces without cells, and "
-        "both surfaces where neither or each has cells)",
-    )
