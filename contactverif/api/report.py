@@ -207,7 +207,6 @@ class Report(Run):
 
 
 def _counts(rows: Sequence[Row]) -> str:
-    """Return the numbers of rows with each result, in words."""
     counts = Counter(row.result for row in rows)
     return ", ".join(f"{counts[result]} {result}" for result in Result if counts[result]) or "nothing was checked"
 
@@ -220,7 +219,6 @@ def _failing_rows(run: Run) -> list[Row]:
 
 
 def _remarks(run: Run) -> list[str]:
-    """Return the sentences about whole formulations: those that did not load, signs, diagnoses."""
     remarks = [f"{item.formulation}: {Result.NOT_LOADED}: {item.reason}" for item in run.not_loaded]
     remarks += [f"{name}: {OPPOSITE_SIGN}" for name in run.opposite_signs]
     return remarks + [f"{name}: {words}" for name, words in run.diagnoses.items()]

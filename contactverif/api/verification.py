@@ -144,12 +144,10 @@ def _items(argument: Any, name: str, needed: str) -> list[Any]:
 
 
 def _is_instance(item: Any) -> bool:
-    """Return whether an object is a formulation, and not the class of one."""
     return not isinstance(item, type) and callable(getattr(item, "residual", None))
 
 
 def _load_questions(properties: Any) -> list[Property | NotLoaded]:
-    """Return the properties that the user wants; names may overlap."""
     if properties is None:
         return list(load_properties())
     items = _items(properties, "properties", _PROPERTIES)
@@ -170,7 +168,6 @@ def _limits(isolation: str | None) -> Limits | None:
 
 
 def _load_subject(item: Any, limits: Limits | None) -> Subject | NotLoaded:
-    """Return the formulation that an item names, makes or is."""
     if isinstance(item, Subject | NotLoaded):
         return item
     if isinstance(item, str):

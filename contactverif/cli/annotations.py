@@ -91,7 +91,6 @@ def _follow(module: str, name: str) -> tuple[Path, int] | None:
 
 
 def _file_of(module: str) -> Path | None:
-    """Return the file of a module. Of a package no more than its place is looked up."""
     top, *rest = module.split(".")
     try:
         spec = importlib.util.find_spec(top)
@@ -107,7 +106,6 @@ def _file_of(module: str) -> Path | None:
 
 
 def _names(node: ast.stmt) -> list[str]:
-    """Return the names that a statement defines."""
     match node:
         case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
             return [name]
@@ -117,7 +115,6 @@ def _names(node: ast.stmt) -> list[str]:
 
 
 def _origins(tree: ast.Module, module: str, name: str, *, is_package: bool) -> Iterator[tuple[str, str]]:
-    """Yield (module, name) from which a module imports a name."""
     for node in tree.body:
         if not isinstance(node, ast.ImportFrom):
             continue

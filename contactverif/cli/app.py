@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from contactverif import __version__
 from contactverif.cli import commands
 from contactverif.cli.options import spell_out
 from contactverif.contract.errors import ContactverifError, MisuseError, name_line, one_line
@@ -36,7 +37,7 @@ COMMANDS: dict[str, Callable[..., int | None]] = {
     "draw": commands.draw,
     "bench": commands.bench,
     "paper": commands.paper,
-    "scenes": commands.scenes,
+    "scenes": commands.list_scenes,
     "new": commands.new,
 }
 for name, command in COMMANDS.items():
@@ -55,10 +56,7 @@ _MOST_COLUMNS = 10_000
 
 
 def _print_version(wanted: bool) -> None:
-    """Print the version and end, if the user wants that."""
     if wanted:
-        from contactverif import __version__
-
         typer.echo(f"contactverif {__version__}")
         raise typer.Exit
 
@@ -77,7 +75,9 @@ def main() -> None:
     if "numpy" not in sys.modules:  # Later no library would read it.
         os.environ.update(ONE_THREAD)
     _open_closed_streams()
-    _limit_columns()
+    columns = os.environ.get("COLUMNS", "")  # The lines of a help page fill a terminal, however wide it says it is.
+    if columns.isdecimal() and (len(columns) > len(str(_MOST_COLUMNS)) or int(columns) > _MOST_COLUMNS):
+        os.environ["COLUMNS"] = str(_MOST_COLUMNS)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # A terminal that has no ≤ shows a question mark.
             stream.reconfigure(errors="replace")
@@ -100,13 +100,6 @@ def _open_closed_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115, since it stays open to the end
-
-
-def _limit_columns() -> None:
-    """Take a terminal that says it is wider than any for a wide one, since the lines of a help page fill it."""
-    columns = os.environ.get("COLUMNS", "")
-    if columns.isdecimal() and (len(columns) > len(str(_MOST_COLUMNS)) or int(columns) > _MOST_COLUMNS):
-        os.environ["COLUMNS"] = str(_MOST_COLUMNS)
 
 
 def _exit_status(error: Exception) -> int:
@@ -161,7 +154,6 @@ def _words_of_usage_error(error: Exception) -> str:
 
 
 def _refuse(reason: str) -> int:
-    """Print the reason in one line."""
     if reason:
         typer.echo(f"contactverif: {one_line(' '.join(reason.split()))}", err=True)
     return _MISUSE

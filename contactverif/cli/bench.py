@@ -36,8 +36,7 @@ _LONG_CALLS = 10  # A state of a large mesh, or all states of differences, may t
 
 def bench(
     options: RunOptions,
-    scenes: Sequence[str],
-    *,
+    scene: Sequence[str],
     quick: bool,
     instances: int | None,
     processes: int | None,
@@ -53,16 +52,16 @@ def bench(
     if file:
         results = read_bench(file)
     else:
-        plan = make_plan(scenes, quick=quick, instances=instances, processes=processes)
+        plan = make_plan(scene, quick=quick, instances=instances, processes=processes)
         results = _run(options, plan, files)
     since = () if old is None else compare_benches(results, old)
     _write(results, since, files, pictures, file)
-    for scene in results.scenes:
-        show(overview_table(results, scene).terminal(dense=True))
-    if any(results.uses_differences(name, scene) for name in results.formulations for scene in results.scenes):
+    for name in results.scenes:
+        show(overview_table(results, name).terminal(dense=True))
+    if any(results.uses_differences(name, each) for name in results.formulations for each in results.scenes):
         show("* with differences of forces where there is no tangent, or it did not help")
-    for scene in results.scenes:
-        show("\n".join(cost_sentences(results, scene, results.targets[scene][0])))
+    for name in results.scenes:
+        show("\n".join(cost_sentences(results, name, results.targets[name][0])))
     for name, reason in results.not_loaded.items():
         show(f"{name} is not measured: {reason}")
     if old is not None:
@@ -76,7 +75,6 @@ def bench(
 
 
 def _run(options: RunOptions, plan: BenchPlan, files: OutputFiles) -> BenchResults:
-    """Run the bench with a progress bar."""
     names, limits = select_names(options), options.limits()
     of_solution = None if limits is None else replace(limits, seconds=_LONG_CALLS * limits.seconds)
     subjects = [load_formulation(name, of_solution) for name in names]

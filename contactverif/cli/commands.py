@@ -1,7 +1,6 @@
-"""The commands: how each is typed, and what its help says. A function of another module does the work.
+"""The commands: how each is typed, and what its help says. The function of the same name in a module does the work.
 
-Rule: this file imports nothing at the top that takes long, because every `--help` imports it. That of a command is
-imported when it runs.
+Rule: this file imports nothing that takes long, because every `--help` imports it. A module is imported when it works.
 """
 
 from __future__ import annotations
@@ -11,13 +10,7 @@ from typing import Annotated
 
 import typer
 
-from contactverif.cli.options import (
-    Screen,
-    Takes,
-    complete_property,
-    formulation_option,
-    output_option,
-)
+from contactverif.cli.options import Screen, Takes, complete_property, done_in, formulation_option, output_option
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, RunOptions
 
 Isolated = Annotated[RunOptions, Takes([ISOLATION])]
@@ -28,6 +21,7 @@ _FORMULATIONS = "Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=re
 _EVERY = "Take every installed formulation that wraps no other."
 
 
+@done_in("listing")
 def list_installed(
     *,
     traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
@@ -45,9 +39,6 @@ def list_installed(
       contactverif list
       contactverif list --traits
     """
-    from contactverif.cli.listing import list_installed
-
-    list_installed(options, every_trait=traits)
 
 
 def verify(
@@ -104,6 +95,7 @@ def verify(
     return verify(options, screen, resume)
 
 
+@done_in("explain")
 def explain(
     *,
     name: Annotated[
@@ -134,11 +126,9 @@ def explain(
       contactverif explain balance.force --report ppt.nc
       contactverif explain --report ppt.nc --case vts-ppt.balance.force
     """
-    from contactverif.cli.explain import explain
-
-    explain(name, report, case, options)
 
 
+@done_in("verify")
 def campaign(
     *,
     options: Annotated[
@@ -150,7 +140,7 @@ def campaign(
     ],
     shard: Annotated[str, typer.Option(help="The shard: its number from 1, and the number of all.", metavar="I/N")],
     folder: Annotated[Path, typer.Option("--out", help="The folder of all shards.", metavar="FOLDER")],
-) -> int:
+) -> None:
     """Judge one shard of a run, for many processes or machines.
 
     Each shard is a process by itself, and merge makes the report of all. A
@@ -167,11 +157,9 @@ def campaign(
       contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
       contactverif merge runs --out nts-ar.nc
     """
-    from contactverif.cli.verify import campaign
-
-    return campaign(options, shard, folder)
 
 
+@done_in("verify")
 def merge(
     folder: Annotated[Path, typer.Argument(help="The folder that campaign --out made.", metavar="FOLDER")],
     out: Annotated[
@@ -188,7 +176,7 @@ def merge(
     ] = False,
     share: Share = 0.01,
     screen: Screen,
-) -> int:
+) -> None:
     """Make the report of a campaign: that of one verify with the same seed.
 
     A share of the outcomes is judged again; a row in which one differs is
@@ -203,11 +191,9 @@ def merge(
       contactverif merge runs --out nts-ar.nc --out nts-ar.html
       contactverif merge runs --out nts-ar.nc --audit --share 0.1
     """
-    from contactverif.cli.verify import merge
-
-    return merge(folder, tuple(out), options.shrink, share if audit else None, screen)
 
 
+@done_in("compare")
 def compare(
     *,
     options: Annotated[
@@ -226,7 +212,7 @@ def compare(
         Path | None,
         typer.Option(help="Go on with the comparison that was to write FILE and was stopped.", metavar="FILE"),
     ] = None,
-) -> int:
+) -> None:
     """Compare formulations with a reference, on the same cases; or two reports.
 
     Few lines say which verdicts differ, the errors and the time; -v shows all
@@ -261,11 +247,9 @@ def compare(
       contactverif compare --resume mine.nc
       contactverif compare old.nc new.nc
     """
-    from contactverif.cli.compare import compare
-
-    return compare(options, against or [], screen, resume)
 
 
+@done_in("run_screen")
 def report(
     path: ReportPath,
     out: Annotated[list[Path] | None, output_option("Write FILE.html, a page; or FILE.json, FILE.xml (JUnit).")] = None,
@@ -286,11 +270,9 @@ def report(
       contactverif report vts-ppt.nc
       contactverif report vts-ppt.nc --out vts-ppt.html --out vts-ppt.xml
     """
-    from contactverif.cli.stored_report import report
-
-    report(path, out or (), screen)
 
 
+@done_in("replay")
 def replay(
     *,
     report: ReportPath,
@@ -308,7 +290,7 @@ def replay(
         ),
     ] = None,
     options: Isolated,
-) -> int:
+) -> None:
     """Judge one stored counterexample again; without --case, list the ids.
 
     A report names the formulation that failed, and this runs it. It says which
@@ -325,17 +307,15 @@ def replay(
       contactverif replay ppt.nc --case vts-ppt.balance.force --out case.svg
       contactverif replay ppt.nc --case vts-ppt.balance.force --formulation mine
     """
-    from contactverif.cli.replay import replay
-
-    return replay(report, case, formulation, engine, out or (), options)
 
 
+@done_in("replay")
 def audit(
     *,
     report: ReportPath,
     share: Share = 0.01,
     options: Annotated[RunOptions, Takes([PLACE, ISOLATION])],
-) -> int:
+) -> None:
     """Derive all verdicts of a report again, and judge a sample again.
 
     All verdicts, counts and sums are derived again from the stored numbers. A
@@ -355,11 +335,9 @@ def audit(
       contactverif audit vts-ppt.nc
       contactverif audit vts-ppt.nc --share 0.1
     """
-    from contactverif.cli.replay import audit
-
-    return audit(report, share, options)
 
 
+@done_in("scenes")
 def draw(
     *,
     report: Annotated[
@@ -383,7 +361,7 @@ def draw(
         output_option("Draw to FILE.png or FILE.svg, or write the solved scene for ParaView to FILE.vtu. Repeatable."),
     ] = None,
     options: Isolated,
-) -> int:
+) -> None:
     """Solve a scene and draw it: deformed bodies, contact pressure, residuals.
 
     Displacements and penetration are magnified; the figure says how much.
@@ -402,11 +380,9 @@ def draw(
       contactverif draw --scene c:degrees=30 -f nts -f vts-ppt --out both.svg
       contactverif draw ppt.nc --case vts-ppt.balance.force --out case.png
     """
-    from contactverif.cli.scenes import draw
-
-    return draw(report, case, scene, formulation or [], out or (), options)
 
 
+@done_in("bench")
 def bench(
     *,
     options: Annotated[
@@ -444,7 +420,7 @@ def bench(
         list[Path] | None,
         output_option("Write the results: FILE.nc all instances, FILE.html or FILE.md a page. Repeatable."),
     ] = None,
-) -> int:
+) -> None:
     """Measure speed against error, on scenes whose exact solution is known.
 
     All formulations solve the same instances of each mesh, from the same
@@ -467,19 +443,9 @@ def bench(
       contactverif bench vts-ppt --quick --against bench.nc
       contactverif bench bench.nc --out bench.html
     """
-    from contactverif.cli.bench import bench
-
-    return bench(
-        options,
-        scene or [],
-        quick=quick,
-        instances=instances,
-        processes=processes,
-        against=against,
-        out=out or (),
-    )
 
 
+@done_in("paper")
 def paper(
     out: Annotated[str, typer.Option(help="Write to this folder; it is made if needed.", metavar="FOLDER")] = "paper",
     jobs: Annotated[
@@ -508,12 +474,10 @@ def paper(
       contactverif paper
       contactverif paper --out reports/paper
     """
-    from contactverif.cli.paper import paper
-
-    paper(out, jobs)
 
 
-def scenes() -> None:
+@done_in("scenes")
+def list_scenes() -> None:
     """List the named scenes, with drawings, and their options.
 
     A scene with options is written NAME:OPTION=VALUE,OPTION=VALUE.
@@ -526,11 +490,9 @@ def scenes() -> None:
       contactverif draw --scene b -f vts-me -f vts-ppt --out b.png
       contactverif verify vts-ppt --scene c-prime:refine=4 -p 'patch.*'
     """
-    from contactverif.cli.scenes import list_scenes
-
-    list_scenes()
 
 
+@done_in("new")
 def new(
     name: Annotated[
         str, typer.Argument(help="The name of the formulation, of its project and of its folder.", metavar="NAME")
@@ -562,6 +524,3 @@ def new(
       contactverif new mine --3d
       contactverif new mine --fortran
     """
-    from contactverif.cli.new import new
-
-    new(name, {"jax": jax, "3d": in_space, "c": c, "f90": fortran})

@@ -6,33 +6,21 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 
 from contactverif.api.drawing import draw_outcome
 from contactverif.api.run_files import PAGE, REPORT, write_run
-from contactverif.cli.annotations import annotate
-from contactverif.cli.comparison_screen import ComparisonScreen
-from contactverif.cli.comparison_tables import SideBySide, last_line, mesh_text
-from contactverif.cli.console import print_plugin_output, show, show_verbatim
+from contactverif.cli import comparison_screen as screens
+from contactverif.cli.console import columns, show, show_verbatim
 from contactverif.cli.options import OutputFiles, Screen, with_engines
 from contactverif.cli.progress import Bar
-from contactverif.cli.report_comparison import compare_reports
-from contactverif.cli.verify import (
-    COMPARE,
-    Job,
-    Plugins,
-    end_run,
-    new_job,
-    print_isolation,
-    print_resume_hint,
-    print_stored,
-    resumed_job,
-    watch_for_stops,
-)
-from contactverif.contract.counterexample import case_id
-from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Property
+from contactverif.cli.verify import COMPARE, Job, Plugins, end_run, new_job, resumed_job, show_end, watch_for_stops
+from contactverif.contract.counterexample import case_id, counterexamples
+from contactverif.contract.errors import MisuseError, unknown_name_error
+from contactverif.contract.property import Property, Verdict
+from contactverif.contract.result import Run
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.scene import has_bodies
 from contactverif.plugins.registry import formulation_names, load_properties, that_loads
@@ -44,8 +32,10 @@ from contactverif.run.worker_pool import worker_pool
 from contactverif.studies.comparison import Study, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.comparisons import Differing
-from contactverif_reports.html.comparison_page import Drawing, comparison_page
+from contactverif_reports.html.comparison_page import Drawing, changes_page, comparison_page
 from contactverif_reports.html.pages import write_page
+from contactverif_reports.netcdf.read import read_run
+from contactverif_reports.regressions import Changes, NamedRun
 
 
 def compare(options: RunOptions, against: Sequence[str], screen: Screen, resume: Path | None) -> int:
@@ -55,7 +45,7 @@ def compare(options: RunOptions, against: Sequence[str], screen: Screen, resume:
     names = with_engines(options.names, options.engines)
     if reports := _reports_among(names):
         _check_no_run_options(options, screen, against, resume)
-        return 0 if compare_reports(reports, options.properties, OutputFiles.check(options.out, (PAGE,))) else 1
+        return _compare_reports(reports, options.properties, OutputFiles.check(options.out, (PAGE,)))
     # The reference is the first name.
     names = (next(iter(against), ""), *names) if against or names else ()
     typed = replace(options, names=names, engines=(), keep_going=True)
@@ -86,7 +76,6 @@ def _reports_among(names: Sequence[str]) -> list[Path]:
 
 
 def _check_no_run_options(options: RunOptions, screen: Screen, against: Sequence[str], resume: Path | None) -> None:
-    """Refuse the options of a run beside two reports, which have been judged already."""
     both = {
         name: (getattr(options, name), getattr(RunOptions(), name))
         for name, (_, option) in declared_options(RunOptions).items()
@@ -97,6 +86,45 @@ def _check_no_run_options(options: RunOptions, screen: Screen, against: Sequence
     for name, (value, default) in both.items():
         if value != default:
             raise MisuseError(f"--{name}", "two reports beside it", "formulations: a report has been judged already")
+
+
+def _compare_reports(paths: Sequence[Path], globs: Sequence[str], files: OutputFiles) -> int:
+    """Show what changed in a report, and write the page; return 1 if something got worse, else 0."""
+    old, new = (_read(path, argument) for path, argument in zip(paths, ("OLD.nc", "NEW.nc"), strict=True))
+    every = list(dict.fromkeys([*old.properties, *new.properties]))
+    for glob in globs:
+        if not any(fnmatchcase(id_, glob) for id_ in every):
+            raise unknown_name_error("--property", glob, every)
+    ids = [id_ for id_ in every if not globs or any(fnmatchcase(id_, glob) for glob in globs)]
+    runs = [NamedRun.from_run(str(path), run.only(ids)) for path, run in zip(paths, (old, new), strict=True)]
+    changes = Changes.between(*runs)
+    if not changes.changes and not changes.no_longer_loaded:
+        kind = "property" if set(old.formulations) & set(new.formulations) else "formulation"
+        lists = [run.run.formulations if kind == "formulation" else list(run.run.properties) for run in runs]
+        names = " and ".join(", ".join(each) or "nothing" for each in lists)
+        raise MisuseError("NEW.nc", f"no {kind} that OLD.nc has too ({names})", "two reports with something in common")
+    rows = [change.pair.new.row for change in changes.changes if change.regressions]
+    worse = {(row.formulation, row.property_id) for row in rows}
+    meshes = {
+        id_: example
+        for id_, example in counterexamples(changes.new.run).items()
+        if (example.formulation, example.property_id) in worse and example.verdict is not Verdict.PASS
+    }
+    if PAGE in files.paths:
+        write_page(files.paths[PAGE], changes_page(changes, meshes), "--out")
+    show(*screens.changes_screen(changes))
+    for example in list(meshes.values())[: screens.MOST_MESHES]:
+        show_verbatim(screens.stored_mesh_text(example, changes.new.path))
+    files.announce()
+    show(screens.regressions_text(changes))
+    return 1 if changes.regressions else 0
+
+
+def _read(path: Path, argument: str) -> Run:
+    try:
+        return read_run(path)
+    except MisuseError as error:
+        raise MisuseError(argument, error.found, error.needed) from None
 
 
 def _load(job: Job, executor: Executor | None) -> tuple[Subject, Plugins]:
@@ -115,7 +143,6 @@ def _load(job: Job, executor: Executor | None) -> tuple[Subject, Plugins]:
 
 
 def _compare_formulations(job: Job, screen: Screen) -> int:
-    """Run all properties, show what was found and write the files; return the exit status."""
     with watch_for_stops(job), ExitStack() as stack:
         with worker_pool(job.jobs) as executor, Bar() as bar:
             (reference, plugins), store = stack.enter_context(job.begin(partial(_load, job, executor)))
@@ -126,81 +153,62 @@ def _compare_formulations(job: Job, screen: Screen) -> int:
             job, store, gap, partial(_write_file, study, plugins), promises_kept=study.comparison.promises_kept
         )
     if job.pictures is not None:
-        _draw_meshes(study, plugins, job.pictures)
-    print_plugin_output()
-    annotate(study.run)
-    if not screen.quiet:
-        _show_study(study, screen)
-        print_stored(study.run)
-        if job.pictures is not None:
-            show(f"pictures: {job.options.pictures}")
-        end.files.announce()
-    show(f"Not complete: {end.gap}." if end.gap else last_line(study.comparison))
-    if not screen.quiet:
-        print_isolation(study.run.provenance)
-    if not end.complete:
-        print_resume_hint(job)
-    return end.status
+        for differing in study.differing:
+            _draw_pictures(differing, *_both(differing, plugins), job.pictures)
+    return show_end(
+        job, screen, end, study.run, partial(_show_study, study, screen), screens.last_line(study.comparison)
+    )
 
 
 def _write_file(study: Study, plugins: Plugins, path: Path) -> None:
-    """Write the run to a file; the page compares."""
     if path.suffix.lower() != PAGE:
         write_run(study.run, path)
         return
-    drawings = [_page_drawing(differing, *_both(differing, study, plugins)) for differing in study.differing]
+    drawings = []  # What the page's picture of a case needs: its scene solved by both, or the forces of both.
+    for differing in study.differing:
+        question, candidate, reference = _both(differing, plugins)
+        case = differing.sides[0][1].case
+        if has_bodies(case):
+            drawings.append(Drawing(solved=solve_scene(case, [candidate, reference])))
+        else:
+            exact = None if question.exact is None else question.exact(case)
+            drawings.append(Drawing(forces_on(case, candidate), forces_on(case, reference), exact))
     write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
 
 
-def _both(differing: Differing, study: Study, plugins: Plugins) -> tuple[Property, Subject, Subject]:
-    """Return the property on which a candidate and the reference differ, and these two."""
-    names = differing.formulation, study.comparison.reference
-    candidate, reference = map(plugins.subject, names)
+def _both(differing: Differing, plugins: Plugins) -> tuple[Property, Subject, Subject]:
+    candidate, reference = (plugins.subject(name) for name, _, _ in differing.sides)
     return plugins.question(differing.info.id), candidate, reference
 
 
 def _show_study(study: Study, screen: Screen) -> None:
     """Show what differs in few lines, or all tables; and the meshes on which they differ, if the user wants them."""
-    show(SideBySide(study) if screen.verbose else ComparisonScreen(study))
+    show(*(screens.comparison_tables if screen.verbose else screens.comparison_screen)(study, columns()))
     if study.apart:
-        reference = study.comparison.reference
         show(
-            f"{', '.join(study.apart)} and {reference} are asked on different interfaces, of other dimension or faces: "
-            "verdicts and promises can be compared, errors only on cases that both have, and times cannot."
+            f"{', '.join(study.apart)} and {study.comparison.reference} are asked on different interfaces, of other "
+            "dimension or faces: verdicts and promises can be compared, errors only on cases that both have, and times "
+            "cannot."
         )
     if screen.verbose or screen.show == "all":
         for differing in study.differing:
-            show_verbatim(mesh_text(differing, study.comparison.reference))
+            show_verbatim(screens.mesh_text(differing))
     elif study.differing:
         show("error: the worst over its tolerance. --show all: the meshes on which they differ; -v: all tables.")
-
-
-def _draw_meshes(study: Study, plugins: Plugins, folder: Path) -> None:
-    """Draw all meshes on which they differ into a folder."""
-    for differing in study.differing:
-        _draw_pictures(differing, *_both(differing, study, plugins), folder)
-
-
-def _page_drawing(differing: Differing, question: Property, candidate: Subject, reference: Subject) -> Drawing:
-    """Return what the page's picture of a case needs: its scene solved by both, or the forces of both."""
-    if has_bodies(differing.case):
-        return Drawing(solved=solve_scene(differing.case, [candidate, reference]))
-    exact = None if question.exact is None else question.exact(differing.case)
-    return Drawing(forces_on(differing.case, candidate), forces_on(differing.case, reference), exact)
 
 
 def _draw_pictures(
     differing: Differing, question: Property, candidate: Subject, reference: Subject, folder: Path
 ) -> None:
-    """Draw the bodies as both solve them, or the case with the forces of each."""
-    if has_bodies(differing.case):
+    case = differing.sides[0][1].case
+    if has_bodies(case):
         from contactverif_reports.plot.scene_figures import plot_scene  # importing matplotlib is slow
 
-        scene = solve_scene(differing.case, [candidate, reference])
-        name = f"{case_id(candidate.name, differing.info.id)}.png"
+        scene = solve_scene(case, [candidate, reference])
         if scene.solutions:
-            plot_scene(scene, folder / name, title=f"{differing.info.id}, case {differing.number}")
+            path = folder / f"{case_id(candidate.name, question.id)}.png"
+            plot_scene(scene, path, title=f"{question.id}, case {differing.number}")
         return
-    for subject, outcome in ((candidate, differing.outcome), (reference, differing.reference_outcome)):
-        name = f"{case_id(subject.name, differing.info.id)}.png"
-        draw_outcome(subject, question, outcome, folder / name, argument="--pictures")
+    for subject, (name, outcome, _) in zip((candidate, reference), differing.sides, strict=True):
+        path = folder / f"{case_id(name, question.id)}.png"
+        draw_outcome(subject, question, outcome, path, argument="--pictures")

@@ -1,4 +1,4 @@
-"""The terminal: how wide it is, how text is printed, how a table looks, and which colour a result has.
+"""The terminal: how wide it is, and how text is printed.
 
 Whatever a command prints goes through `show`, `show_verbatim` or `echo`, which let no control character of a plugin or
 a file reach the terminal.
@@ -9,23 +9,16 @@ from __future__ import annotations
 import os
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
-from itertools import groupby
-from typing import NoReturn, TypeVar
+from typing import NoReturn
 
 import typer
-from rich import box
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.segment import Segment, Segments
-from rich.table import Table
 from rich.text import Text
 
 from contactverif.contract.errors import printable
-from contactverif.contract.result import Result
 from contactverif.isolation.host import end_all
-from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
-_Item = TypeVar("_Item")
 _LINES_OF_A_PLUGIN = 5
 _PIPE_WIDTH = 140  # The number of columns where no terminal says how many there are.
 
@@ -41,11 +34,20 @@ class QuietConsole(Console):
         raise BrokenPipeError
 
 
-def show(content: RenderableType) -> None:
+def columns() -> int:
+    """Return the columns of the terminal, or enough of them where there is none."""
+    return _console().width
+
+
+def show(*contents: RenderableType) -> None:
     """Print to standard output, as wide as the terminal, or wide enough where there is none."""
+    console = _console()
+    console.print(_clean(console, Group(*contents)))
+
+
+def _console() -> QuietConsole:
     width_is_known = sys.stdout.isatty() or "COLUMNS" in os.environ
-    console = QuietConsole(None if width_is_known else _PIPE_WIDTH)
-    console.print(_clean(console, content))
+    return QuietConsole(None if width_is_known else _PIPE_WIDTH)
 
 
 def show_verbatim(text: Text) -> None:
@@ -73,47 +75,6 @@ def _clean(console: Console, content: RenderableType, *, soft_wrap: bool = False
     return Segments([Segment(printable(line.text), line.style) for line in lines if not line.is_control])
 
 
-def plain_table(
-    title: str = "",
-    name: str | None = None,
-    *,
-    width: int | None = None,
-    words: Sequence[str] = (),
-    numbers: Sequence[str] = (),
-    dense: bool = False,
-) -> Table:
-    """Return a table without lines that a narrow terminal would break.
-
-    Only the column `name`, at least `width` wide, gives way where the terminal is narrow: a number that is cut off is
-    wrong. Behind it are columns of `words`, left-aligned, and of `numbers`, right-aligned.
-    """
-    table = Table(
-        title=title or None, title_justify="left", title_style="bold", header_style="bold", box=box.SIMPLE_HEAD
-    )
-    if dense:
-        table.padding = (0, 1, 0, 0)
-    if name is not None:
-        table.add_column(name, overflow="fold", min_width=width)
-    for word in words:
-        table.add_column(word, no_wrap=True)
-    for number in numbers:
-        table.add_column(number, justify="right", no_wrap=True)
-    return table
-
-
-def add_groups(
-    table: Table,
-    items: Iterable[_Item],
-    heading: Callable[[_Item], str],
-    cells: Callable[[_Item], Iterable[RenderableType]],
-) -> None:
-    """Add a row for each item, and a bold heading above the items of a group, which follow one another."""
-    for title, group in groupby(items, heading):
-        table.add_row(Text(title, style="bold"))
-        for item in group:
-            table.add_row(*cells(item))
-
-
 def line(words: str, style: str = "") -> Text:
     """Return a line that the terminal does not wrap."""
     return Text(words, style=style, no_wrap=True, overflow="ignore")
@@ -128,8 +89,3 @@ def fold(words: str, width: int, style: str = "", *, indent: int = 6) -> Text:
     """Return words of any length, indented, to stand below a line."""
     lines = textwrap.wrap(words, max(width - indent, 20), break_on_hyphens=False)
     return line("\n".join(" " * indent + each for each in lines), style)
-
-
-def result_text(result: Result, before: str = "") -> Text:
-    """Return the word of a result in its colour."""
-    return Text(f"{before}{result}", style=STYLES.get(result, PLAIN_STYLE))

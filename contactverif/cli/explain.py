@@ -52,7 +52,6 @@ def explain(name: str | None, report: Path | None, case: str | None, options: Ru
 
 
 def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run | None, list[Counterexample]]:
-    """Return the run in a report, and the counterexamples of it that the user means."""
     if report is None:
         if case is not None:
             raise MisuseError("--report", "nothing", f"the report that has the case {case!r}")
@@ -75,7 +74,6 @@ def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run 
 def _explain_property(
     name: str, run: Run | None, examples: list[Counterexample], report: Path | None, options: RunOptions
 ) -> None:
-    """Show the text of a property, its results in a report, and the formulations that state a failure."""
     question = the_property(name)
     _show(property_text(question))
     if run is not None and not examples:
@@ -97,15 +95,11 @@ def _show(markdown: str) -> None:
 
 
 class _LeftHeading(Heading):
-    """A heading that is bold, without a frame."""
-
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         yield Text(self.text.plain, style="bold")
 
 
 class _Markdown(Markdown):
-    """Markdown whose headings have no frame."""
-
     elements: ClassVar[dict[str, type[MarkdownElement]]] = {**Markdown.elements, "heading_open": _LeftHeading}
 
 

@@ -32,41 +32,36 @@ _YES_OR_NO = (  # (trait, statement where it is true, statement where it is fals
 )
 
 
-def list_installed(options: RunOptions, *, every_trait: bool) -> None:
+def list_installed(options: RunOptions, traits: bool) -> None:
     """Show four tables; of the traits the most important ones or all."""
-    table = Table([Column("name"), _wrapping_column("in"), _wrapping_column("promises")], "formulations")
+    table = _table("formulations", "name", "in", "promises")
     for item in load_formulations(options.limits()):
         if isinstance(item, NotLoaded):
             table.add(item.formulation, "", _not_loaded(item))
         else:
             dimensions = item.traits.abilities.dimensions if isinstance(item, Subject) else ()
-            table.add(item.name, _dimensions(*dimensions), _promises(item, every_trait))
+            table.add(item.name, ", ".join(f"{each}-D" for each in dimensions), _promises(item, every_trait=traits))
     show(table.terminal())
-    table = Table([Column("id"), _wrapping_column("in"), _wrapping_column("asks")], "properties")
+    table = _table("properties", "id", "in", "asks")
     for question in load_properties():
         if isinstance(question, NotLoaded):
             table.add(question.formulation, "", _not_loaded(question))
         else:
-            dimensions = (2,) if question.cases_in_space is None else (2, 3)
-            table.add(question.id, _dimensions(*dimensions), question.summary)
+            table.add(question.id, "2-D" if question.cases_in_space is None else "2-D, 3-D", question.summary)
     show(table.terminal())
-    table = Table([Column("name"), _wrapping_column("what bench solves")], "problems")
+    table = _table("problems", "name", "what bench solves")
     for name, problem in load_problems().items():
         table.add(name, _not_loaded(problem) if isinstance(problem, NotLoaded) else problem.label)
     show(table.terminal())
-    table = Table([Column("name"), _wrapping_column("what it is")], "engines")
+    table = _table("engines", "name", "what it is")
     for name, words in describe_engines().items():
         table.add(name, words)
     show(table.terminal())
 
 
-def _wrapping_column(head: str) -> Column:
-    """Return a column that gives way on a narrow screen; names do not."""
-    return Column(head, wrap=True)
-
-
-def _dimensions(*dimensions: int) -> str:
-    return ", ".join(f"{dimension}-D" for dimension in dimensions)
+def _table(title: str, name: str, *heads: str) -> Table:
+    """Return a table of which all columns but the first give way on a narrow screen."""
+    return Table([Column(name), *(Column(head, wrap=True) for head in heads)], title)
 
 
 def _not_loaded(item: NotLoaded) -> Text:
@@ -74,7 +69,6 @@ def _not_loaded(item: NotLoaded) -> Text:
 
 
 def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
-    """Return what a formulation states and which parts it leaves out, or what a wrapper does."""
     if not isinstance(item, Subject):
         verbs = {"/NAME": "wraps another", "=PATH": "loads a file", "=KIND": "has kinds"}
         verb = next(words for ending, words in verbs.items() if item.form.endswith(ending))
@@ -85,7 +79,6 @@ def _promises(item: Subject | Wrapper, every_trait: bool) -> str:
 
 
 def _statements(traits: Traits, every_trait: bool) -> list[str]:
-    """Return what the traits say, in words; the most important ones alone or all of them."""
     statements: list[str] = [] if traits.rules.enforcement == "penalty" else [f"by {traits.rules.enforcement}"]
     if traits.promises.patch.flat is not None:
         statements.append("passes the flat patch test" if traits.promises.patch.flat else "fails the flat patch test")

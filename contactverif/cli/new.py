@@ -11,7 +11,6 @@ import keyword
 import os
 import re
 import tempfile
-from collections.abc import Mapping
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from importlib.resources import files
 from pathlib import Path
@@ -50,9 +49,9 @@ _FLAGS = {"jax": "--jax", "3d": "--3d", "c": "--c", "f90": "--fortran"}
 _LOADERS = {"c": "c", "f90": "uel"}  # The formulations that load a library, by its language.
 
 
-def new(name: str, kinds: Mapping[str, bool]) -> None:
+def new(name: str, jax: bool, in_space: bool, c: bool, fortran: bool) -> None:
     """Make a project of the kind that is wanted, if one is, and say what comes next."""
-    wanted = [kind for kind, typed in kinds.items() if typed]
+    wanted = [kind for kind, typed in zip(_FLAGS, (jax, in_space, c, fortran), strict=True) if typed]
     if len(wanted) > 1:
         raise MisuseError("NAME", " and ".join(_FLAGS[kind] for kind in wanted), "one of them")
     kind = wanted[0] if wanted else ""
@@ -75,8 +74,36 @@ def make_project(name: str, kind: str = "") -> list[str]:
     """
     module = _module_of(name)
     names = [name, f"{name}-energy"] if kind == "jax" else [name]
-    _check_is_free(name, names, module)
-    texts = _render_library(name, module, kind) if kind in _LOADERS else _render(name, names, module, kind)
+    free = "a name that is free"
+    if os.path.lexists(name):
+        raise MisuseError("NAME", f"{name!r}, which exists in this folder", "the name of a new folder")
+    if registered := sorted(set(names) & set(formulation_names())):
+        raise MisuseError("NAME", f"{name!r}, but a formulation {registered[0]} is registered", free)
+    if _distribution(name) is not None:
+        raise MisuseError("NAME", f"{name!r}, a package that is installed", free)
+    if importlib.util.find_spec(module) is not None:
+        raise MisuseError("NAME", f"{name!r}, but Python has a module {module}", free)
+    language = kind if kind in _LOADERS else ""
+    words = {"name": name, "names": " ".join(names), "module": module, "kind": kind, "language": language}
+    if language:
+        words["subject"] = library_subject(name, language)
+    else:
+        words["requirement"], words["shared_requirement"] = _requirements()
+    environment = Environment(  # The templates make no pages of HTML.
+        loader=PackageLoader("contactverif.cli", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    texts = {}
+    for file, template in (_LIBRARY_TEMPLATES if language else _TEMPLATES).items():
+        source = _SOURCES.get(kind, template) if template == "formulation.py" else template.format(language=language)
+        target = file.format(module=module, language=language)
+        texts[target] = environment.get_template(f"{source}.jinja").render(words)
+    if language == "c":
+        texts[_HEADER] = files("contactverif_foreign").joinpath(_HEADER).read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory(prefix=".contactverif-new-", dir=".") as folder:
         project = Path(folder, name)
         for file, text in texts.items():
@@ -88,7 +115,6 @@ def make_project(name: str, kind: str = "") -> list[str]:
 
 
 def _module_of(name: str) -> str:
-    """Return the name of the module of a project."""
     if not _NAME.fullmatch(name) or len(name) > _LONGEST:
         raise MisuseError("NAME", repr(name), _NEEDED)
     module = re.sub(r"[-.]+", "_", name).lower()
@@ -97,59 +123,11 @@ def _module_of(name: str) -> str:
     return module
 
 
-def _check_is_free(name: str, names: list[str], module: str) -> None:
-    """Refuse a name that a folder, a formulation, a distribution or a module has."""
-    if os.path.lexists(name):
-        raise MisuseError("NAME", f"{name!r}, which exists in this folder", "the name of a new folder")
-    if registered := sorted(set(names) & set(formulation_names())):
-        raise MisuseError("NAME", f"{name!r}, but a formulation {registered[0]} is registered", "a name that is free")
-    if _distribution(name) is not None:
-        raise MisuseError("NAME", f"{name!r}, a package that is installed", "a name that is free")
-    if importlib.util.find_spec(module) is not None:
-        raise MisuseError("NAME", f"{name!r}, but Python has a module {module}", "a name that is free")
-
-
 def _distribution(name: str) -> Distribution | None:
     try:
         return distribution(name)
     except PackageNotFoundError:
         return None
-
-
-def _render(name: str, names: list[str], module: str, kind: str) -> dict[str, str]:
-    """Return {file: text} of a project."""
-    requirement, shared_requirement = _requirements()
-    words = {"name": name, "names": " ".join(names), "module": module, "kind": kind, "language": ""}
-    words |= {"requirement": requirement, "shared_requirement": shared_requirement}
-    texts = {}
-    for file, template in _TEMPLATES.items():
-        source = _SOURCES.get(kind, template) if template == "formulation.py" else template
-        texts[file.format(module=module)] = _environment().get_template(f"{source}.jinja").render(words)
-    return texts
-
-
-def _render_library(name: str, module: str, language: str) -> dict[str, str]:
-    """Return {file: text} of a project of C or Fortran."""
-    words = {"name": name, "module": module, "language": language, "subject": library_subject(name, language)}
-    texts = {}
-    for file, template in _LIBRARY_TEMPLATES.items():
-        source = f"{template.format(language=language)}.jinja"
-        texts[file.format(module=module, language=language)] = _environment().get_template(source).render(words)
-    if language == "c":
-        texts[_HEADER] = files("contactverif_foreign").joinpath(_HEADER).read_text(encoding="utf-8")
-    return texts
-
-
-def _environment() -> Environment:
-    """Return the templates, which make no pages of HTML."""
-    return Environment(
-        loader=PackageLoader("contactverif.cli", "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
 
 
 def _requirements() -> tuple[str, str]:

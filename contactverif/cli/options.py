@@ -9,6 +9,7 @@ import functools
 import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
@@ -85,6 +86,20 @@ def output_option(words: str) -> Any:
     return typer.Option("--out", help=words, metavar="FILE")
 
 
+def done_in(module: str) -> Callable[[Callable[..., None]], Callable[..., int | None]]:
+    """Return a decorator: the function of the same name in a module of the command line does the work of a command."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., int | None]:
+        @functools.wraps(command)
+        def work(**values: Any) -> int | None:
+            status: int | None = getattr(import_module(f"contactverif.cli.{module}"), command.__name__)(**values)
+            return status
+
+        return work
+
+    return decorate
+
+
 def spell_out(command: Callable[..., int | None]) -> Callable[..., int | None]:
     """Return a command whose parameters are single options, as typer needs them, and no groups.
 
@@ -92,8 +107,9 @@ def spell_out(command: Callable[..., int | None]) -> Callable[..., int | None]:
     """
     hints = get_type_hints(command, include_extras=True)
     parameters = inspect.signature(command).parameters
-    groups: dict[str, tuple[Any, dict[str, Any]]] = {}  # {parameter: its class, its fields}
+    groups: dict[str, tuple[Any, dict[str, Any]]] = {}  # {parameter: its class, its fields with their defaults}
     single: dict[str, inspect.Parameter] = {}
+    lists = [name for name in parameters if "list[" in str(hints[name])]  # Typer has None where nothing is typed.
 
     def add(name: str) -> None:
         parameter = parameters[name].replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
@@ -112,18 +128,17 @@ def spell_out(command: Callable[..., int | None]) -> Callable[..., int | None]:
                     add(each)
                     continue
                 for option in group_names(each) if kind is RunOptions else [each]:
-                    single[option] = _make_parameter(
-                        option, *declared[option], defaults[option], takes.words.get(option)
-                    )
-            groups[name] = (
-                kind,
-                {option: defaults[option] for option in declared if option in single and option not in parameters},
-            )
+                    words = takes.words.get(option)
+                    single[option] = _make_parameter(option, *declared[option], defaults[option], words)
+            typed = {option: value for option, value in defaults.items() if option in single}
+            groups[name] = kind, {option: value for option, value in typed.items() if option not in parameters}
 
     @functools.wraps(command)
     def spelled_out(**values: Any) -> int | None:
         for name, (kind, defaults) in groups.items():
             values[name] = kind(**{each: _value(each, values.pop(each), defaults[each]) for each in defaults})
+        for name in lists:
+            values[name] = () if values[name] is None else values[name]
         return command(**values)
 
     spelled_out.__signature__ = inspect.Signature([*single.values()])  # type: ignore[attr-defined]
@@ -148,20 +163,15 @@ def _make_parameter(name: str, kind: Any, option: Option, default: Any, words: s
 
 
 def _value(name: str, typed: Any, default: Any) -> Any:
-    """Return the value of a field from what is typed."""
+    """Return the value of a field from what is typed; known failures are {property: reason} of each ID=REASON."""
     if typed is None:
         return default
     if isinstance(typed, bool):
         return typed != default
-    if isinstance(typed, list):
-        return _known_failures(typed) if name == "known" else tuple(typed)
-    return typed
-
-
-def _known_failures(texts: Sequence[str]) -> dict[str, str]:
-    """Return {property: reason} of each ID=REASON."""
+    if name != "known":
+        return tuple(typed) if isinstance(typed, list) else typed
     reasons = {}
-    for text in texts:
+    for text in typed:
         property_id, _, reason = text.partition("=")
         if not (property_id and reason):
             raise MisuseError("--known", repr(text), "ID=REASON, the id of a property and why it is known to fail")

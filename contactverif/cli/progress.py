@@ -22,7 +22,6 @@ from rich.text import Text
 
 from contactverif.cli.console import QuietConsole
 from contactverif.contract.errors import one_line
-from contactverif.contract.result import Row
 from contactverif.run import scheduler
 from contactverif.run.judge import SLOW_CALL
 from contactverif_reports.tables import PLAIN_STYLE, STYLES
@@ -81,7 +80,11 @@ class Bar:
         """Show how far a run is; the scheduler calls this after every case."""
         self._of_run = step.of_run or self._of_run
         if step.row is not None:
-            self._show_row(step.row)
+            row = step.row  # One without planned cases is that of a failure of an earlier run.
+            judged = f", {row.judged}/{row.planned} judged" if row.planned else " again"
+            result = row.result, STYLES.get(row.result, PLAIN_STYLE)
+            behind = f"{judged}{f': {row.reason}' if row.reason else ''}"
+            self._print(Text.assemble(f"{row.formulation} {row.property_id}: ", result, behind))
         if (step.first_seconds or 0.0) >= SLOW_CALL:
             self._print(Text(f"{step.formulation}: a pairing and a residual take {step.first_seconds:.2g} s"))
         words = f"{f'{step.formulation} {step.property_id}'.rstrip()}: {step.phase} {step.count}/{step.planned}"
@@ -89,13 +92,6 @@ class Bar:
             self.update(words, 0, None)
         else:
             self.update(words, self._of_run.finished, self._of_run.planned, left=_time_left(self._of_run))
-
-    def _show_row(self, row: Row) -> None:
-        # A row without planned cases is that of a failure of an earlier run.
-        judged = f", {row.judged}/{row.planned} judged" if row.planned else " again"
-        words = f"{row.formulation} {row.property_id}: ", row.result, judged
-        reason = f": {row.reason}" if row.reason else ""
-        self._print(Text.assemble(words[0], (words[1], STYLES.get(row.result, PLAIN_STYLE)), words[2] + reason))
 
     def _print(self, line: Text) -> None:
         try:
@@ -116,20 +112,16 @@ class Bar:
         if self._progress.disable:
             if monotonic() >= self._next_line:
                 self._next_line = monotonic() + _PAUSE
-                self._print(Text(f"{description}{_of_all(n_finished, n_planned, left)}", style=PLAIN_STYLE))
+                total = (
+                    "" if n_planned is None else f"; {n_finished:,} of some {n_planned:,} in all{left and f', {left}'}"
+                )
+                self._print(Text(f"{description}{total}", style=PLAIN_STYLE))
             return
         if self._task is None:
             self._task = self._progress.add_task(description, left=left)
         self._progress.update(
             self._task, description=one_line(description, _LONGEST), completed=n_finished, total=n_planned, left=left
         )
-
-
-def _of_all(n_finished: int, n_planned: int | None, left: str) -> str:
-    """Return how far all of it is, behind other words."""
-    if n_planned is None:
-        return ""
-    return f"; {n_finished:,} of some {n_planned:,} in all{left and f', {left}'}"
 
 
 def _time_left(progress: scheduler.RunProgress) -> str:

@@ -88,7 +88,6 @@ def audit(report: Path, share: float, options: RunOptions) -> int:
 
 
 def _sampling(run: Run, options: RunOptions) -> Sampling:
-    """Return the size and the seed of a run, and the place where it asked."""
     stored, typed = run.provenance.get("place", ""), options.place_words
     if stored != typed:
         difference = f"a run with {stored or 'no place'}, and here {typed or 'none'}"
@@ -101,7 +100,6 @@ def _sampling(run: Run, options: RunOptions) -> Sampling:
 
 
 def _show_audit(run: Run, audit: Audit, derivable: list[str]) -> None:
-    """Show what was compared, what differs, and how likely a forgery would have been seen."""
     show(f"{len(run.rows)} rows, {audit.n_outcomes} outcomes, {audit.n_examples} witnesses and counterexamples")
     for change in audit.changes:
         echo(f"  {change}")

@@ -1,7 +1,8 @@
-"""The screen of a run in few lines: what is wrong, the most telling failure with its mesh, and what is kept.
+"""The screens of a run: what is wrong and what is kept in few lines, or every row with the coverage of its cases.
 
-Of each formulation it shows what breaks a promise first, then what fails without one, then what fails as stated, and
-at last the families of what passes. `run_tables` has every row.
+A screen reads a `Run`, from memory or from a file, and needs no more than 80 columns. In few lines each formulation
+has what breaks a promise first, with the most telling mesh, then what fails without one, then what fails as stated, and
+at last the families of what passes. Words of the table of all rows are explained below it.
 """
 
 from __future__ import annotations
@@ -9,17 +10,15 @@ from __future__ import annotations
 import shlex
 import textwrap
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
-from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
-from contactverif.cli.console import echo, fold, indent_below, line, show, show_verbatim
-from contactverif.cli.options import Screen
-from contactverif.cli.run_tables import RunTable, finding_of, headline, remark_of
+from contactverif.api.run_files import REPORT, RUN_FILES, write_run
+from contactverif.cli.console import columns, echo, fold, indent_below, line, show, show_verbatim
+from contactverif.cli.options import OutputFiles, Screen
 from contactverif.contract.counterexample import Counterexample, counterexamples, failing_examples
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import (
@@ -28,19 +27,31 @@ from contactverif.contract.result import (
     NOT_JUDGED,
     OMITTED,
     OPPOSITE_SIGN,
+    CaseCounts,
+    Coverage,
     Result,
     Row,
     Run,
+    add_by_kind,
+    coverage_of,
+    percent,
+    total,
+    whole_percent,
 )
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
+from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.plot.text import as_text
-from contactverif_reports.tables import STYLES
+from contactverif_reports.tables import PLAIN_STYLE, STYLES, WRONG_RESULTS
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
 _MOST_WRONG = 8  # The same of those that are wrong beside the most telling one.
 _MOST_IDS = 4  # The ids of a family that are listed in a sentence.
+_MOST_NAMES = 6  # Named cases that a remark lists.
+_MOST_SUMMED_UP = 3  # Rows of one result that the last line names.
+_MOST_REASONS = 3  # The most frequent reasons of undecided cases that are shown.
 _LEAST_NAME = 12  # Columns of the name of a number that are left.
 _LEAST_WORDS = 30  # Columns that are left for words beside a name, however long it is.
+_LONGEST_KIND = 35  # A longer name is cut, or the table would not fit into 80 columns.
 _PARTS = {  # The results that show no mistake and have a line for each row, and the title above them.
     Result.FAIL: "fails, and promises nothing",
     Result.FAILS_AS_STATED: "fails as stated",
@@ -57,83 +68,174 @@ _COUNTED = {
     Result.NOT_APPLICABLE: "do not apply",
     Result.NOT_PROVIDED: "need a missing part",
 }
+_PROMISES = {True: "passes", False: "fails", None: "–"}
+COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
+_LEGEND = {
+    "promise": "what the formulation states about itself: it passes, it fails, or – nothing",
+    "judged": "cases that could be decided, of those planned",
+    "touch": "share of the judged cases in which something was in contact",
+    "closest": "of all measured numbers the one nearest to its tolerance, or furthest beyond it",
+}
+_MEANINGS = {  # The results that are explained below the table where they occur in it.
+    Result.FAIL: "the formulation fails, and states nothing about this property: news, but no broken promise",
+    Result.FAILS_AS_STATED: "the formulation states itself that it fails here, or --known lists it",
+    Result.BROKEN_PROMISE: "the formulation does not do what it states",
+    Result.CRASHED: "the plugin raised an exception",
+    Result.WRONG_TRAITS: "a mistake in the traits: they state a failure, and name no case that shows it (a witness)",
+    Result.UNDECIDED: "roundoff or a kink leaves open whether it passes; the reason stands beside it",
+    Result.NOT_JUDGED: "fewer than 90 % of the planned cases could be decided, or too few were in contact",
+    Result.OMITTED: "an earlier property explains what all others would show; --keep-going asks them",
+    Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
+    Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
+}
+_KIND_COLUMNS = ("planned", "judged", "failed", "undecided", "idle")
+_NO_KIND = "other"  # The line of the cases that name no kind.
+
+
+def report(path: Path, out: Sequence[Path], screen: Screen) -> None:
+    """Show a stored report, or write it as other files. Nothing is judged."""
+    files = OutputFiles.check(out, [suffix for suffix in RUN_FILES if suffix != REPORT])
+    run = read_run(path)
+    if not files.paths:
+        if not screen.quiet:
+            show_run(run, screen, path)
+        show(summary(run, quiet=screen.quiet))
+        return
+    for target in files.paths.values():
+        write_run(run, target, path)
+    files.announce()
 
 
 def show_run(result: Run, screen: Screen, report: Path | None) -> None:
     """Show a run as the user wants it: its few telling lines, or every row, and counterexamples."""
-    show(RunTable(result) if screen.verbose else RunScreen(result, report))
+    show(*(run_table(result, columns()) if screen.verbose else run_screen(result, columns(), report)))
     if screen.verbose or screen.show == "all":
         for example in failing_examples(result):
             show_verbatim(counterexample_text(example, report))
-    if advice := how_to_explain(result, report):
-        echo(advice)
+    failing = by_rank(row for row in result.rows if row.verdict in (Verdict.FAIL, Verdict.CRASHED))
+    news = [row for row in failing if row.result is Result.FAIL]
+    first = first_failure(failing) or next(iter([*news, *failing]), None)
+    if first is not None:
+        stored = report is not None and any(example.row is first for example in failing_examples(result))
+        option = f" --report {shlex.quote(str(report))}" if stored else ""
+        echo(f"to have a row explained: contactverif explain {first.property_id}{option}")
 
 
-@dataclass(frozen=True, slots=True)
-class RunScreen:
-    """The results of a run for a person, in at most 80 columns.
+def headline(provenance: Mapping[str, str]) -> str:
+    """Say how many cases there are, and where they come from."""
+    if "asked" in provenance:
+        return f"asked: {provenance['asked']}"
+    profile, examples, seed = (provenance.get(name) for name in ("profile", "examples", "seed"))
+    if profile is None:
+        return "named cases alone, no random ones"
+    return f"profile {profile}: {examples} random cases for each property, seed {seed}"
+
+
+def summary(run: Run, *, quiet: bool = False) -> Text:
+    """Say in the last lines whether every promise is kept, and how many there are, or what is wrong."""
+    if run.promises_kept:
+        return Text(run.praise if quiet else f"{run.praise}\n{run.promises}", style="green")
+    signs = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
+    return conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
+
+
+def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], signs: Sequence[str] = ()) -> Text:
+    """Sum up rows and plugins that did not load, behind sentences about whole formulations."""
+    sentences = list(signs)
+    for result, words in WRONG_RESULTS.items():
+        names = []
+        for row in by_rank(rows):
+            if row.result is result and row.unexpected:
+                otherwise = result is Result.BROKEN_PROMISE and row.unexpected != BROKEN_BY_FAILING
+                names.append(f"{row.formulation} {row.property_id}{f' ({row.unexpected})' if otherwise else ''}")
+        names += not_loaded if result is Result.NOT_LOADED else []
+        if names:
+            named = f": {_list(names, _MOST_SUMMED_UP)}" if result is not Result.OMITTED else ""
+            sentences.append(f"{len(names)} {words[len(names) > 1]}{named}.")
+    return Text(" ".join(sentences) or "Nothing was checked.", style="red")
+
+
+def _list(names: Sequence[str], most: int = _MOST_NAMES) -> str:
+    return "; ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _remark(row: Row) -> str:
+    parts = [
+        row.unexpected if row.result is Result.BROKEN_PROMISE else "",
+        f"known: {row.known}" if row.known else "",
+        row.reason if row.verdict not in (Verdict.PASS, Verdict.FAIL) or row.fails_in_words else "",
+        f"fails in: {_list(row.failing_names)}" if row.failing_names else "",
+        f"{row.undecided} undecided" if row.undecided else "",
+        f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",
+        row.suspicion,
+        _finding(row),
+    ]
+    return "; ".join(part for part in parts if part)
+
+
+def _finding(row: Row) -> str:
+    """Return the sentence that a property says of the case with the closest number although it passes."""
+    if row.verdict is not Verdict.PASS or row.closest is None or row.closest.case is None:
+        return ""
+    measurement = row.outcomes[row.closest.case].measurement
+    finding = measurement.finding if measurement is not None else None
+    return "" if finding is None or finding.found else str(finding)
+
+
+# The screen of few lines.
+
+
+def run_screen(run: Run, width: int, report: Path | None = None) -> Iterator[Text]:
+    """Yield the results of a run for a person; a counterexample can be replayed from a report.
 
     One formulation that keeps its promises takes at most 25 lines, and one with a mistake at most 60. Where several
     are shown, those that keep their promises take a few lines each.
     """
-
-    run: Run
-    report: Path | None = None  # The report from which a counterexample can be replayed.
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
-        width, names = options.max_width, self.run.formulations
-        yield Text(headline(self.run.provenance))
-        for name in names:
-            yield Text("")
-            yield from self._formulation(name, width, alone=len(names) == 1)
-        for plugin in self.run.not_loaded:
-            yield Text("")
-            yield fold(f"{plugin.formulation}: {Result.NOT_LOADED}: {plugin.reason}", width, "red", indent=0)
+    names = run.formulations
+    yield Text(headline(run.provenance))
+    for name in names:
         yield Text("")
-
-    def _formulation(self, name: str, width: int, *, alone: bool) -> Iterator[Text]:
-        rows = [row for row in self.run.rows if row.formulation == name]
-        wrong = wrong_rows(rows)
-        yield _title(name, rows, wrong, width)
-        if name in self.run.opposite_signs:
-            yield fold(OPPOSITE_SIGN, width, "bold red", indent=2)
-        if name in self.run.diagnoses:
-            yield fold(f"diagnosis: {self.run.diagnoses[name]}", width, "bold", indent=2)
-        if (row := first_failure(rows)) is not None:
-            yield self._with_mesh(row, width)
-            yield Text("")
-        yield from _part("also wrong", wrong[1:], width, _MOST_WRONG)
-        yield from _say_what_is_left_out(rows, width)
-        yield from _remarks(rows, width)
-        yield from _other_failures(rows, width, in_full=alone and not wrong)
-        yield from _families(rows, width)
-        yield from _say_what_the_place_lacks(rows, width)
-
-    def _with_mesh(self, row: Row, width: int) -> Text:
-        """Return a row that is wrong, with the mesh that shows it, if one does."""
-        for example in counterexamples(self.run).values():
-            if example.row is row and row.verdict in (Verdict.FAIL, Verdict.CRASHED):
-                return counterexample_text(example, self.report, width)
-        return fold(f"{row.property_id}: {row.result}: {remark_of(row)}", width, STYLES[row.result], indent=2)
+        yield from _formulation(run, name, width, report, alone=len(names) == 1)
+    for plugin in run.not_loaded:
+        yield Text("")
+        yield fold(f"{plugin.formulation}: {Result.NOT_LOADED}: {plugin.reason}", width, "red", indent=0)
+    yield Text("")
 
 
-def _title(name: str, rows: Sequence[Row], wrong: Sequence[Row], width: int) -> Text:
-    """Return the line of a formulation: how many properties are wrong, or what the others come to."""
-    counts = Counter(row.result for row in rows)
+def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone: bool) -> Iterator[Text]:
+    rows = list(run.rows_of(name))
+    wrong, counts = wrong_rows(rows), Counter(row.result for row in rows)
     words = [f"{len(wrong)} wrong"] if wrong else []
     words += [f"{counts[result]} {text}" for result, text in _COUNTED.items() if counts[result]]
-    text = f"{name}: {', '.join(words)}" if words else name
-    return fold(text, width, "bold red" if wrong else "bold", indent=0)
-
-
-def _other_failures(rows: Sequence[Row], width: int, *, in_full: bool) -> Iterator[Text]:
-    """Yield the failures that break no promise, and what was left open; in full with a line for each."""
+    title = f"{name}: {', '.join(words)}" if words else name
+    yield fold(title, width, "bold red" if wrong else "bold", indent=0)
+    if name in run.opposite_signs:
+        yield fold(OPPOSITE_SIGN, width, "bold red", indent=2)
+    if name in run.diagnoses:
+        yield fold(f"diagnosis: {run.diagnoses[name]}", width, "bold", indent=2)
+    if (first := first_failure(rows)) is not None:
+        examples = counterexamples(run).values() if first.verdict in (Verdict.FAIL, Verdict.CRASHED) else ()
+        example = next((each for each in examples if each.row is first), None)
+        if example is None:
+            yield fold(f"{first.property_id}: {first.result}: {_remark(first)}", width, STYLES[first.result], indent=2)
+        else:
+            yield counterexample_text(example, report, width)
+        yield Text("")
+    yield from _part("also wrong", wrong[1:], width, _MOST_WRONG)
+    if omitted := [row for row in rows if row.omitted]:
+        reason = omitted[0].reason.removeprefix(OMITTED)
+        yield fold(f"{len(omitted)} properties were not asked: {reason}. --keep-going asks them all.", width, indent=0)
+    for row in rows:  # A doubt about a formulation that passes, or how stiff its springs are.
+        if row.result is Result.PASS and (remark := "; ".join(filter(None, (row.suspicion, _finding(row))))):
+            yield fold(f"{row.property_id} passes, and says: {remark}", width, "yellow", indent=0)
     for result, title in _PARTS.items():
         part = by_rank(row for row in rows if row.result is result)
-        if in_full or result is Result.NOT_JUDGED:  # Such a row makes a run fail, too: its reason is wanted.
+        # A row that was not judged makes a run fail, too: its reason is wanted.
+        if (alone and not wrong) or result is Result.NOT_JUDGED:
             yield from _part(title, part, width)
         elif part:
             yield fold(f"{title}: {', '.join(row.property_id for row in part)}", width, indent=0)
+    yield from _families(rows, width)
 
 
 def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -> Iterator[Text]:
@@ -152,14 +254,6 @@ def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -
         yield fold(f"and {len(others)} more: {', '.join(row.property_id for row in others)}", width, indent=2)
 
 
-def _remarks(rows: Sequence[Row], width: int) -> Iterator[Text]:
-    """Yield what a property says of a formulation that passes it: a doubt, or how stiff its springs are."""
-    for row in rows:
-        words = "; ".join(filter(None, (row.suspicion, finding_of(row)))) if row.result is Result.PASS else ""
-        if words:
-            yield fold(f"{row.property_id} passes, and says: {words}", width, "yellow", indent=0)
-
-
 def _words(row: Row, room: int) -> str:
     """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none.
 
@@ -175,49 +269,27 @@ def _words(row: Row, room: int) -> str:
 
 
 def _shorten(words: str, room: int) -> str:
-    """Return words that fit, with an ellipsis at their end where they do not."""
     return words if len(words) <= room else f"{words[: max(room, _LEAST_NAME) - 1].rstrip()}…"
 
 
 def _families(rows: Sequence[Row], width: int) -> Iterator[Text]:
-    """Yield the families of the properties that pass, such as `patch 12 of 14`."""
-    members: dict[str, list[Row]] = {}
+    """Yield the families of what passes, such as `patch 12 of 14`, and what the mesh or scene lacks for the others."""
+    passing: dict[str, list[bool]] = {}
+    lacking: dict[str, dict[str, list[str]]] = {}  # {what is needed: {family: ids}}
     for row in rows:
         if row.result not in (Result.NOT_APPLICABLE, Result.NOT_PROVIDED):
-            members.setdefault(row.info.family, []).append(row)
-    passing = {family: sum(row.result is Result.PASS for row in group) for family, group in members.items()}
-    words = [f"{family} {count} of {len(members[family])}" for family, count in passing.items() if count]
+            passing.setdefault(row.info.family, []).append(row.result is Result.PASS)
+        if row.reason.startswith(NOT_HERE):
+            families = lacking.setdefault(row.reason.removeprefix(NOT_HERE), {})
+            families.setdefault(row.info.family, []).append(row.property_id)
+    words = [f"{family} {sum(each)} of {len(each)}" for family, each in passing.items() if any(each)]
     if words:
         yield fold(f"passes: {', '.join(words)}", width, STYLES[Result.PASS], indent=0)
-
-
-def _say_what_is_left_out(rows: Sequence[Row], width: int) -> Iterator[Text]:
-    """Say how many properties were not asked because of what the first ones had shown, and how to ask them."""
-    rows = [row for row in rows if row.omitted]
-    if rows:
-        reason = rows[0].reason.removeprefix(OMITTED)
-        yield fold(f"{len(rows)} properties were not asked: {reason}. --keep-going asks them all.", width, indent=0)
-
-
-def _say_what_the_place_lacks(rows: Sequence[Row], width: int) -> Iterator[Text]:
-    """Say what the mesh or the scene of the run lacks, and which properties were not asked for this reason."""
-    lacking: dict[str, list[Row]] = {}
-    for row in rows:
-        if row.reason.startswith(NOT_HERE):
-            lacking.setdefault(row.reason.removeprefix(NOT_HERE), []).append(row)
     if lacking:
         yield Text("not asked here, needs:", style="bold")
-    for needs, group in lacking.items():
-        yield fold(f"{needs}: {', '.join(_fold_families(group))}", width, indent=2)
-
-
-def _fold_families(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the ids of rows, and of a family with many of them the number."""
-    families: dict[str, list[str]] = {}
-    for row in rows:
-        families.setdefault(row.info.family, []).append(row.property_id)
-    for family, ids in families.items():
-        yield from [f"{len(ids)} of {family}"] if len(ids) > _MOST_IDS else ids
+    for needs, families in lacking.items():
+        lists = ([f"{len(ids)} of {family}"] if len(ids) > _MOST_IDS else ids for family, ids in families.items())
+        yield fold(f"{needs}: {', '.join(chain.from_iterable(lists))}", width, indent=2)
 
 
 def counterexample_text(example: Counterexample, report: Path | None, width: int = 10**4) -> Text:
@@ -239,43 +311,6 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     return text
 
 
-def how_to_keep(run: Run) -> str:
-    """Say how the cases that fail are stored, so that they can be replayed; empty where there is none."""
-    seed = run.provenance.get("seed")
-    return f"to keep these cases: the same command with --seed {seed} --out FILE.nc" if failing_examples(run) else ""
-
-
-def how_to_explain(run: Run, report: Path | None) -> str:
-    """Return the line that explains the first row of the screen that fails, with its numbers if a report has them."""
-    failing = by_rank(row for row in run.rows if row.verdict in (Verdict.FAIL, Verdict.CRASHED))
-    news = [row for row in failing if row.result is Result.FAIL]
-    row = first_failure(failing) or next(iter([*news, *failing]), None)
-    if row is None:
-        return ""
-    stored = report is not None and any(example.row is row for example in failing_examples(run))
-    option = f" --report {shlex.quote(str(report))}" if stored else ""
-    return f"to have a row explained: contactverif explain {row.property_id}{option}"
-
-
-def ending_lines(outcome: Outcome) -> list[str]:
-    """Return how Newton's method ended where a property solved, with advice where it did not converge."""
-    details: Mapping[str, float] = outcome.measurement.details if outcome.measurement is not None else {}
-    lines = []
-    for name, value in details.items():
-        kind, _, solution = name.partition(", ")
-        iterations = details.get(name.replace("end", "iterations", 1))
-        if kind == "end" and iterations is not None:
-            from contactverif.mechanics.newton import (
-                End,  # It brings scipy, and is needed only where a property solved.
-            )
-
-            end = End(int(value))
-            words = f"{end.label} after {iterations:g} iteration{'s' * (iterations != 1)}"
-            label = f" ({solution})" if solution else ""
-            lines.append(f"Newton's method{label}: {words}{'' if end is End.CONVERGED else f': {end.advice}'}")
-    return lines
-
-
 def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
     """Return the numbers that fail, or all, beside their tolerances, and how Newton ended; else the reason."""
     measurement = outcome.measurement
@@ -294,3 +329,180 @@ def _numbers(info: PropertyInfo, outcome: Outcome) -> list[str]:
         if kind not in ("end", "iterations"):
             others.append(f"{kind}{f' ({solution})' if solution else ''}: {value:.3g}")
     return lines + ending_lines(outcome) + (["; ".join(others)] if others else [])
+
+
+def ending_lines(outcome: Outcome) -> list[str]:
+    """Return how Newton's method ended where a property solved, with advice where it did not converge."""
+    details: Mapping[str, float] = outcome.measurement.details if outcome.measurement is not None else {}
+    lines = []
+    for name, value in details.items():
+        kind, _, solution = name.partition(", ")
+        iterations = details.get(name.replace("end", "iterations", 1))
+        if kind == "end" and iterations is not None:
+            from contactverif.mechanics.newton import End  # It brings scipy; needed only where a property solved.
+
+            end = End(int(value))
+            words = f"{end.label} after {iterations:g} iteration{'s' * (iterations != 1)}"
+            label = f" ({solution})" if solution else ""
+            lines.append(f"Newton's method{label}: {words}{'' if end is End.CONVERGED else f': {end.advice}'}")
+    return lines
+
+
+# The table of all rows.
+
+
+def run_table(run: Run, width: int) -> Iterator[Text]:
+    """Yield a line for each formulation and property: promise, result, and how close it came to the tolerance.
+
+    A remark stands behind its line if there is room, else below it. The name of the closest number is left out if there
+    is no room. Below the table stands the coverage.
+    """
+    for name in run.opposite_signs:
+        yield fold(f"{name}: {OPPOSITE_SIGN}", width, style="bold red", indent=0)
+        yield Text("")
+    yield Text(headline(run.provenance))
+    if run.rows:
+        yield from _lines(run.rows, width)
+    for plugin in run.not_loaded:
+        yield Text(plugin.formulation, style="bold")
+        yield fold(f"{Result.NOT_LOADED}: {plugin.reason}", width, style="red")
+    if run.rows:
+        yield from _legend({row.result for row in run.rows}, width)
+        yield from coverage_text(run, width)
+
+
+def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:
+    entries = [_entries(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(COLUMNS, *entries, strict=True)]
+    # Where the columns are too many for the terminal, they stand closer together.
+    space = " " * (2 if sum(widths) + 2 * len(widths) <= max_width else 1)
+
+    def align(cells: Sequence[str]) -> str:
+        places = enumerate(zip(cells, widths, strict=True))
+        return space + space.join(cell.ljust(n) if place < 3 else cell.rjust(n) for place, (cell, n) in places)
+
+    yield Text("")
+    yield Text(align(COLUMNS), style="bold")
+    start_of_result = widths[0] + widths[1] + 3 * len(space)
+    previous = None
+    for row, cells in zip(rows, entries, strict=True):
+        if row.formulation != previous:
+            yield Text(row.formulation, style="bold")
+        previous = row.formulation
+        quantity = ""  # The name of the closest number where a property measures several, and of its case.
+        if row.closest is not None:
+            name = row.closest.number.quantity.name if len(row.info.quantities) > 1 else ""
+            quantity = " in ".join(text for text in (name, row.closest_name) if text)
+        listed, remark = align(cells), _remark(row)
+        options = ("; ".join(text for text in (remark, quantity) if text), remark)
+        behind = next((text for text in options if len(listed) + 2 + len(text) <= max_width), "")
+        text = line(f"{listed}  {behind}".rstrip())
+        text.stylize(STYLES.get(row.result, PLAIN_STYLE), start_of_result, start_of_result + len(row.result))
+        yield text
+        if remark and not behind:
+            yield fold(remark, max_width)
+
+
+def _entries(row: Row) -> tuple[str, ...]:
+    number = row.closest.number if row.closest is not None else None
+    return (
+        row.property_id,
+        _PROMISES[row.promise],
+        str(row.result),
+        f"{row.judged}/{row.planned}" if row.planned else "–",
+        whole_percent(row.contact_share) if row.contact_share is not None else "",
+        _short(number.value) if number is not None else "",
+        f"{number.sign} {_short(number.tolerance)}" if number is not None else "",
+    )
+
+
+def _short(number: float) -> str:
+    """Return two digits of a number, without zeros in its exponent: they make a column too wide for 80."""
+    return f"{number:.2g}".replace("e-0", "e-").replace("e+0", "e+")
+
+
+def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:
+    entries = _LEGEND | {str(result): words for result, words in _MEANINGS.items() if result in results}
+    width = max(map(len, entries))
+    indent = " " * (width + 4)
+    yield Text("")
+    for name, words in entries.items():
+        folded = textwrap.wrap(words, max(max_width - len(indent), 20))
+        yield line(f"  {name:{width}}  " + f"\n{indent}".join(folded), "dim")
+    yield Text("")
+
+
+def coverage_text(run: Run, width: int) -> Iterator[Text]:
+    """Yield the shares of undecided and idle cases, then the cases of each kind; properties of equal kinds together."""
+    everything = coverage_of(run)
+    if not everything:
+        return
+    yield from _shares(everything, width)
+    with_kinds: dict[tuple[str, ...], list[Coverage]] = {}
+    for coverage in everything:
+        if coverage.kinds:
+            with_kinds.setdefault(tuple(coverage.kinds), []).append(coverage)
+    for group in with_kinds.values():
+        yield from _kinds(group, width)
+
+
+def _shares(everything: Sequence[Coverage], width: int) -> Iterator[Text]:
+    together = _together(everything)
+    incomplete = [each for each in everything if each.counts.undecided or each.counts.idle]
+    if not incomplete:
+        yield fold(f"No case was undecided, and none was idle (nothing in contact){together}.", width, "dim", indent=0)
+        yield Text("")
+        return
+    yield fold(f"Undecided cases, and idle ones (nothing in contact){together}", width, "bold", indent=0)
+    size = max(len("property"), *(len(each.info.id) for each in incomplete))
+    yield line(f"  {'property':{size}}  {'cases':>7}  {'undecided':>9}  {'idle':>7}", style="bold")
+    for each in incomplete:
+        shares = f"{percent(each.counts.undecided_share):>9}  {percent(each.counts.idle_share):>7}"
+        yield line(f"  {each.info.id:{size}}  {each.counts.cases:7}  {shares}")
+        reasons = [*each.reasons.items()]
+        for reason, number in reasons[:_MOST_REASONS]:
+            yield fold(f"{number} undecided: {reason}", width, "dim")
+        if others := reasons[_MOST_REASONS:]:
+            more = sum(number for _, number in others)
+            yield fold(f"{more} undecided for {len(others)} other reasons", width, "dim")
+    if len(incomplete) < len(everything):
+        words = "In all other properties every case was decided, and something was in contact."
+        yield fold(words, width, "dim", indent=2)
+    yield Text("")
+
+
+def _together(group: Sequence[Coverage]) -> str:
+    n_formulations = max(each.n_formulations for each in group)
+    return f", {n_formulations} formulations together" if n_formulations > 1 else ""
+
+
+def _kinds(group: Sequence[Coverage], width: int) -> Iterator[Text]:
+    """Yield how many cases of each kind were judged, in all properties of a group together."""
+
+    def cells(counts: CaseCounts) -> str:
+        numbers = counts.cases, counts.judged, counts.failed, counts.undecided, counts.idle
+        return "  ".join(f"{n:>{len(name)}}" for name, n in zip(_KIND_COLUMNS, numbers, strict=True))
+
+    kinds = add_by_kind(each.kinds for each in group)
+    properties = ", ".join(each.info.id for each in group)
+    yield fold(f"Cases of each kind in {properties}{_together(group)}", width, "bold", indent=0)
+    size = min(max(len("kind"), *map(len, kinds)), _LONGEST_KIND)
+    yield line(f"  {'kind':{size}}  {'  '.join(_KIND_COLUMNS)}", style="bold")
+    for kind, counts in kinds.items():
+        style = "yellow" if counts.judged == counts.idle else ""  # Nothing of this kind was judged in contact.
+        yield line(f"  {(kind or _NO_KIND)[:size]:{size}}  {cells(counts)}", style=style)
+    yield line(f"  {'all':{size}}  {cells(total(kinds.values()))}", style="dim")
+    weak = {
+        each.info.id: ", ".join(
+            f"{kind or _NO_KIND} {counts.judged}/{counts.cases}"
+            for kind, counts in each.kinds.items()
+            if counts.judged < counts.cases / 2
+        )
+        for each in (group if len(group) > 1 else ())
+    }
+    if any(weak.values()):
+        yield line("  Kinds of which a property could judge less than half:", style="yellow")
+    for id_, words in weak.items():
+        if words:
+            yield fold(f"{id_}: {words}", width, "dim")
+    yield Text("")

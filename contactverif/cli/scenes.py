@@ -8,11 +8,10 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
 from contactverif.api.drawing import draw_outcome
-from contactverif.cli.console import echo, print_plugin_output, show
+from contactverif.cli.console import columns, echo, print_plugin_output, show
 from contactverif.cli.options import PICTURES, SOLVED_SCENE, OutputFiles
 from contactverif.cli.replay import announce_stored, check_surfaces
 from contactverif.contract.case import Case
@@ -27,7 +26,6 @@ from contactverif.run.judge import judge_if_applicable
 from contactverif.run.run_options import RunOptions
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.read import read_case
-from contactverif_reports.plot.solved_scene import SolvedScene
 from contactverif_reports.plot.text import as_text, blocks_as_text, silhouettes_as_text
 from contactverif_reports.plot.vtu import write_vtu
 from contactverif_reports.tables import Column, Table, numbers
@@ -52,52 +50,49 @@ _MOST_COLUMNS = 80  # The largest number of columns of a remark.
 
 def draw(
     report: Path | None,
-    case_id: str | None,
+    case: str | None,
     scene: str | None,
-    names: Sequence[str],
+    formulation: Sequence[str],
     out: Sequence[Path],
     options: RunOptions,
 ) -> int:
     """Draw a scene or a counterexample; return 0 if every formulation loaded and kept its contract, else 1."""
-    files = OutputFiles.check(out, (*PICTURES, SOLVED_SCENE))
-    limits = options.limits()
+    files, limits, names = OutputFiles.check(out, (*PICTURES, SOLVED_SCENE)), options.limits(), formulation
     for name in names:
         if names.count(name) > 1:
             raise MisuseError("--formulation", f"{name} twice", "each formulation once")
     complete = True
     if scene is not None:
-        for option, value in (("--case", case_id), ("REPORT", report)):
+        for option, value in (("--case", case), ("REPORT", report)):
             if value is not None:
                 raise MisuseError("--scene", f"{scene} and {option} {value}", "one of the two")
-        case = load_scene(scene).case()
+        posed = load_scene(scene).case()
         if not names:
             raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
-        complete = _draw_solved(case, names, scene, files, limits)
+        complete = _draw_solved(posed, names, scene, files, limits)
     else:
-        stored = _read_stored(report, case_id)
+        stored = _read_stored(report, case)
         if has_bodies(stored.case):
             names = names or [announce_stored(stored.formulation)]
-            complete = _draw_solved(stored.case, names, f"{case_id}: {stored.reason}", files, limits)
+            complete = _draw_solved(stored.case, names, f"{case}: {stored.reason}", files, limits)
         else:
             _draw_stored(stored, names, files, limits)
     print_plugin_output()
     return 0 if complete else 1
 
 
-def _read_stored(report: Path | None, case_id: str | None) -> Counterexample:
-    """Read the counterexample that the user names."""
-    if report is None and case_id is None:
+def _read_stored(report: Path | None, case: str | None) -> Counterexample:
+    if report is None and case is None:
         raise MisuseError("--scene", "nothing to draw", "--scene NAME, or REPORT --case ID")
     if report is None:
-        raise MisuseError("REPORT", f"none, but --case {case_id}", "the report that holds the case")
-    if case_id is None:
+        raise MisuseError("REPORT", f"none, but --case {case}", "the report that holds the case")
+    if case is None:
         check_ordinary(report, "REPORT", "a report that `contactverif verify --out FILE.nc` wrote, or --scene NAME")
         raise MisuseError("--case", "nothing", f"--case ID; `contactverif replay {report}` lists the ids")
-    return read_case(report, case_id)
+    return read_case(report, case)
 
 
 def _draw_stored(stored: Counterexample, names: Sequence[str], files: OutputFiles, limits: Limits | None) -> None:
-    """Draw a case without bodies, as `replay --out` draws it."""
     check_surfaces(stored.case, files)
     if len(names) > 1:
         raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
@@ -127,7 +122,13 @@ def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFile
     if not (scene.solutions and files.paths):
         echo(as_text(case))
     if scene.solutions:
-        show(_solutions_table(scene).terminal())
+        # How Newton's method ended for each formulation, a line each.
+        table = Table([Column("formulation"), Column("end"), *numbers("iterations", "residual", "stress error")])
+        for each in scene.solutions:
+            residual = f"{each.residuals[-1]:.2g}"
+            table.add(each.formulation, str(each.end), each.n_iterations, residual, each.stress_error)
+        without_stress = all(isnan(each.stress_error) for each in scene.solutions)
+        show((table.without("stress error") if without_stress else table).terminal())
     remarks = [(each.formulation, text) for each in scene.solutions for text in (each.advice, each.remark) if text]
     for name, text in (*remarks, *scene.failures.items()):
         echo("\n".join(textwrap.wrap(f"{name}: {text}", _MOST_COLUMNS, subsequent_indent="  ")))
@@ -136,33 +137,13 @@ def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFile
     return not scene.failures
 
 
-def _solutions_table(scene: SolvedScene) -> Table:
-    """Return a table of how Newton's method ended for each formulation, a line each."""
-    table = Table([Column("formulation"), Column("end"), *numbers("iterations", "residual", "stress error")])
-    for each in scene.solutions:
-        residual = f"{each.residuals[-1]:.2g}"
-        table.add(each.formulation, str(each.end), each.n_iterations, residual, each.stress_error)
-    without_stress = all(isnan(each.stress_error) for each in scene.solutions)
-    return table.without("stress error") if without_stress else table
-
-
 def list_scenes() -> None:
-    """Show all scenes."""
-    show(Gallery())
-
-
-class Gallery:
-    """All scenes, then the meaning of their options."""
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
-        width = max(_NARROWEST, min(options.max_width, _WIDEST))
-        for name in SCENES:
-            yield from _scene(name, width)
-        yield from _options(width)
+    """Show all scenes, then the meaning of their options."""
+    width = max(_NARROWEST, min(columns(), _WIDEST))
+    show(*(text for name in SCENES for text in _scene(name, width)), *_options(width))
 
 
 def _scene(name: str, width: int) -> Iterator[Text]:
-    """Yield the description of one scene and its drawing."""
     entry = SCENES[name]
     yield Text(name, style="bold")
     yield _wrap(entry.summary, width)
@@ -181,7 +162,6 @@ def _scene(name: str, width: int) -> Iterator[Text]:
 
 
 def _options(width: int) -> Iterator[Text]:
-    """Yield the options of the scenes, with their meanings and defaults."""
     yield Text("options, as in --scene c:refine=2,penalty=1e4", style="bold")
     defaults = {option: default for name in [*SCENES][::-1] for option, default in options_of(name).items()}
     longest = max(map(len, MEANINGS))
@@ -199,7 +179,6 @@ def _default_in_words(default: Any) -> str:
 
 
 def _wrap(words: str, width: int) -> Text:
-    """Return words wrapped and indented below the name of a scene."""
     indent = " " * _MARGIN
     return _keep_lines(textwrap.fill(words, width, initial_indent=indent, subsequent_indent=indent + "  "))
 

@@ -15,15 +15,15 @@ from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 import typer
+from rich.text import Text
 
 from contactverif.api.drawing import draw_outcome
 from contactverif.api.run_files import REPORT, RUN_FILES, write_run
 from contactverif.cli.annotations import annotate
-from contactverif.cli.console import echo, print_plugin_output, show
+from contactverif.cli.console import columns, echo, print_plugin_output, show
 from contactverif.cli.options import OutputFiles, Screen, picture_folder, read_place, select_names, with_engines
 from contactverif.cli.progress import Bar
-from contactverif.cli.run_screen import RunScreen, how_to_keep, show_run
-from contactverif.cli.run_tables import summary
+from contactverif.cli.run_screen import run_screen, show_run, summary
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import case_id, failing_examples
 from contactverif.contract.errors import MisuseError, name_line, one_line
@@ -38,7 +38,6 @@ from contactverif.plugins.registry import load_properties
 from contactverif.run.campaign import Shard, mark_done, open_shard, read_shards
 from contactverif.run.failure_memory import FailureMemory
 from contactverif.run.journal import hold_journal, journal_folder, keep_earlier, new_journal, remove_journal
-from contactverif.run.profiles import Shrink
 from contactverif.run.rows import find_missing
 from contactverif.run.run import RunStopped, run, run_failures, run_share
 from contactverif.run.run_options import Isolation, RunOptions, declared_options, read_settings
@@ -98,24 +97,24 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
     return 0
 
 
-def merge(folder: Path, out: tuple[Path, ...], shrink: Shrink | None, audited: float | None, screen: Screen) -> int:
+def merge(folder: Path, out: Sequence[Path], options: RunOptions, audit: bool, share: float, screen: Screen) -> int:
     """Make the report of a campaign from the journals of its shards, and audit a share of it; return the exit status.
 
     What fails is shrunk here.
     """
-    from contactverif.cli.replay import audit, check_share
+    from contactverif.cli import replay
 
-    check_share(1.0 if audited is None else audited)
+    replay.check_share(share if audit else 1.0)
     plan, journals = read_shards(folder, "FOLDER")
-    options = options_of(plan, CAMPAIGN, "FOLDER")
-    job = new_job(replace(options, shrink=shrink or options.shrink, out=out))
+    planned, shrink = options_of(plan, CAMPAIGN, "FOLDER"), options.shrink
+    job = new_job(replace(planned, shrink=shrink or planned.shrink, out=tuple(out)))
     files = " ".join(f"--out {shlex.quote(str(path))}" for path in out)
     again = f"contactverif merge {shlex.quote(str(folder))} {files}{f' --shrink {shrink}' if shrink else ''}"
-    if audited is not None and REPORT not in job.files.names:
+    if audit and REPORT not in job.files.names:
         raise MisuseError("--audit", "no report", f"--out FILE{REPORT} beside it")
     status = _run_job(replace(job, sources=journals, again=again), screen)
-    if audited is not None and job.files.paths[REPORT].exists():
-        differs = audit(job.files.paths[REPORT], audited, options)
+    if audit and job.files.paths[REPORT].exists():
+        differs = replay.audit(job.files.paths[REPORT], share, planned)
         status = status or differs
     return status
 
@@ -313,34 +312,45 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
         gap = partial(find_missing, result, plugins.subjects, plugins.questions, job.sampling)
         write = partial(write_run, result, report=job.files.names.get(REPORT))
         end = end_run(job, store, gap, write, promises_kept=result.promises_kept)
-    _show_results(result, plugins, end, job, screen)
-    if not end.complete:
-        print_resume_hint(job)
-    return end.status
-
-
-def _show_results(result: Run, plugins: Plugins, end: End, job: Job, screen: Screen) -> None:
-    """Show the results, the names of the files, and the last line; draw the pictures."""
     if job.pictures is not None:
         for example in failing_examples(result):
             subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
             name = f"{case_id(subject.name, question.id)}.png"
             draw_outcome(subject, question, example.outcome, job.pictures / name, argument="--pictures")
-    print_plugin_output()
-    annotate(result)
-    if not screen.quiet:
+    advice = ""
+    if REPORT not in end.files.names and not result.promises_kept and failing_examples(result):
+        seed = result.provenance.get("seed")
+        advice = f"to keep these cases: the same command with --seed {seed} --out FILE.nc"
+
+    def show_result() -> None:
         show_run(result, screen, end.files.names.get(REPORT))
         if remark := result.provenance.get("drawing"):
             show(f"{remark}.")
-        print_stored(result)
+
+    return show_end(job, screen, end, result, show_result, summary(result, quiet=screen.quiet), advice)
+
+
+def show_end(
+    job: Job, screen: Screen, end: End, result: Run, show_result: Callable[[], None], last_line: Text, advice: str = ""
+) -> int:
+    """Show the results, the names of the files, and the last line; return the exit status."""
+    print_plugin_output()
+    annotate(result)
+    if not screen.quiet:
+        show_result()
+        if stored := result.provenance.get(STORED):
+            typer.echo(f"outcomes that were judged before: {stored}")
         if job.pictures is not None:
             show(f"pictures: {job.options.pictures}")
         end.files.announce()
-        if REPORT not in end.files.names and not result.promises_kept and (advice := how_to_keep(result)):
+        if advice:
             show(advice)
-    show(f"Not complete: {end.gap}." if end.gap else summary(result, quiet=screen.quiet))
+    show(f"Not complete: {end.gap}." if end.gap else last_line)
     if not screen.quiet:
         print_isolation(result.provenance)
+    if not end.complete:
+        print_resume_hint(job)
+    return end.status
 
 
 class End(NamedTuple):
@@ -391,7 +401,7 @@ def watch_for_stops(job: Job) -> Iterator[None]:
     try:
         yield
     except RunStopped as stop:
-        show(RunScreen(stop.run))
+        show(*run_screen(stop.run, columns()))
         print_resume_hint(job)
         raise typer.Exit(_STOPPED) from None
     except WorkerError:
@@ -418,12 +428,6 @@ def print_isolation(provenance: Mapping[str, str]) -> None:
         typer.echo(f"The plugins ran in a {place}.")
     elif place != Isolation.INLINE:
         typer.echo(f"The plugins ran in a {place} without a box: {why_no_box() or 'as --isolation says'}.")
-
-
-def print_stored(result: Run) -> None:
-    """Print how many outcomes of a run earlier processes had judged."""
-    if stored := result.provenance.get(STORED):
-        typer.echo(f"outcomes that were judged before: {stored}")
 
 
 def _print_remarks(store: Store) -> None:
@@ -456,7 +460,7 @@ def _judge_last_failed(job: Job) -> int:
     result = run_failures((*plugins.subjects, *plugins.questions), failures, provenance)
     memory.update(result.rows)
     print_plugin_output()
-    show(RunScreen(result))
+    show(*run_screen(result, columns()))
     left = len(memory.recall(*names))  # What cannot be judged now is left, too.
     show(f"{left} of {len(failures)} failures of earlier runs are left.")
     return 0 if result.promises_kept else 1

@@ -10,8 +10,8 @@ call itself, without the checks of the harness and without the way there.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Collection, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from math import nan
@@ -172,12 +172,17 @@ def run_cell(
     forget_bodies()
     running = [number for number, run in enumerate(runs) if not run.is_lost]
     gc.collect()
-    with _without_collector():
+    was_enabled = gc.isenabled()
+    gc.disable()  # Python's collector of garbage stays out of the times, as in `timeit`.
+    try:
         for turn in range(TURNS):
             for place in range(len(running)):
                 number = running[(place + turn) % len(running)]
                 seconds = evaluate(subjects[number], instances[number], timed=True).seconds
                 runs[number].evaluation = float(np.fmin(runs[number].evaluation, seconds))
+    finally:
+        if was_enabled:
+            gc.enable()
     names = (subject.name for subject in subjects)
     size = 0 if whole is None else whole.n_free
     best = 0.0 if whole is None else instances[0].best_pressure
@@ -187,7 +192,6 @@ def run_cell(
 def _solve_variants(
     cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeScene, run: RunRecord
 ) -> None:
-    """Solve all variants of a cell, measure the whole system at the solution of the rule, and count an evaluation."""
     if run.is_lost:
         return
     for variant in VARIANTS:
@@ -206,7 +210,6 @@ def _solve_variants(
 
 
 def _solve(subject: Subject, instance: ProblemInstance, start: str, record: SolutionRecord) -> Trace:
-    """Solve one variant; record how that ended, its errors and its counts."""
     meter = Meter()
     formulation = _add_meter(subject, instance.first_guess, meter)
     with np.errstate(all="ignore"):  # A diverging iteration overflows; its end says so.
@@ -226,7 +229,6 @@ def _solve(subject: Subject, instance: ProblemInstance, start: str, record: Solu
 def _measure_system(
     subject: Subject, instance: ProblemInstance, trace: Trace, whole: WholeScene, run: RunRecord
 ) -> None:
-    """Count the nonzeros of the tangent at the solution and of the factors, and time the factorisation."""
     formulation: CheckedFormulation = subject.for_case(instance.first_guess)
     system = System(instance.scene, formulation, difference_step=instance.step)
     u = trace.u[-1]
@@ -267,15 +269,3 @@ def evaluate(subject: Subject, instance: ProblemInstance, *, timed: bool = False
     except ContractError:
         meter.seconds = nan
     return meter
-
-
-@contextmanager
-def _without_collector() -> Iterator[None]:
-    """Keep Python's collector of garbage out of the times, as `timeit` does."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()

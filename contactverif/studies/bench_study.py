@@ -159,7 +159,6 @@ def _collect_results(
     not_loaded: dict[str, str],
     provenance: dict[str, str],
 ) -> BenchResults:
-    """Return the records of all processes and cells as arrays."""
     first = [*map(records[0].__getitem__, plan.cells)]
     rows = [[record.runs[name] for record in first] for name in names]
     timed = [process[cell] for process in records for cell in plan.cells]

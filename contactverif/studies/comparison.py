@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isnan, nan
+from math import nan
 from time import perf_counter
 from typing import Any
 
@@ -58,10 +58,8 @@ def run_comparison(
     if not candidates:
         raise MisuseError("NAME", "nothing", f"a formulation to compare with {reference.name}")
     loaded = [candidate for candidate in candidates if isinstance(candidate, Subject)]
-    if reference.name in [
-        *(item.name for item in loaded),
-        *(item.formulation for item in candidates if isinstance(item, NotLoaded)),
-    ]:
+    names = [item.formulation if isinstance(item, NotLoaded) else item.name for item in candidates]
+    if reference.name in names:
         raise MisuseError("--against", f"{reference.name}, which is compared too", "another formulation than those")
     result = run([reference, *candidates], properties, place=place, **options)
     comparison = Comparison.from_run(result, reference.name)
@@ -69,67 +67,14 @@ def run_comparison(
     faces, *others = (() if each.in_plane else each.faces for each in abilities)
     apart = tuple(subject.name for subject, there in zip(loaded, others, strict=True) if there != faces)
     variants = [item.for_traits(reference.traits) for item in properties if isinstance(item, Property)]
-    differing = _with_cases(find_differing(result, comparison), variants, result, place)
-    return Study(result, comparison, differing, measure_costs([reference, *loaded]), apart)
-
-
-def _with_cases(
-    every: Sequence[Differing],
-    properties: Sequence[Property],
-    result: Run,
-    place: Interface | Case | None,
-) -> tuple[Differing, ...]:
-    """Return the differing outcomes with their cases; a run of many examples does not keep them all."""
-    facts = result.provenance
-    sampling = Sampling.at(place, int(facts["examples"]), int(facts["seed"]))
-    question_of = {question.id: question for question in properties}
-    complete = []
-    for differing in every:
-        question, number = question_of[differing.info.id], differing.number
-        outcome = with_case(sampling, question, number, differing.outcome)
-        reference_outcome = replace(differing.reference_outcome, case_or_summary=outcome.case)
-        complete.append(replace(differing, outcome=outcome, reference_outcome=reference_outcome))
-    return tuple(complete)
-
-
-def find_differing(result: Run, comparison: Comparison) -> tuple[Differing, ...]:
-    """Return for each property the case on which a candidate differs most from the reference.
-
-    The largest difference comes first. Cases on which one passes and the other does not stand before those where both
-    fail.
-    """
-    rows, reference = result.row_of, comparison.reference
-    largest = []
-    for id_ in comparison.properties:
-        every = []
-        for name in comparison.formulations[1:]:
-            paired = comparison.paired.get((name, id_))
-            if paired is None:
-                continue
-            cell, beside = comparison.cells[name, id_], comparison.cells[reference, id_]
-            number = paired.furthest(cell.kinds[:, :2].sum(axis=1))
-            if number is not None:
-                every.append(
-                    Differing(
-                        info=rows[name, id_].info,
-                        formulation=name,
-                        number=number,
-                        apart=bool(paired.apart[number]),
-                        decades=float(paired.decades[number]),
-                        margin=float(cell.standing[number]),
-                        reference_margin=float(beside.standing[number]),
-                        outcome=rows[name, id_].outcomes[number],
-                        reference_outcome=rows[reference, id_].outcomes[number],
-                    )
-                )
-        if every:
-            largest.append(max(every, key=_rank))
-    return tuple(sorted(largest, key=_rank, reverse=True))
-
-
-def _rank(differing: Differing) -> tuple[Any, ...]:
-    far = inf if isnan(differing.decades) else float(np.abs(differing.decades))
-    return differing.apart, far
+    question_of = {question.id: question for question in variants}
+    sampling = Sampling.at(place, int(result.provenance["examples"]), int(result.provenance["seed"]))
+    differing = []
+    for each in comparison.differing:
+        outcome = each.pair.new.row.outcomes[each.number]
+        case = with_case(sampling, question_of[each.info.id], each.number, outcome).case
+        differing.append(replace(each, case=case))
+    return Study(result, comparison, tuple(differing), measure_costs([reference, *loaded]), apart)
 
 
 def measure_costs(
@@ -164,8 +109,6 @@ def make_state(n_segments: int, ratio: float = 0.75, before: float = 0.5) -> Cas
 
 
 class _Timer:
-    """The times of one formulation on one state."""
-
     def __init__(self, subject: Subject, case: Case) -> None:
         self._subject, self._case = subject, case
         self._fastest = dict.fromkeys(PARTS, nan)

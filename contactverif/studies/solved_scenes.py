@@ -5,12 +5,11 @@ Rule: a solution that did not converge is a result too, with its end; a mistake 
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
@@ -37,16 +36,13 @@ def solve_scene(case: Case, subjects: Sequence[Subject | NotLoaded]) -> SolvedSc
             solutions.append(_solution(scene, case, subject))
         except ContractError as error:
             failures[subject.name] = str(error)
-    return SolvedScene(case, scene.bodies, _on_interface(scene), tuple(solutions), failures)
-
-
-def _on_interface(scene: Scene) -> tuple[IntArray, ...]:
-    """Return for each body the interface's numbers of its contact nodes; none if it is out of reach."""
-    ends = np.cumsum([0, *(len(scene.bodies[index].contact_nodes) for index in scene.bodies_in_reach)]).tolist()
-    numbers = {
-        index: np.arange(*ends_) for index, ends_ in zip(scene.bodies_in_reach, itertools.pairwise(ends), strict=True)
-    }
-    return tuple(numbers.get(index, np.zeros(0, np.int64)) for index in range(len(scene.bodies)))
+    # For each body the interface's numbers of its contact nodes; none if it is out of reach.
+    on_interface = [np.zeros(0, np.int64) for _ in scene.bodies]
+    first = 0
+    for index in scene.bodies_in_reach:
+        end = first + len(scene.bodies[index].contact_nodes)
+        on_interface[index], first = np.arange(first, end), end
+    return SolvedScene(case, scene.bodies, tuple(on_interface), tuple(solutions), failures)
 
 
 def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
@@ -59,7 +55,9 @@ def _solution(scene: Scene, case: Case, subject: Subject) -> Solution:
     z = scene.positions(q, factor)
     state = np.concatenate([z, trace.u[iterate, scene.n_free :]])
     forces, points, remark = _contact(scene, subject, formulation, state)
-    pressure = _exact_pressure(case, subject)
+    # Under an imposed approach the exact pressure is larger with multipliers, because a penalty gives way.
+    penalty = np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty
+    pressure = pressure_of(case, penalty) if is_uniform(case) else np.nan
     if trace.deficiency:
         rank = f"{trace.deficiency} of {len(trace.multipliers)} multipliers are not unique"
         remark = f"{remark}{'; ' if remark else ''}{rank}"
@@ -124,13 +122,3 @@ def _in_global_axes(body: Body, stresses: FloatArray) -> FloatArray:
     tensors = np.stack([along, shear, shear, across], axis=-1).reshape(-1, 2, 2)
     rotated = body.frame @ tensors @ body.frame.T
     return np.column_stack([rotated[:, 0, 0], rotated[:, 1, 1], rotated[:, 0, 1]])
-
-
-def _exact_pressure(case: Case, subject: Subject) -> float:
-    """Return the exact contact pressure, NaN where it is not known.
-
-    Under an imposed approach it is larger with multipliers, because a penalty gives way.
-    """
-    if not is_uniform(case):
-        return np.nan
-    return pressure_of(case, np.inf if subject.traits.rules.enforcement == "multiplier" else case.penalty)

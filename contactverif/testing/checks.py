@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import shlex
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +20,6 @@ from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import load_formulation, load_properties, subject_of
 from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.run import check_known, run
-from contactverif.testing.parametrize import CheckOptions
 from contactverif_reports.plot.text import as_text
 
 
@@ -71,25 +70,33 @@ class Check:
             pytest.xfail(f"fails; the formulation promises nothing here: {row.reason}")
 
 
-def make_checks(arguments: CheckOptions, options: Any, fresh_seed: int) -> list[Check]:
+def make_checks(
+    options: Any,
+    fresh_seed: int,
+    *,
+    formulations: Sequence[str | Callable[..., Any]],
+    properties: Sequence[str],
+    examples: int | None,
+    seed: int | None,
+    profile: str | None,
+    known: Mapping[str, str],
+) -> list[Check]:
     """Return the checks of a decorated test; what is typed behind `pytest` counts more than the decorator."""
-    questions = load_properties(arguments.properties)
-    check_known(arguments.known, questions)
-    examples, seed = options.contactverif_examples, options.contactverif_seed
-    profile = profile_named(options.contactverif_profile or arguments.profile or "dev").resolve(
-        examples=arguments.examples if examples is None else examples,
-        seed=arguments.seed if seed is None else seed,
+    questions = load_properties(properties)
+    check_known(known, questions)
+    size = profile_named(options.contactverif_profile or profile or "dev").resolve(
+        examples=examples if options.contactverif_examples is None else options.contactverif_examples,
+        seed=seed if options.contactverif_seed is None else options.contactverif_seed,
         fresh=fresh_seed,
     )
     subjects = [
         load_formulation(item)
         if isinstance(item, str)
         else subject_of(getattr(item, "__name__", type(item).__name__), item)
-        for item in arguments.formulations
+        for item in formulations
     ]
-    known = arguments.known
     return [
-        Check(subject, question, profile, {id_: known[id_] for id_ in (_id(question),) if id_ in known})
+        Check(subject, question, size, {id_: known[id_] for id_ in (_id(question),) if id_ in known})
         for subject in subjects
         for question in questions
     ]
@@ -114,26 +121,20 @@ def explain(row: Row, *, command: str, opposite_sign: bool = False, diagnosis: s
     if row.suspicion:
         lines.append(f"  {row.suspicion}")
     if outcome is not None:
-        lines += _example(row, outcome)
+        name, role = outcome.case.name, "witness" if outcome is row.witness else "case"
+        unnamed = "smallest case that fails" if row.shrunk else "first case that clearly fails, not shrunk"
+        lines.append(f"  The {role} {name}: {outcome.verdict}" if name else f"  The {unnamed}:")
+        lines += _numbers(row.info, outcome)
+        lines.append(textwrap.indent(as_text(outcome.case), "    "))
     lines.append(f"  To run it again: {command}")
     return "\n".join(lines)
-
-
-def _example(row: Row, outcome: Outcome) -> list[str]:
-    """Return the numbers and the drawing of a case."""
-    name, role = outcome.case.name, "witness" if outcome is row.witness else "case"
-    unnamed = "smallest case that fails" if row.shrunk else "first case that clearly fails, not shrunk"
-    lines = [f"  The {role} {name}: {outcome.verdict}" if name else f"  The {unnamed}:"]
-    if outcome.measurement is None:
-        lines.append(f"    {outcome.reason}")
-    return [*lines, *_numbers(row.info, outcome), textwrap.indent(as_text(outcome.case), "    ")]
 
 
 def _numbers(question: PropertyInfo, outcome: Outcome) -> list[str]:
     """Return each measured number against its tolerance, with the formula of the tolerance and its reason."""
     measurement = outcome.measurement
     if measurement is None:
-        return []
+        return [f"    {outcome.reason}"]
     lines = [f"    {measurement.broken}"] if measurement.broken else []
     for number in checked_numbers(question, measurement):
         mark, quantity = "✗" if number.ratio > 1 else "✓", number.quantity

@@ -12,7 +12,6 @@ Several decorators on one test add up. Nothing that takes long is imported here:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import pytest
@@ -21,18 +20,6 @@ from contactverif.contract.errors import MisuseError
 
 MARK = "contactverif_properties"  # The mark that carries the arguments of the decorator to the pytest plugin.
 _Test = TypeVar("_Test", bound=Callable[..., Any])
-
-
-@dataclass(frozen=True, slots=True)
-class CheckOptions:
-    """The arguments of `parametrize_with_properties`, until pytest collects the test."""
-
-    formulations: tuple[str | Callable[..., Any], ...]  # Names as on the command line, or factories.
-    properties: tuple[str, ...]  # Patterns of property ids.
-    examples: int | None  # The size of the run; None where the test file leaves it open.
-    seed: int | None
-    profile: str | None
-    known: Mapping[str, str]  # {property id: why its failure is known}.
 
 
 def parametrize_with_properties(
@@ -80,6 +67,12 @@ def parametrize_with_properties(
         raise MisuseError("formulations", repr(formulations), "names or factories, at least one")
     if isinstance(properties, str):
         raise MisuseError("properties", repr(properties), f"a sequence of patterns, ({properties!r},)")
-    options = CheckOptions(formulations, tuple(properties), examples, seed, profile, known or {})
-    mark: Callable[[_Test], _Test] = getattr(pytest.mark, MARK)(options=options)
+    mark: Callable[[_Test], _Test] = getattr(pytest.mark, MARK)(
+        formulations=formulations,
+        properties=tuple(properties),
+        examples=examples,
+        seed=seed,
+        profile=profile,
+        known=known or {},
+    )
     return mark

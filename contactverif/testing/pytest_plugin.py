@@ -7,7 +7,7 @@ before a marked test is collected.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -51,7 +51,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     config = metafunc.config
     fresh_seed = config.stash[_FRESH_SEED]
     try:
-        checks = [check for mark in marks for check in make_checks(mark.kwargs["options"], config.option, fresh_seed)]
+        checks = [check for mark in marks for check in make_checks(config.option, fresh_seed, **mark.kwargs)]
     except MisuseError as error:
         raise pytest.Collector.CollectError(f"parametrize_with_properties: {error}") from None
     metafunc.parametrize("check", [pytest.param(check, id=check.id) for check in checks])
@@ -82,14 +82,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _counts(reports_by_outcome: Any) -> Iterator[dict[str, Any]]:
-    """Yield the numbers of each test report that carries some."""
     for reports in reports_by_outcome:
-        for report in _of_calls(reports):
-            numbers = dict(report.user_properties)
+        for report in reports:
+            numbers = dict(report.user_properties) if getattr(report, "when", "") == "call" else {}
             if f"{_COUNTS}_planned" in numbers:
                 yield numbers
-
-
-def _of_calls(reports: Sequence[Any]) -> Iterator[Any]:
-    """Yield the reports of the tests themselves, not those of their set-up and tear-down."""
-    yield from (report for report in reports if getattr(report, "when", "") == "call")

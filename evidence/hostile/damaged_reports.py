@@ -338,7 +338,7 @@ class Campaign:
 def import_everything() -> None:
     """Import what the commands import, once and not in each fork."""
     for name in (
-        "contactverif.cli.report_comparison",
+        "contactverif.cli.compare",
         "contactverif.cli.scenes",
         "contactverif_reports.html.report_page",
         "contactverif_reports.netcdf.bench_file",

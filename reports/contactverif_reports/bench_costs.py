@@ -12,7 +12,7 @@ Efron & Tibshirani, An Introduction to the Bootstrap (1993), Chapter 13 (percent
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, isnan, nan
 
@@ -149,13 +149,15 @@ def costs_at(results: BenchResults, scene: str, target: float) -> dict[str, Cost
 
 
 def cost_ratio(cost: Cost, reference: Cost, number: str) -> Ratio:
-    """Return the ratio of a number to that of the reference.
+    """Return the ratio of a number to that of the reference."""
+    return _ratio(cost, reference, lambda each: getattr(each, number))
 
-    It is infinite if the formulation does not bring half of the instances there, NaN if the reference does not.
-    """
+
+def _ratio(cost: Cost, reference: Cost, value: Callable[[Cost], FloatArray]) -> Ratio:
+    """Return a ratio; infinite if the formulation does not bring half of the instances there, NaN if the reference."""
     if not reference.is_usual:
         return Ratio(nan)
-    return ratio_of(getattr(cost, number), getattr(reference, number)) if cost.is_usual else Ratio(inf)
+    return ratio_of(value(cost), value(reference)) if cost.is_usual else Ratio(inf)
 
 
 def ratios_at(results: BenchResults, scene: str, target: float, number: str) -> dict[str, Ratio]:
@@ -171,13 +173,8 @@ def total_ratio(cost: Cost, reference: Cost, share: float) -> Ratio:
 
     A solution is linear systems × (evaluation + system). Systems cost as much as their factorisations do here.
     """
-    if not reference.is_usual:
-        return Ratio(nan)
-    if not cost.is_usual:
-        return Ratio(inf)
     unit = share * reference.evaluation.mean(axis=1, keepdims=True) / reference.factorisation
-    totals = [each.systems * (each.evaluation + unit * each.factorisation) for each in (cost, reference)]
-    return ratio_of(*totals)
+    return _ratio(cost, reference, lambda each: each.systems * (each.evaluation + unit * each.factorisation))
 
 
 def runtimes(results: BenchResults, formulation: str, scene: str, number: str) -> FloatArray:
@@ -315,13 +312,10 @@ def split_targets(results: BenchResults, scene: str) -> tuple[list[float], str]:
     """Return the errors that a formulation reaches, at the fixed penalty or the best, and a sentence of the rest."""
     reached: list[float] = []
     others: list[float] = []
+    ways = [(name, variants) for name in results.formulations for variants in ((0,), BEST)]
     for target in results.targets[scene]:
-        every = (
-            cost_of(results, name, scene, target, variants)
-            for name in results.formulations
-            for variants in ((0,), BEST)
-        )
-        (reached if any(cost.is_usual for cost in every) else others).append(target)
+        usual = any(cost_of(results, name, scene, target, variants).is_usual for name, variants in ways)
+        (reached if usual else others).append(target)
     words = f"No formulation comes to an error of {' or '.join(map(format_share, others))} on the meshes of {scene}."
     return reached, words if others else ""
 
@@ -391,36 +385,31 @@ def compare_benches(new: BenchResults, old: BenchResults) -> tuple[BenchChange, 
     changes nothing.
     """
     common = [cell for cell in new.cells if cell in old.cells]
-    cells = [[results.cells.index(cell) for cell in common] for results in (new, old)]
+    benches = [(results, [results.cells.index(cell) for cell in common]) for results in (new, old)]
     names = [name for name in new.formulations if name in old.formulations] if common else []
-    speeds = [_factorisation_seconds(results, places, names) for results, places in zip((new, old), cells, strict=True)]
+    speeds = []  # The median of the seconds of a factorisation in each bench, 1 where there is none.
+    for results, cells in benches:
+        seconds = results.factorisation[np.ix_([results.formulations.index(name) for name in names], cells)]
+        finite = seconds[np.isfinite(seconds)]
+        speeds.append(float(np.median(finite)) if len(finite) else 1.0)
     changes = []
     for name in names:
-        seconds, counts = [], []
-        for results, places in zip((new, old), cells, strict=True):
+        evaluations, counts = [], []
+        for results, cells in benches:
             row = results.formulations.index(name)
-            seconds.append(results.evaluation[row, places])
-            table = {kind: results.counts[row, places, :, place] for place, kind in enumerate(COUNTS)}
-            work = {kind.replace("_", " "): results.work[row, places, place] for place, kind in enumerate(WORK)}
+            evaluations.append(results.evaluation[row, cells])
+            table = {kind: results.counts[row, cells, :, place] for place, kind in enumerate(COUNTS)}
+            work = {kind.replace("_", " "): results.work[row, cells, place] for place, kind in enumerate(WORK)}
             counts.append(table | work)
         differing = {
-            kind: (int(counts[0][kind].sum()), int(counts[1][kind].sum()))
-            for kind in counts[0]
-            if (counts[0][kind] != counts[1][kind]).any()
+            kind: (int(here.sum()), int(counts[1][kind].sum()))
+            for kind, here in counts[0].items()
+            if (here != counts[1][kind]).any()
         }
-        n_processes = min(values.shape[1] for values in seconds)
-        here, there = (values[:, :n_processes] for values in seconds)
-        ratio = ratio_of(here / (speeds[0] / speeds[1]), there)
-        changes.append(BenchChange(name, len(common), differing, ratio))
+        n_processes = min(values.shape[1] for values in evaluations)
+        here, there = (values[:, :n_processes] for values in evaluations)
+        changes.append(BenchChange(name, len(common), differing, ratio_of(here / (speeds[0] / speeds[1]), there)))
     return tuple(changes)
-
-
-def _factorisation_seconds(results: BenchResults, cells: list[int], names: list[str]) -> float:
-    """Return the median of the seconds of a factorisation, 1 where there is none."""
-    rows = [results.formulations.index(name) for name in names]
-    seconds = results.factorisation[np.ix_(rows, cells)]
-    finite = seconds[np.isfinite(seconds)]
-    return float(np.median(finite)) if len(finite) else 1.0
 
 
 # The page in Markdown.

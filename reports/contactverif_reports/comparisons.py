@@ -1,7 +1,6 @@
-"""Formulations beside a reference, from the rows of a run: numbers by case, pairs, iterations, cost, and tables.
+"""Rows beside other rows: numbers by case, pairs, iterations, cost, and the tables of a comparison of formulations.
 
-Rule for the next editor: numbers alone, for a terminal and for a page. Nothing is judged, solved or timed here, and it
-does not matter whether a row comes from memory or from a file.
+Numbers alone: nothing is judged, solved or timed here. It does not matter whether a row comes from memory or a file.
 """
 
 from __future__ import annotations
@@ -76,8 +75,7 @@ class RowNumbers:
     @property
     def worst(self) -> float:
         """The largest of the margins; NaN where there are none."""
-        margins = self.margins[~np.isnan(self.margins)]
-        return float(margins.max()) if len(margins) else nan
+        return float(np.fmax.reduce(self.margins, initial=nan))
 
     @property
     def standing(self) -> FloatArray:
@@ -110,87 +108,101 @@ def _column(values: Sequence[float]) -> FloatArray:
     return freeze(np.array(values, dtype=np.float64), np.float64)
 
 
-def statistics(old: RowNumbers, new: RowNumbers) -> list[tuple[str, float, float]]:
-    """Return (name, before, after) of the median and the worst margin over the cases that both decided, if any."""
-    n_cases = min(len(old.verdicts), len(new.verdicts))
-    before, after = old.standing[:n_cases], new.standing[:n_cases]
-    both = ~(np.isnan(before) | np.isnan(after))
-    if not both.any():
-        return []
-    kinds = (("median", np.median), ("worst", np.max))
-    return [(name, float(statistic(before[both])), float(statistic(after[both]))) for name, statistic in kinds]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Paired:
-    """A candidate beside a reference on the cases that both decided.
+class Pair:
+    """A row beside another: a candidate's beside the reference's, or a new report's beside the old one's.
 
-    Their margins are equal if both keep their tolerances, or if both do not and are no further apart than one
-    tolerance: roundoff may change a number by that much.
+    Two margins are equal if both keep their tolerances, or if both do not and are no further apart than one tolerance:
+    roundoff may change a number by that much. Cases that only the longer row has are left out.
     """
 
-    n: int  # Numbers of cases.
+    new: RowNumbers
+    old: RowNumbers
+    n: int  # Numbers of cases that both decided.
     better: int
     equal: int
     worse: int
-    # Median over the cases of the candidate's margin over the reference's. A margin within the tolerance counts as 1,
-    # because below it all is roundoff. NaN where there is none.
+    # Median over the cases of the new margin over the old one. A margin within the tolerance counts as 1, because below
+    # it all is roundoff. NaN where there is none.
     ratio: float
-    # (n_cases,) Powers of ten that the candidate is further beyond the tolerance than the reference; a margin within
-    # it counts as 1. Negative where the reference is further, NaN where one of them is undecided.
+    # (n_cases,) Powers of ten that the new row is further beyond the tolerance; a margin within it counts as 1.
+    # Negative where the old row is further, NaN where one of them is undecided.
     decades: FloatArray
     apart: BoolArray  # (n_cases,) One passes and the other does not.
 
     @classmethod
-    def from_cells(cls, candidate: RowNumbers, reference: RowNumbers) -> Paired:
-        """Compare cells over the same cases; further cases of the longer one are left out."""
-        n_cases = min(len(candidate.verdicts), len(reference.verdicts))
-        a, b = candidate.standing[:n_cases], reference.standing[:n_cases]
+    def from_cells(cls, new: RowNumbers, old: RowNumbers) -> Pair:
+        """Compare the margins of two rows case by case."""
+        n_cases = min(len(new.verdicts), len(old.verdicts))
+        a, b = new.standing[:n_cases], old.standing[:n_cases]
         # In other dimensions, or on faces that one of them does not take, the cases are others.
-        alike = (candidate.kinds[:n_cases] == reference.kinds[:n_cases]).all(axis=1)
+        alike = (new.kinds[:n_cases] == old.kinds[:n_cases]).all(axis=1)
         both = alike & ~(np.isnan(a) | np.isnan(b))
-        fails_a, fails_b = a > 1, b > 1
-        apart = both & (fails_a != fails_b)
-        with np.errstate(invalid="ignore"):  # ∞ − ∞
-            close = np.abs(a - b) <= 1
-        same = both & ~apart & (~fails_a | close | (a == b))
+        apart = both & ((a > 1) != (b > 1))
+        with np.errstate(divide="ignore", invalid="ignore"):  # ∞ − ∞; equal values may both be infinite.
+            same = both & ~apart & ((a <= 1) | (np.abs(a - b) <= 1) | (a == b))
+            logs = np.log(np.fmax(a[both], 1.0)) - np.log(np.fmax(b[both], 1.0))
+            ratio = float(np.exp(np.median(np.where(a[both] == b[both], 0.0, logs)))) if both.any() else nan
+            decades = np.where(a == b, 0.0, np.log10(np.fmax(a, 1.0)) - np.log10(np.fmax(b, 1.0)))
         worse = both & ~same & (a > b)
         return cls(
-            n=int(both.sum()),
-            better=int((both & ~same & ~worse).sum()),
-            equal=int(same.sum()),
-            worse=int(worse.sum()),
-            ratio=_median_ratio(a[both], b[both]),
-            decades=freeze(np.where(both, _decades(a, b), nan), np.float64),
+            *(new, old, int(both.sum()), int((both & ~same & ~worse).sum()), int(same.sum()), int(worse.sum()), ratio),
+            decades=freeze(np.where(both, decades, nan), np.float64),
             apart=freeze(apart, np.bool_),
         )
 
-    def furthest(self, sizes: FloatArray) -> int | None:
+    def statistics(self) -> list[tuple[str, float, float]]:
+        """Return (name, old, new) of the median and the worst margin over the cases that both decided, if any."""
+        n_cases = len(self.decades)
+        before, after = self.old.standing[:n_cases], self.new.standing[:n_cases]
+        both = ~(np.isnan(before) | np.isnan(after))
+        kinds = (("median", np.median), ("worst", np.max)) if both.any() else ()
+        return [(name, float(statistic(before[both])), float(statistic(after[both]))) for name, statistic in kinds]
+
+    def furthest(self) -> int | None:
         """Return the number of the case to draw; None where no case differs.
 
         Cases on which one passes and the other does not come first, then those that differ most. Of those that are at
-        least half as far, in decades, it is the one with the smallest mesh (`sizes`, (n_cases,)).
+        least half as far, in decades, it is the one with the smallest mesh.
         """
         far = np.abs(np.nan_to_num(self.decades, nan=0.0, posinf=inf, neginf=-inf))
         differs = self.apart if self.apart.any() else far > 0
         if not differs.any():
             return None
-        enough = differs & (far >= MESH_CHOICE_SHARE * far[differs].max())
-        numbers = np.flatnonzero(enough)
+        sizes = self.new.kinds[:, :2].sum(axis=1)
+        numbers = np.flatnonzero(differs & (far >= MESH_CHOICE_SHARE * far[differs].max()))
         return int(min(numbers, key=lambda number: (sizes[number], -far[number], number)))
 
 
-def _median_ratio(a: FloatArray, b: FloatArray) -> float:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = [np.log(np.fmax(margins, 1.0)) for margins in (a, b)]
-        logs = np.where(a == b, 0.0, beyond[0] - beyond[1])  # Equal values may both be infinite.
-        return float(np.exp(np.median(logs))) if len(logs) else nan
+@dataclass(frozen=True, slots=True, eq=False)
+class Differing:
+    """The case of a property on which a candidate and the reference differ most."""
 
+    pair: Pair
+    number: int  # The number of the case in the run.
+    case: Case | None = None  # The mesh and its state; a run of many examples does not keep them all.
 
-def _decades(a: FloatArray, b: FloatArray) -> FloatArray:
-    with np.errstate(invalid="ignore"):  # ∞ − ∞
-        decades: FloatArray = np.where(a == b, 0.0, np.log10(np.fmax(a, 1.0)) - np.log10(np.fmax(b, 1.0)))
-    return decades
+    @property
+    def info(self) -> PropertyInfo:
+        """The property."""
+        return self.pair.new.row.info
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """Whether one passes and the other does not, and how many powers of ten they are apart."""
+        far = abs(float(self.pair.decades[self.number]))
+        return bool(self.pair.apart[self.number]), inf if isnan(far) else far
+
+    @property
+    def sides(self) -> tuple[tuple[str, Outcome, float], ...]:
+        """(formulation, outcome, error over its tolerance) of the candidate and of the reference."""
+        outcomes = [cell.row.outcomes[self.number] for cell in (self.pair.new, self.pair.old)]
+        if self.case is not None:
+            outcomes = [replace(outcome, case_or_summary=self.case) for outcome in outcomes]
+        return tuple(
+            (cell.row.formulation, outcome, float(cell.standing[self.number]))
+            for cell, outcome in zip((self.pair.new, self.pair.old), outcomes, strict=True)
+        )
 
 
 ITERATIONS, END = "iterations", "end"  # The details in which a property that solves says how Newton's method went.
@@ -228,7 +240,7 @@ class Comparison:
     formulations: tuple[str, ...]  # All of them, the reference first.
     properties: tuple[str, ...]  # Ids, in the order of the run.
     cells: Mapping[tuple[str, str], RowNumbers]  # {(formulation, property): numbers}.
-    paired: Mapping[tuple[str, str], Paired]  # {(candidate, property): comparison}, where both decided some case.
+    pairs: Mapping[tuple[str, str], Pair]  # {(candidate, property): beside the reference}, where both were asked.
     iterations: tuple[Iterations, ...]  # Newton's iterations, property by property.
     not_loaded: Mapping[str, str]  # {name: reason} of plugins that did not load.
     provenance: Mapping[str, str]  # Where the run comes from.
@@ -240,7 +252,7 @@ class Comparison:
         candidates = [name for name in dict.fromkeys(name for name, _ in cells) if name != reference]
         formulations, properties = (reference, *candidates), tuple(run.properties)
         pairs = {
-            (name, id_): Paired.from_cells(cells[name, id_], cells[reference, id_])
+            (name, id_): Pair.from_cells(cells[name, id_], cells[reference, id_])
             for name in candidates
             for id_ in properties
             if (name, id_) in cells and (reference, id_) in cells
@@ -253,7 +265,7 @@ class Comparison:
             formulations=formulations,
             properties=properties,
             cells=cells,
-            paired={key: pair for key, pair in pairs.items() if pair.n},
+            pairs=pairs,
             iterations=tuple(itertools.chain.from_iterable(lines)),
             not_loaded={item.formulation: item.reason for item in run.not_loaded},
             provenance=run.provenance,
@@ -268,6 +280,18 @@ class Comparison:
     def promises_kept(self) -> bool:
         """Return whether every candidate was checked and keeps all that it promises."""
         return not self.unexpected and not self.not_loaded and len(self.formulations) > 1
+
+    @property
+    def differing(self) -> list[Differing]:
+        """For each property the case on which a candidate differs most from the reference, the largest rank first."""
+        largest: dict[str, Differing] = {}
+        for id_, name in itertools.product(self.properties, self.formulations[1:]):
+            pair = self.pairs.get((name, id_))
+            if pair is not None and (number := pair.furthest()) is not None:
+                differing = Differing(pair, number)
+                if id_ not in largest or differing.rank > largest[id_].rank:
+                    largest[id_] = differing
+        return sorted(largest.values(), key=lambda differing: differing.rank, reverse=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -286,67 +310,44 @@ class Cost:
         return sum(seconds) if seconds else nan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Differing:
-    """The case of a property on which a candidate and the reference differ most."""
-
-    info: PropertyInfo  # The property.
-    formulation: str  # The candidate.
-    number: int  # The number of the case in the run.
-    apart: bool  # One passes and the other does not.
-    # Powers of ten that the candidate is further beyond the tolerance than the reference; negative where the reference
-    # is further.
-    decades: float
-    margin: float  # The error of each over its tolerance.
-    reference_margin: float
-    outcome: Outcome  # The verdict on each, with its numbers.
-    reference_outcome: Outcome
-
-    @property
-    def case(self) -> Case:
-        """The mesh and its state."""
-        return self.outcome.case
-
-
 def count_iterations(cells: Sequence[RowNumbers]) -> list[Iterations]:
     """Count Newton's iterations over the rows of one property, one line for each solution and formulation."""
     names = sorted({name for cell in cells for name in cell.details if name.partition(", ")[0] == ITERATIONS})
-    return [
-        _iterations(cell, name, _converged_counts(cells[0], name))
-        for name in names
-        for cell in cells
-        if name in cell.details
-    ]
-
-
-def _iterations(cell: RowNumbers, name: str, reference: FloatArray) -> Iterations:
-    counts = _converged_counts(cell, name)
-    converged = counts[~np.isnan(counts)]
-    n_both = min(len(counts), len(reference))
-    with np.errstate(invalid="ignore"):  # A comparison with NaN is False, as it should be.
-        against = np.sign(counts[:n_both] - reference[:n_both])
-    return Iterations(
-        formulation=cell.row.formulation,
-        property_id=cell.row.property_id,
-        solution=name.partition(", ")[2],
-        solved=int((~np.isnan(cell.details[name])).sum()),
-        converged=len(converged),
-        median=float(np.median(converged)) if len(converged) else nan,
-        most=float(converged.max()) if len(converged) else nan,
-        fewer=int((against < 0).sum()),
-        same=int((against == 0).sum()),
-        more=int((against > 0).sum()),
-        order=float(np.nanmedian(cell.orders)) if np.isfinite(cell.orders).any() else nan,
-    )
+    lines = []
+    for name in names:
+        reference = _converged_counts(cells[0], name)
+        for cell in cells:
+            if name not in cell.details:
+                continue
+            counts = _converged_counts(cell, name)
+            converged = counts[~np.isnan(counts)]
+            n_both = min(len(counts), len(reference))
+            with np.errstate(invalid="ignore"):  # A comparison with NaN is False, as it should be.
+                against = np.sign(counts[:n_both] - reference[:n_both])
+            lines.append(
+                Iterations(
+                    formulation=cell.row.formulation,
+                    property_id=cell.row.property_id,
+                    solution=name.partition(", ")[2],
+                    solved=int((~np.isnan(cell.details[name])).sum()),
+                    converged=len(converged),
+                    median=float(np.median(converged)) if len(converged) else nan,
+                    most=float(converged.max()) if len(converged) else nan,
+                    fewer=int((against < 0).sum()),
+                    same=int((against == 0).sum()),
+                    more=int((against > 0).sum()),
+                    order=float(np.nanmedian(cell.orders)) if np.isfinite(cell.orders).any() else nan,
+                )
+            )
+    return lines
 
 
 def _converged_counts(cell: RowNumbers, name: str) -> FloatArray:
     """Return the iterations of the cases that converged, NaN for the others; empty where the property keeps none."""
     if name not in cell.details:
         return np.zeros(0)
-    counts = cell.details[name]
     end = cell.details.get(name.replace(ITERATIONS, END, 1))
-    return counts if end is None else np.where(end == CONVERGED, counts, nan)
+    return cell.details[name] if end is None else np.where(end == CONVERGED, cell.details[name], nan)
 
 
 # Tables of a comparison, for the terminal and for a page.
@@ -385,8 +386,8 @@ def errors_table(comparison: Comparison) -> Table:
     worst = Column("worst number", page_head="number furthest beyond, or closest to, its tolerance")
     table = Table([name_column("property, formulation"), *counts, worst], title)
     for cell in measured_cells(comparison):
-        paired = comparison.paired.get((cell.row.formulation, cell.row.property_id))
-        beside = [None] * 4 if paired is None else [paired.ratio, paired.better, paired.equal, paired.worse]
+        pair = comparison.pairs.get((cell.row.formulation, cell.row.property_id))
+        beside = [pair.ratio, pair.better, pair.equal, pair.worse] if pair is not None and pair.n else [None] * 4
         closest = None if cell.closest is None else Measured(cell.closest.value, cell.closest.quantity.name)
         table.add(cell.row.formulation, cell.median, cell.worst, *beside, closest, group=Code(cell.row.property_id))
     return table

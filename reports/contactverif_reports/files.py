@@ -27,24 +27,27 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
     """Check before a long computation that its file can be written afterwards."""
     name = os.fspath(path)
     target = Path(os.path.realpath(path))  # `resolve` raises an error for links that form a loop.
-    if not name or name.endswith(os.sep):
-        raise MisuseError(argument, f"{name!r}, which names no file", f"the name of a file, {form}")
-    if target.is_dir():
-        raise MisuseError(argument, f"{name}, a folder", f"the name of a file, {form}")
-    if target.exists() and not target.is_file():
-        raise MisuseError(argument, f"{name}, which is no ordinary file", f"the name of a file, {form}")
-    if not target.parent.is_dir():
-        raise MisuseError(argument, f"{name} in {target.parent}, which is no folder", "a folder that exists")
-    if target.exists() and not os.access(target, os.W_OK):
-        raise MisuseError(argument, f"{name}, which is write-protected", "a file that may be replaced")
+    file = f"the name of a file, {form}"
+    for wrong, found, needed in (
+        (not name or name.endswith(os.sep), f"{name!r}, which names no file", file),
+        (target.is_dir(), f"{name}, a folder", file),
+        (target.exists() and not target.is_file(), f"{name}, which is no ordinary file", file),
+        (not target.parent.is_dir(), f"{name} in {target.parent}, which is no folder", "a folder that exists"),
+        (
+            target.exists() and not os.access(target, os.W_OK),
+            f"{name}, which is write-protected",
+            "a file that may be replaced",
+        ),
+    ):
+        if wrong:
+            raise MisuseError(argument, found, needed)
     part = _part(target)
     try:
         part.touch()
         part.unlink()
     except OSError as error:
-        raise MisuseError(
-            argument, f"{name}: {error.strerror}", "a folder that may be written to, and a name of usual length"
-        ) from error
+        needed = "a folder that may be written to, and a name of usual length"
+        raise MisuseError(argument, f"{name}: {error.strerror}", needed) from error
 
 
 def reason_not_to_grow(path: Path) -> str:
@@ -64,10 +67,11 @@ def made_folder(folder: Path, argument: str) -> None:
     """Make the folder, and those above it, if it does not exist."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise MisuseError(argument, f"{folder}, which is no folder", "a folder that can be written") from None
     except OSError as error:
-        raise MisuseError(argument, f"{folder} ({error.strerror})", "a folder that can be written") from None
+        found = (
+            f"{folder}, which is no folder" if isinstance(error, FileExistsError) else f"{folder} ({error.strerror})"
+        )
+        raise MisuseError(argument, found, "a folder that can be written") from None
 
 
 @contextmanager
@@ -94,7 +98,6 @@ def _part(target: Path) -> Path:
 
 
 def _remove_stale(target: Path) -> None:
-    """Remove the temporary files of the same name that killed processes left behind."""
     name = re.compile(rf"\.{re.escape(target.name)}\.(\d{{1,9}})\.part")
     for entry in target.parent.iterdir():
         match = name.fullmatch(entry.name)

@@ -36,20 +36,11 @@ from textwrap import shorten
 
 import numpy as np
 
-from contactverif.contract.arrays import BoolArray, FloatArray
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif_reports import tables
-from contactverif_reports.comparisons import (
-    CONVERGED,
-    END,
-    Iterations,
-    Paired,
-    RowNumbers,
-    count_iterations,
-    name_column,
-    statistics,
-)
+from contactverif_reports.comparisons import CONVERGED, END, Iterations, Pair, RowNumbers, count_iterations, name_column
 from contactverif_reports.tables import Code, Column, ResultCell, Table, numbers
 
 ALPHA = 1e-6  # The rate of false alarms per row on different cases.
@@ -57,37 +48,27 @@ ALPHA = 1e-6  # The rate of false alarms per row on different cases.
 # 1100 pairs.
 INDEPENDENT_SHARE = 0.5
 REASON_LENGTH = 100  # The number of characters of a reason that are printed.
-FACTOR = 2.0  # The factor between two margins beyond the tolerance that is no news.
-ITERATIONS_FACTOR, ITERATIONS_MORE = 2.0, 2.0  # Iterations that grow by no more than factor · n + more are no news.
+FACTOR, ROUNDOFFS = (
+    2.0,
+    2.0,
+)  # A number beyond its tolerance that grows by no more than FACTOR · m + ROUNDOFFS is no news.
 LEAP = 100.0  # The factor by which a margin within the tolerance must grow to be worth a look.
 LEAST_MARGIN = 0.1  # A margin that stays below this is roundoff.
-ROUNDOFFS = 2.0  # The number of tolerances by which two right margins may differ.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
     """One formulation and property, before and after."""
 
-    old: RowNumbers  # The numbers of both rows.
-    new: RowNumbers
-    paired: Paired | None  # The new beside the old, case by case; None where the cases are not the same.
+    pair: Pair  # The new row beside the old one.
+    same_cases: bool  # They are compared case by case; else as two samples.
     regressions: tuple[str, ...]  # The regressions, in words; empty if there is none.
     noteworthy: tuple[str, ...] = ()  # The changes that are worth a look and no regression, in words.
 
     @property
-    def title(self) -> str:
-        """The formulation and the property."""
-        return f"{self.new.row.formulation}, {self.new.row.property_id}"
-
-    @property
-    def better(self) -> bool:
-        """Return whether the row passes now, and did not before."""
-        return self.new.row.verdict is Verdict.PASS and self.old.row.verdict is not Verdict.PASS
-
-    @property
     def slower(self) -> float:
         """Median seconds of a case, new over old; NaN where nothing was judged. It decides nothing."""
-        return self.new.seconds / self.old.seconds if self.old.seconds > 0 else nan
+        return self.pair.new.seconds / self.pair.old.seconds if self.pair.old.seconds > 0 else nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,11 +83,6 @@ class NamedRun:
     def from_run(cls, path: str, run: Run) -> NamedRun:
         """Collect the numbers of a run."""
         return cls(path, run, {key: RowNumbers.from_row(row) for key, row in run.row_of.items()})
-
-    @property
-    def not_loaded(self) -> dict[str, str]:
-        """The plugins that did not load, {name: reason}."""
-        return {item.formulation: item.reason for item in self.run.not_loaded}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,60 +102,63 @@ class Changes:
     @property
     def regressions(self) -> tuple[str, ...]:
         """The regressions: a line for each row, and for each plugin that does not load any more."""
-        lines = [f"{change.title}: {'; '.join(change.regressions)}" for change in self.changes if change.regressions]
-        return (*lines, *(f"{name}: not loaded any more: {reason}" for name, reason in self.no_longer_loaded.items()))
+        lost = (f"{name}: not loaded any more: {reason}" for name, reason in self.no_longer_loaded.items())
+        return (*self._lines("regressions"), *lost)
 
     @property
     def noteworthy(self) -> tuple[str, ...]:
         """The changes that are worth a look and no regression: a line for each row."""
-        return tuple(f"{change.title}: {'; '.join(change.noteworthy)}" for change in self.changes if change.noteworthy)
+        return self._lines("noteworthy")
+
+    def _lines(self, kind: str) -> tuple[str, ...]:
+        rows = ((change.pair.new.row, getattr(change, kind)) for change in self.changes)
+        return tuple(f"{row.formulation}, {row.property_id}: {'; '.join(words)}" for row, words in rows if words)
 
     @property
     def iterations(self) -> tuple[tuple[Iterations, Iterations], ...]:
         """Newton iterations (old, new) that changed, on the same cases."""
-        paired = [change for change in self.changes if change.paired is not None]
         return tuple(
             lines
-            for change in paired
-            for lines in paired_iterations(change.old, change.new)
+            for change in self.changes
+            for lines in (_paired_iterations(change.pair) if change.same_cases else ())
             if lines[1].fewer or lines[1].more or lines[0].converged != lines[1].converged
         )
 
     @classmethod
     def between(cls, old: NamedRun, new: NamedRun) -> Changes:
         """Compare the rows that both runs have; none if they have nothing in common."""
-        same_seed, same_examples = (
-            old.run.provenance.get(name) == new.run.provenance.get(name) for name in ("seed", "examples")
-        )
+        same = {key: old.run.provenance.get(key) == new.run.provenance.get(key) for key in ("seed", "examples")}
+        asked = (*old.run.formulations, *old.run.properties)
+        lost_before = {item.formulation for item in old.run.not_loaded}
         return cls(
             old=old,
             new=new,
             changes=tuple(
-                compare_rows(cell, new.cells[key], same_seed=same_seed, same_examples=same_examples)
+                compare_rows(cell, new.cells[key], same_seed=same["seed"], same_examples=same["examples"])
                 for key, cell in old.cells.items()
                 if key in new.cells
             ),
             removed=_only(old, new),
             added=_only(new, old),
             no_longer_loaded={
-                name: reason
-                for name, reason in new.not_loaded.items()
-                if name in (*old.run.formulations, *old.run.properties) and name not in old.not_loaded
+                item.formulation: item.reason
+                for item in new.run.not_loaded
+                if item.formulation in asked and item.formulation not in lost_before
             },
         )
 
 
 def compare_rows(old: RowNumbers, new: RowNumbers, *, same_seed: bool, same_examples: bool = True) -> Change:
     """Compare one row, before and after."""
-    paired = Paired.from_cells(new, old) if same_seed and same_cases(old, new) else None
-    lines = [*_verdicts(old, new)]
+    pair = Pair.from_cells(new, old)
+    n = len(pair.decades)  # The cases of the shorter row may be the first of the longer one, by their summaries.
+    same_cases = same_seed and np.array_equal(old.kinds[:n], new.kinds[:n], equal_nan=True)
     n_old, n_new = len(old.verdicts), len(new.verdicts)
+    lines = _verdicts(pair)
     if same_seed and same_examples and n_old - n_new > few(n_old):
         lines.append(f"{n_new} cases, {n_old} before, at the same seed and number of examples")
-    if paired is None:
-        return Change(old, new, None, (*lines, *_on_others(old, new)))
-    lines += [*_on_the_same(old, new, paired), *_fewer(old, new)]
-    return Change(old, new, paired, tuple(lines), tuple(noteworthy_changes(old, new)))
+    lines += [*_on_the_same(pair), *_fewer(pair)] if same_cases else _on_others(pair)
+    return Change(pair, same_cases, tuple(lines), tuple(_noteworthy(pair)) if same_cases else ())
 
 
 def few(n_cases: int) -> float:
@@ -192,74 +171,57 @@ def wandering(n_cases: int) -> float:
     return 2 + 0.05 * n_cases
 
 
-def same_cases(old: RowNumbers, new: RowNumbers) -> bool:
-    """Return whether the cases of the shorter row are the first of the longer one, by their summaries."""
-    n = min(len(old.kinds), len(new.kinds))
-    return bool(np.array_equal(old.kinds[:n], new.kinds[:n], equal_nan=True))
+def _verdicts(pair: Pair) -> list[str]:
+    old, new = pair.old.row, pair.new.row
+    if new.verdict is not old.verdict and (old.verdict is Verdict.PASS or new.verdict is Verdict.CRASHED):
+        detail = f" ({shorten(new.reason, REASON_LENGTH, placeholder=' …')})" if new.reason else ""
+        return [f"{old.verdict} → {new.verdict}{detail}"]
+    return [f"promises kept → {new.unexpected}"] if new.unexpected and not old.unexpected else []
 
 
-def _verdicts(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
-    before, after = old.row.verdict, new.row.verdict
-    if after is not before and (before is Verdict.PASS or after is Verdict.CRASHED):
-        reason = new.row.reason
-        detail = f" ({shorten(reason, REASON_LENGTH, placeholder=' …')})" if reason else ""
-        return [f"{before} → {after}{detail}"]
-    if new.row.unexpected and not old.row.unexpected:
-        return [f"promises kept → {new.row.unexpected}"]
-    return []
-
-
-def _on_the_same(old: RowNumbers, new: RowNumbers, paired: Paired) -> Sequence[str]:
-    n = len(paired.decades)
-    fails_now = paired.apart & (new.standing[:n] > 1)
+def _on_the_same(pair: Pair) -> list[str]:
+    fails_now = pair.apart & (pair.new.standing[: len(pair.apart)] > 1)
     lines = []
-    if fails_now.any() and old.row.verdict is not Verdict.PASS:
+    if fails_now.any() and pair.old.row.verdict is not Verdict.PASS:
         first = int(np.flatnonzero(fails_now)[0])
-        lines.append(f"{int(fails_now.sum())} of {paired.n} cases passed and fail now, the first is case {first}")
+        lines.append(f"{int(fails_now.sum())} of {pair.n} cases passed and fail now, the first is case {first}")
     grew = [
         f"{name} {m_old:.3g} → {m_new:.3g}"
-        for name, m_old, m_new in statistics(old, new)
+        for name, m_old, m_new in pair.statistics()
         if m_new > 1 and m_new > FACTOR * m_old + ROUNDOFFS
     ]
     if grew:
-        lines.append(f"error grew, in tolerances, on the same {paired.n} cases: {', '.join(grew)}")
+        lines.append(f"error grew, in tolerances, on the same {pair.n} cases: {', '.join(grew)}")
     return lines
 
 
-def _fewer(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
-    """Return a line if fewer cases are judged, and one for each solution that converges less often."""
-    n = min(len(old.verdicts), len(new.verdicts))
+def _fewer(pair: Pair) -> list[str]:
+    n, old, new = len(pair.decades), pair.old, pair.new
+    comparisons = [(old.decided[:n], new.decided[:n], few(n), f"{n} cases were judged and are undecided now")]
+    for name in old.details:
+        if name in new.details and name.partition(", ")[0] == END:
+            before, after = old.details[name][:n], new.details[name][:n]
+            both, solution = ~(np.isnan(before) | np.isnan(after)), name.partition(", ")[2]
+            n_both = int(both.sum())
+            words = f"{n_both} solutions{f' ({solution})' if solution else ''} converged and do not any more"
+            converged = (both & (ends == CONVERGED) for ends in (before, after))
+            comparisons.append((*converged, wandering(n_both), words))
     lines = []
-    worse, better, back = _count_changes(old.decided[:n], new.decided[:n])
-    if worse - better > few(n):
-        lines.append(f"{worse} of the same {n} cases were judged and are undecided now{back}")
-    ends = [name for name in old.details if name in new.details and name.partition(", ")[0] == END]
-    for name in ends:
-        before, after = old.details[name][:n], new.details[name][:n]
-        both = ~(np.isnan(before) | np.isnan(after))
-        worse, better, back = _count_changes(both & (before == CONVERGED), both & (after == CONVERGED))
-        n_both, solution = int(both.sum()), name.partition(", ")[2]
-        if worse - better > wandering(n_both):
-            solutions = f"{n_both} solutions{f' ({solution})' if solution else ''}"
-            lines.append(f"{worse} of the same {solutions} converged and do not any more{back}")
+    for held, holds, allowed, words in comparisons:
+        worse, better = int((held & ~holds).sum()), int((~held & holds).sum())
+        if worse - better > allowed:
+            lines.append(f"{worse} of the same {words}{f', {better} the other way round' if better else ''}")
     return lines
 
 
-def _count_changes(before: BoolArray, after: BoolArray) -> tuple[int, int, str]:
-    """Return how many cases became worse and better, and the latter in words."""
-    worse, better = int((before & ~after).sum()), int((~before & after).sum())
-    return worse, better, f", {better} the other way round" if better else ""
-
-
-def _on_others(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
-    before, after = (np.maximum(cell.standing[~np.isnan(cell.standing)], 1.0) for cell in (old, new))
+def _on_others(pair: Pair) -> list[str]:
+    before, after = (np.maximum(cell.standing[~np.isnan(cell.standing)], 1.0) for cell in (pair.old, pair.new))
     if not (len(before) and len(after)):
         return []
     higher = shift(np.where(before > 1, FACTOR * before + ROUNDOFFS, 1.0), after)
     by_chance = sqrt(0.5 * log(1 / ALPHA) * (1 / len(before) + 1 / len(after)) / INDEPENDENT_SHARE)
-    if higher <= by_chance:
-        return []
-    return [f"errors grew on other cases: distributions {higher:.2f} apart, chance allows {by_chance:.2f}"]
+    words = f"errors grew on other cases: distributions {higher:.2f} apart, chance allows {by_chance:.2f}"
+    return [words] if higher > by_chance else []
 
 
 def shift(before: FloatArray, after: FloatArray) -> float:
@@ -269,24 +231,24 @@ def shift(before: FloatArray, after: FloatArray) -> float:
     return float(np.max(counts[0] - counts[1], initial=0.0))
 
 
-def noteworthy_changes(old: RowNumbers, new: RowNumbers) -> Sequence[str]:
-    """Return what is worth a look, in words; both cells are over the same cases."""
+def _noteworthy(pair: Pair) -> list[str]:
+    """Return what is worth a look, in words; both rows are over the same cases."""
     lines = [
         f"{name} error grew within its tolerance, {m_old:.2g} → {m_new:.2g} of it"
-        for name, m_old, m_new in statistics(old, new)
+        for name, m_old, m_new in pair.statistics()
         if LEAST_MARGIN < m_new <= 1 and m_new > LEAP * m_old
     ]
-    for before, after in paired_iterations(old, new):
-        if after.median > ITERATIONS_FACTOR * before.median + ITERATIONS_MORE:
+    for before, after in _paired_iterations(pair):
+        if after.median > FACTOR * before.median + ROUNDOFFS:
             solution = f" ({after.solution})" if after.solution else ""
             lines.append(f"Newton iterations{solution}, median {before.median:g} → {after.median:g}")
     return lines
 
 
-def paired_iterations(old: RowNumbers, new: RowNumbers) -> Sequence[tuple[Iterations, Iterations]]:
+def _paired_iterations(pair: Pair) -> list[tuple[Iterations, Iterations]]:
     """Return the Newton iterations (before, after) of each solution that both kept."""
     by_title: dict[str, list[Iterations]] = {}
-    for line in count_iterations([old, new]):
+    for line in count_iterations([pair.old, pair.new]):
         by_title.setdefault(line.title, []).append(line)
     return [(lines[0], lines[1]) for lines in by_title.values() if len(lines) == 2]
 
@@ -295,12 +257,9 @@ def _only(first: NamedRun, second: NamedRun) -> tuple[str, ...]:
     """Return what only the first has; a formulation or property that the second does not have is named once."""
     formulations = [name for name in first.run.formulations if name not in second.run.formulations]
     properties = [name for name in first.run.properties if name not in second.run.properties]
-    rows = [
-        f"{formulation}, {id_}"
-        for formulation, id_ in first.cells
-        if formulation not in formulations and id_ not in properties and (formulation, id_) not in second.cells
-    ]
-    return (*formulations, *properties, *rows)
+    rows = [key for key in first.cells if key not in second.cells]
+    others = [f"{name}, {id_}" for name, id_ in rows if name not in formulations and id_ not in properties]
+    return (*formulations, *properties, *others)
 
 
 def changes_table(changes: Sequence[Change]) -> Table:
@@ -309,15 +268,16 @@ def changes_table(changes: Sequence[Change]) -> Table:
     words = Column("result"), Column("median"), Column("worst")
     table = Table([name_column("formulation, property"), *words, *numbers("better", "equal", "worse", "time")], title)
     for change in changes:
-        old, new, paired = change.old, change.new, change.paired
-        style = "red" if change.regressions else "green" if change.better else ""
+        old, new, pair = change.pair.old, change.pair.new, change.pair
+        better = new.row.verdict is Verdict.PASS and old.row.verdict is not Verdict.PASS
+        style = "red" if change.regressions else "green" if better else ""
         results = ResultCell(old.row.result), ResultCell(new.row.result, "; ".join(change.regressions))
         table.add(
-            Code(f"{new.row.property_id}{'' if paired else ' *'}"),
+            Code(f"{new.row.property_id}{'' if change.same_cases else ' *'}"),
             tables.Change(*results, style),
             tables.Change(old.median, new.median),
             tables.Change(old.worst, new.worst),
-            *([paired.better, paired.equal, paired.worse] if paired is not None and paired.n else [None] * 3),
+            *([pair.better, pair.equal, pair.worse] if change.same_cases and pair.n else [None] * 3),
             f"{change.slower:.2f}" if isfinite(change.slower) else "–",
             group=new.row.formulation,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isnan
@@ -22,6 +23,14 @@ STYLES = {  # Red only where the run fails by it. What a formulation states abou
     Result.NOT_JUDGED: "yellow",
     Result.OMITTED: "yellow",
     Result.UNDECIDED: "yellow",
+}
+WRONG_RESULTS = {  # {result that makes a run fail: (words for one row, words for several)}
+    Result.BROKEN_PROMISE: ("broken promise", "broken promises"),
+    Result.CRASHED: ("crash", "crashes"),
+    Result.WRONG_TRAITS: ("mistake in the traits", "mistakes in the traits"),
+    Result.NOT_JUDGED: ("property not judged", "properties not judged"),
+    Result.OMITTED: ("property not asked", "properties not asked"),
+    Result.NOT_LOADED: ("plugin not loaded", "plugins not loaded"),
 }
 PLAIN_STYLE = "dim"  # The style of the other results in the terminal.
 
@@ -145,6 +154,11 @@ class Table:
         rows = [row for group in self.groups.values() for row in group]
         lines += [f"| `{name}` | {' | '.join(map(plain_text, cells))} |" for name, *cells in rows]
         return "\n".join(lines)
+
+
+def decimal(value: float, digits: int) -> str:
+    """Return a number with so many digits, and a plain exponent: 1e-5, 1e6."""
+    return re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
 
 
 def short_number(value: float) -> str:

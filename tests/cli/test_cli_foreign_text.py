@@ -17,6 +17,7 @@ from contactverif import Case, Interface
 from contactverif.cli import console
 from contactverif.cli.progress import Bar
 from contactverif_reports.netcdf.write import write
+from contactverif_reports.tables import Column, Table
 
 PLUGIN = """
 import json, pathlib
@@ -145,11 +146,9 @@ def test_the_last_guard_escapes_what_came_another_way(
     text: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    table = console.plain_table(text)
-    table.add_column(text)
-    table.add_row(text)
-    console.show(table)
-    console.show(text)
+    table = Table([Column(text)], text)
+    table.add(text)
+    console.show(table.terminal(), text)
     console.show_verbatim(console.Text(text))
     console.echo(text)
     assert not hidden_characters(capsys.readouterr().out)

@@ -10,7 +10,7 @@ from subjects import load_property
 
 from contactverif.cli.console import QuietConsole
 from contactverif.cli.explain import TerminalMarkdown
-from contactverif.cli.run_tables import _COLUMNS
+from contactverif.cli.run_screen import COLUMNS as HEADS
 from contactverif.contract.result import Result
 from contactverif.contract.traits import Traits
 from contactverif.explanations.property_text import planted_mistakes, smallest_mesh, stated_failures
@@ -60,7 +60,7 @@ def test_a_property_explains_itself_in_80_columns_as_its_page_does(name: str, as
     assert words(in_terminal(page)) == words(answer.out)
 
 
-@pytest.mark.parametrize("name", [*WORDS, *_COLUMNS, *(str(result) for result in Result), *symbol_meanings()])
+@pytest.mark.parametrize("name", [*WORDS, *HEADS, *(str(result) for result in Result), *symbol_meanings()])
 def test_a_word_of_the_screen_is_a_term(name: str, ask: Ask) -> None:
     answer = ask("explain", name, columns=COLUMNS)
     assert answer.status == 0

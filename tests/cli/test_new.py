@@ -1,9 +1,7 @@
-"""The command `new`: the files that it makes, and the names that it refuses.
-
-`tests/docs/test_new_project.py` runs a project.
-"""
+"""The command `new`: the files that it makes, and the names that it refuses; `docs/test_new_project.py` runs some."""
 
 import errno
+import importlib
 import re
 import tomllib
 from collections.abc import Callable
@@ -14,6 +12,7 @@ import pytest
 import yaml
 from asking import Ask, check_mistake
 
+from contactverif import Subject, Verdict, verify
 from contactverif.cli import new as new_project
 
 Make = Callable[..., Path]
@@ -76,9 +75,33 @@ def test_a_project_of_a_library_has_a_makefile(
     assert not [name for name, text in files.items() if "{{" in text or "{%" in text]
 
 
-def test_a_project_is_of_one_language(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("options", [("--c", "--fortran"), ("--3d", "--c")])
+def test_a_project_is_of_one_kind(
+    ask: Ask, options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    check_mistake(ask("new", "mine", "--c", "--fortran"), "NAME: found --c and --fortran; needed one of them")
+    check_mistake(ask("new", "mine", *options), f"NAME: found {' and '.join(options)}; needed one of them")
+
+
+def test_a_project_in_space_registers_a_formulation_on_faces(make: Make) -> None:
+    project = make("my-faces", "--3d")
+    files = {path.name: path.read_text(encoding="utf-8") for path in project.iterdir() if path.is_file()}
+    entries = read_toml(project / "pyproject.toml")["project"]["entry-points"]["contactverif.formulations"]
+    assert entries == {"my-faces": "my_faces:FaceToFace"}
+    assert "dimensions=(3,), faces=(3,)" in files["my_faces.py"]
+    assert not [name for name, text in files.items() if "{%" in text or max(map(len, text.splitlines())) > 200]
+    assert max(map(len, files["my_faces.py"].splitlines())) <= 120
+    compile(files["my_faces.py"], "my_faces.py", "exec")
+
+
+def test_the_search_in_space_does_not_depend_on_the_corner_at_which_a_face_begins(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It reached as far as a face does from its first corner: 2 of 100 mirror images had other cells."""
+    monkeypatch.syspath_prepend(make("first-corner", "--3d"))
+    subject = Subject("first-corner", importlib.import_module("first_corner").FaceToFace)
+    run = verify(subject, ["mirror", "renumbering"], seed=2, shrink="none")
+    assert [row.verdict for row in run.rows if row.planned] == [Verdict.PASS, Verdict.PASS]
 
 
 def test_tox_and_the_workflow_run_the_tests_and_verify(make: Make) -> None:

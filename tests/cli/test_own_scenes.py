@@ -60,12 +60,6 @@ def test_a_mistake_is_one_line(ask: Ask, on_mesh: tuple[str, ...], options: list
     check_mistake(ask("verify", "nts", *on_mesh, *options), message)
 
 
-def test_material_and_support_need_a_mesh(ask: Ask) -> None:
-    for option, value in (("material", "base=1,0.3"), ("support", "lid=0,0")):
-        message = f"--mesh: found none, but --{option}; needed --mesh FILE, which the tags belong to"
-        check_mistake(ask("verify", "nts", f"--{option}", value), message)
-
-
 def test_a_scene_of_a_file_is_judged_stored_and_replayed_without_the_file(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from asking import Ask, check_mistake, run_inline
+from asking import Ask, run_inline
 from fresh_process import MAIN
 
 from contactverif.cli.progress import Bar
@@ -78,12 +78,3 @@ def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
         with pytest.raises(KeyboardInterrupt):
             bar.update("two", 1, 3)
     assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_two_references_are_one_too_many(ask: Ask) -> None:
-    answer = ask("compare", "nts", "--against", "vts-ppt", "--against", "vts-me")
-    check_mistake(answer, "--against: found 2: vts-ppt, vts-me; needed one")
-
-
-def test_a_folder_without_a_name_is_none(ask: Ask) -> None:
-    check_mistake(ask("paper", "--out", ""), "--out: found ''; needed the name of a folder")

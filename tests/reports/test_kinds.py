@@ -6,8 +6,7 @@ import pytest
 import xarray as xr
 from handmade_report import run_with_kinds
 
-from contactverif.cli.run_screen import counterexample_text
-from contactverif.cli.run_tables import coverage_text
+from contactverif.cli.run_screen import counterexample_text, coverage_text
 from contactverif.contract.counterexample import failing_examples
 from contactverif.contract.result import CaseCounts, coverage_of, percent
 from contactverif_reports.html.report_page import report_page

@@ -11,17 +11,15 @@ import netCDF4
 import numpy as np
 import pytest
 from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, run_with_kinds, small_run
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
 
 from contactverif import Finding, Measurement, MisuseError, Outcome, Verdict, load_formulation, load_properties
-from contactverif.cli.comparison_tables import errors_table, iterations_table, last_line, results_table
-from contactverif.cli.report_comparison import ChangesTable, regressions_text
-from contactverif.cli.run_screen import counterexample_text, how_to_keep
-from contactverif.cli.run_tables import RunTable, summary
+from contactverif.cli.comparison_screen import changes_screen, last_line, regressions_text
+from contactverif.cli.run_screen import counterexample_text, run_screen, run_table, summary
 from contactverif.contract.counterexample import counterexamples, failing_examples
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.run.run import run as verify
-from contactverif_reports.comparisons import Comparison, RowNumbers
+from contactverif_reports.comparisons import Comparison, RowNumbers, errors_table, iterations_table, results_table
 from contactverif_reports.html.comparison_page import changes_page, comparison_page
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.differences import same_data
@@ -109,17 +107,20 @@ def text_of(content: RenderableType, width: int = 100) -> str:
 def everything_shown(run: Run) -> dict[str, str]:
     """Return everything that a reader is shown of a run, by name."""
     texts = {"page": report_page(run, "report.nc"), "last line": text_of(summary(run))}
-    texts |= {f"table, {width} columns": text_of(RunTable(run), width) for width in (80, 140)}
+    for width in (80, 140):
+        texts |= {
+            f"{shown.__name__}, {width}": text_of(Group(*shown(run, width)), width) for shown in (run_screen, run_table)
+        }
     texts |= {example.id: text_of(counterexample_text(example, Path("r.nc"))) for example in failing_examples(run)}
-    texts["advice"] = str(how_to_keep(run))
     for reference in run.formulations[:1] if run.rows else ():
         comparison = Comparison.from_run(run, reference)
-        tables = (results_table, errors_table, iterations_table, last_line)
-        texts |= {table.__name__: text_of(table(comparison)) for table in tables}
+        tables = (results_table, errors_table, iterations_table)
+        texts |= {table.__name__: text_of(table(comparison).terminal()) for table in tables}
+        texts["last line of the comparison"] = text_of(last_line(comparison))
         texts["comparison"] = comparison_page(comparison, (), (), ())
     named = NamedRun.from_run("r.nc", run)
     changes = Changes.between(named, named)
-    texts |= {"changes": text_of(ChangesTable(changes)), "regressions": text_of(regressions_text(changes))}
+    texts |= {"changes": text_of(Group(*changes_screen(changes))), "regressions": text_of(regressions_text(changes))}
     return texts | {"page of changes": changes_page(changes, counterexamples(run))}
 
 

@@ -10,19 +10,28 @@ import pytest
 from subjects import load_subject
 
 from contactverif import Case, End, Interface, Subject, load_formulation, load_properties, load_scene, solve
-from contactverif.cli.report_comparison import regressions_text
+from contactverif.cli.comparison_screen import regressions_text
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.measurement import Measurement, Quantity
 from contactverif.contract.property import Outcome, Property, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.run.worker_pool import worker_pool
-from contactverif.studies.comparison import find_differing, make_state, measure_costs, run_comparison
+from contactverif.studies.comparison import make_state, measure_costs, run_comparison
 from contactverif_properties.newton_method import newton_order, solution_details
-from contactverif_reports.comparisons import CONVERGED, END, ITERATIONS, ORDER, Comparison, Paired, RowNumbers
+from contactverif_reports.comparisons import CONVERGED, END, ITERATIONS, ORDER, Comparison, Pair, RowNumbers
 from contactverif_reports.html.comparison_page import changes_page, comparison_page
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
-from contactverif_reports.regressions import ALPHA, Changes, NamedRun, compare_rows, few, shift, wandering
+from contactverif_reports.regressions import (
+    ALPHA,
+    Changes,
+    NamedRun,
+    changes_table,
+    compare_rows,
+    few,
+    shift,
+    wandering,
+)
 
 ERROR = Quantity("force error", "u(8X/|g| + 4N)", "rounding")
 SLOPE = Quantity("order of one Newton step", "1.9", "second order", sense="at least")
@@ -109,14 +118,14 @@ def test_a_row_that_was_not_asked_is_an_empty_cell() -> None:
     assert isnan(result.median)
     assert isnan(result.worst)
     assert isnan(result.seconds)
-    assert Paired.from_cells(result, result).n == 0
+    assert Pair.from_cells(result, result).n == 0
 
 
 def test_pairs_are_counted_case_by_case() -> None:
     #                within  worse  better  both fail: near  worse  better  undecided        crash
     first = cell(0.25, 2.0, 0.5, 100.0, 100.0, 8.0, Verdict.UNDECIDED, Verdict.CRASHED)
     other = cell(0.75, 1.0, 2.0, 100.5, 10.0, 80.0, 4.0, Verdict.CRASHED)
-    pairs = Paired.from_cells(first, other)
+    pairs = Pair.from_cells(first, other)
     assert (pairs.n, pairs.better, pairs.equal, pairs.worse) == (7, 2, 3, 2)
     assert pairs.apart.tolist() == [False, True, True, False, False, False, False, False]
     assert pairs.decades[[0, 3, 7]] == pytest.approx([0.0, np.log10(100 / 100.5), 0.0])
@@ -137,24 +146,27 @@ def test_pairs_are_counted_case_by_case() -> None:
     ],
 )
 def test_the_ratio_is_the_median_of_ratios_on_the_same_cases(first: Any, other: Any, ratio: float) -> None:
-    assert Paired.from_cells(cell(*first), cell(*other)).ratio == pytest.approx(ratio, nan_ok=True)
+    assert Pair.from_cells(cell(*first), cell(*other)).ratio == pytest.approx(ratio, nan_ok=True)
 
 
 @pytest.mark.parametrize(("other", "counts"), [(100.0, (0, 1, 0)), (101.0, (0, 1, 0)), (101.5, (1, 0, 0))])
 def test_beyond_the_tolerance_one_tolerance_is_roundoff(other: float, counts: tuple[int, int, int]) -> None:
-    pairs = Paired.from_cells(cell(100.0), cell(other))
+    pairs = Pair.from_cells(cell(100.0), cell(other))
     assert (pairs.better, pairs.equal, pairs.worse) == counts
 
 
 def test_the_mesh_to_draw_is_a_small_one_that_differs_much() -> None:
-    sizes = np.array([40.0, 4.0, 2.0, 9.0])
-    reference = cell(1e12, 1e8, 10.0, 0.5)
-    # Case 1 shows 8 of the 12 decades of case 0; the 1 decade of case 2 is too little.
-    assert Paired.from_cells(reference, cell(0.5, 0.5, 0.5, 0.5)).furthest(sizes) == 1
-    # one passes and the other does not: before those where both fail, however far
-    assert Paired.from_cells(reference, cell(2.0, 2.0, 0.5, 0.5)).furthest(sizes) == 2
+    kinds = np.zeros((4, 5))
+    kinds[:, 0] = 40.0, 4.0, 2.0, 9.0  # Segments of the slave.
+    reference = cell(1e12, 1e8, 10.0, 0.5, kinds=kinds)
+    for margins, number in (
+        ((0.5, 0.5, 0.5, 0.5), 1),  # Case 1 shows 8 of the 12 decades of case 0; the 1 decade of case 2 is too little.
+        # One passes and the other does not: before those where both fail, however far.
+        ((2.0, 2.0, 0.5, 0.5), 2),
+    ):
+        assert Pair.from_cells(reference, cell(*margins, kinds=kinds)).furthest() == number
     # Within the tolerance nothing differs.
-    assert Paired.from_cells(cell(0.1, 0.9), cell(0.9, 0.1)).furthest(sizes[:2]) is None
+    assert Pair.from_cells(cell(0.1, 0.9), cell(0.9, 0.1)).furthest() is None
 
 
 def small_run() -> Run:
@@ -175,17 +187,17 @@ def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
     comparison = Comparison.from_run(run, "vts-ppt")
     assert [item.row.formulation for item in comparison.unexpected] == ["vts-me"]
     assert comparison.not_loaded == {"mine": "no module"}
-    paired = comparison.paired["vts-me", "patch.flat.transmission"]
+    paired = comparison.pairs["vts-me", "patch.flat.transmission"]
     assert (paired.better, paired.equal, paired.worse) == (0, 1, 2)
     assert paired.ratio == pytest.approx(32.0)  # the median of 64, 1 (both within) and 32
 
 
 def test_the_mesh_that_is_drawn_is_the_small_one() -> None:
-    run = small_run()
-    (differing,) = find_differing(run, Comparison.from_run(run, "vts-ppt"))
-    assert (differing.formulation, differing.number, differing.apart) == ("vts-me", 2, True)
-    assert len(differing.case.interface.slave) == 1
-    assert (differing.margin, differing.reference_margin) == (32.0, 0.125)
+    (differing,) = Comparison.from_run(small_run(), "vts-ppt").differing
+    (name, outcome, margin), (_, _, reference_margin) = differing.sides
+    assert (name, differing.number, differing.rank[0]) == ("vts-me", 2, True)
+    assert len(outcome.case.interface.slave) == 1
+    assert (margin, reference_margin) == (32.0, 0.125)
 
 
 def test_iterations_are_counted_where_both_converged() -> None:
@@ -225,8 +237,8 @@ def test_all_are_asked_the_same_cases() -> None:
     study = run_comparison(subjects[0], subjects[1:], load_properties(["patch.flat.transmission"]), examples=12, seed=1)
     ours, theirs = (result.outcomes for result in study.run.rows)
     assert [our.case for our in ours] == [their.case for their in theirs]
-    assert study.differing[0].formulation == "vts-me"
-    assert study.differing[0].reference_outcome.verdict is Verdict.PASS
+    (name, _, _), (_, outcome, _) = study.differing[0].sides
+    assert (name, outcome.verdict) == ("vts-me", Verdict.PASS)
     assert {cost.formulation for cost in study.costs} == {"vts-ppt", "vts-me"}
     assert all(cost.total > 0 for cost in study.costs)
 
@@ -239,12 +251,13 @@ def test_two_processes_find_the_same_differences() -> None:
         shared = run_comparison(subjects[0], subjects[1:], questions, examples=30, seed=1, executor=executor)
     alone = run_comparison(subjects[0], subjects[1:], questions, examples=30, seed=1)
     for ours, theirs in zip(shared.differing, alone.differing, strict=True):
-        assert (ours.info.id, ours.formulation, ours.number) == (theirs.info.id, theirs.formulation, theirs.number)
-        assert (ours.decades, ours.margin) == (theirs.decades, theirs.margin)
-        np.testing.assert_array_equal(ours.outcome.case.z, theirs.outcome.case.z)
-    assert shared.comparison.paired.keys() == alone.comparison.paired.keys()
-    for key, paired in shared.comparison.paired.items():
-        np.testing.assert_array_equal(paired.decades, alone.comparison.paired[key].decades)
+        assert (ours.info.id, ours.number, ours.rank) == (theirs.info.id, theirs.number, theirs.rank)
+        for our, their in zip(ours.sides, theirs.sides, strict=True):
+            assert (our[0], our[2]) == (their[0], their[2])
+            np.testing.assert_array_equal(our[1].case.z, their[1].case.z)
+    assert shared.comparison.pairs.keys() == alone.comparison.pairs.keys()
+    for key, pair in shared.comparison.pairs.items():
+        np.testing.assert_array_equal(pair.decades, alone.comparison.pairs[key].decades)
 
 
 class Counting:
@@ -287,7 +300,7 @@ def test_the_shared_state_is_in_contact_everywhere() -> None:
 def test_the_same_again_is_no_regression() -> None:
     same = cell(0.5, 1e12, Verdict.CRASHED, Verdict.UNDECIDED)
     change = compare_rows(same, replace(same, seconds=100 * same.seconds), same_seed=True)
-    assert change.paired is not None
+    assert change.same_cases
     assert (change.slower, change.regressions) == (pytest.approx(100.0), ())
 
 
@@ -309,7 +322,8 @@ def test_the_same_again_is_no_regression() -> None:
 def test_a_verdict_that_got_worse(old: Verdict, new: Verdict, regressions: list[str]) -> None:
     change = compare_rows(cell(verdict=old), cell(verdict=new), same_seed=True)
     assert list(change.regressions) == regressions
-    assert change.better is (new is Verdict.PASS)
+    ((_, result, *_),) = next(iter(changes_table([change]).groups.values()))
+    assert result.style == ("red" if regressions else "green" if new is Verdict.PASS else "")
 
 
 def test_a_promise_that_is_not_kept_any_more() -> None:
@@ -480,7 +494,7 @@ def test_other_cases_are_compared_as_distributions() -> None:
     for worse, regressed in ((just, False), (beyond, True)):
         new = cell(*[10.0] * (n - worse), *[1000.0] * worse)
         change = compare_rows(old, new, same_seed=False)
-        assert change.paired is None
+        assert not change.same_cases
         assert bool(change.regressions) is regressed
         assert compare_rows(new, old, same_seed=False).regressions == ()  # it got better
     within = compare_rows(cell(*[0.01] * n), cell(*[0.99] * n), same_seed=False)
@@ -504,11 +518,11 @@ def test_distributions_on_other_cases_know_the_same_factor(before: float, after:
 
 def test_cases_are_the_same_only_if_the_meshes_are() -> None:
     old, new = row("vts-me", 0.5, 2.0, sizes=[1, 2]), row("vts-me", 0.5, 9.0, sizes=[1, 3])
-    assert compare_rows(RowNumbers.from_row(old), RowNumbers.from_row(new), same_seed=True).paired is None
+    assert not compare_rows(RowNumbers.from_row(old), RowNumbers.from_row(new), same_seed=True).same_cases
     longer = RowNumbers.from_row(row("vts-me", 0.5, 9.0, 64.0, sizes=[1, 2, 7]))
-    pairs = compare_rows(RowNumbers.from_row(old), longer, same_seed=True).paired
-    assert pairs is not None
-    assert pairs.n == 2  # the first ones
+    change = compare_rows(RowNumbers.from_row(old), longer, same_seed=True)
+    assert change.same_cases
+    assert change.pair.n == 2  # the first ones
 
 
 @pytest.mark.parametrize(

@@ -45,12 +45,12 @@ def suites_of(run: Run) -> Element:
 
 
 def _add_row(suite: Element, row: Row, example: Counterexample | None) -> None:
-    """Add the test case of a row, with its counterexample as text."""
     seconds, words = row.seconds, row.reason or str(row.result)
     if row.unexpected:
+        drawing = [] if example is None else [example.label, as_text(example.case)]
         tag = "error" if row.verdict is Verdict.CRASHED else "failure"
         element = _add_case(suite, row.formulation, row.property_id, seconds, tag, words, str(row.result))
-        element.text = _printable("\n".join([f"{row.unexpected}: {row.reason}", *_drawing(example)]))
+        element.text = _printable("\n".join([f"{row.unexpected}: {row.reason}", *drawing]))
     elif row.result in _SKIPPED:
         reason = f"{row.result}: {row.known or row.reason}".removesuffix(": ")
         _add_case(suite, row.formulation, row.property_id, seconds, "skipped", reason)
@@ -73,15 +73,10 @@ def _add_case(
 
 
 def _count(suite: Element) -> None:
-    """Write how many test cases a suite has, and how they ended."""
     suite.set("tests", str(len(suite)))
     for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(name, str(len(suite.findall(f"testcase/{tag}"))))
     suite.set("time", f"{sum(float(case.attrib['time']) for case in suite):.3f}")
-
-
-def _drawing(example: Counterexample | None) -> list[str]:
-    return [] if example is None else [example.label, as_text(example.case)]
 
 
 def _printable(text: str) -> str:

@@ -15,7 +15,7 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
 from contactverif.contract.result import Row, Run
-from contactverif.contract.schema import ROW, ReportColumn, value_of
+from contactverif.contract.schema import ROW, value_of
 from contactverif_reports.files import whole
 from contactverif_reports.plot.text import as_text
 
@@ -52,25 +52,15 @@ class Example(msgspec.Struct, frozen=True, kw_only=True):
     drawing: str
 
 
-def _type_of(column: ReportColumn) -> Any:
-    """Return the type of the key of a column."""
-    types: dict[str, Any] = {
-        "words": str,
-        "count": int,
-        "real": float,
-        "bool or none": bool | None,
-        "number": Number | None,
-    }
-    return types[column.type or column.kind]
-
-
 _KEYS = tuple(column for column in ROW if column.key)
+_TYPES: dict[str, Any] = {"words": str, "count": int, "real": float}
+_TYPES |= {"bool or none": bool | None, "number": Number | None}
 if TYPE_CHECKING:
     RowDocument = Any
 else:
     RowDocument = msgspec.defstruct(
         "RowDocument",
-        [*((column.key, _type_of(column)) for column in _KEYS), ("counterexample", Example | None)],
+        [*((column.key, _TYPES[column.type or column.kind]) for column in _KEYS), ("counterexample", Example | None)],
         namespace={"__doc__": ROW_WORDS},
         module=__name__,
         frozen=True,
@@ -106,12 +96,15 @@ def write_json(run: Run, path: str | os.PathLike[str]) -> None:
 
 def document_of(run: Run) -> RunDocument:
     """Return a run as the document that is written."""
-    examples = {(each.formulation, each.property_id): each for each in counterexamples(run).values()}
+    examples = {(each.formulation, each.property_id): _example(each) for each in counterexamples(run).values()}
     return RunDocument(
         version=VERSION,
         promises_kept=run.promises_kept,
         provenance=dict(run.provenance),
-        rows=[_row_document(row, examples.get((row.formulation, row.property_id))) for row in run.rows],
+        rows=[
+            RowDocument(**row_values(row), counterexample=examples.get((row.formulation, row.property_id)))
+            for row in run.rows
+        ],
         not_loaded=[Missing(name=item.formulation, reason=item.reason) for item in run.not_loaded],
         opposite_signs=list(run.opposite_signs),
         diagnoses=dict(run.diagnoses),
@@ -121,10 +114,6 @@ def document_of(run: Run) -> RunDocument:
 def schema() -> bytes:
     """Return the schema of the document, as it stands beside this file."""
     return msgspec.json.format(msgspec.json.encode(msgspec.json.schema(RunDocument)), indent=1) + b"\n"
-
-
-def _row_document(row: Row, example: Counterexample | None) -> Any:
-    return RowDocument(**row_values(row), counterexample=None if example is None else _example(example))
 
 
 def row_values(row: Row) -> dict[str, Any]:

@@ -82,7 +82,6 @@ def bench_page(results: BenchResults, changes: Sequence[BenchChange] = ()) -> st
 
 
 def _list_failures(results: BenchResults) -> list[tuple[str, int, str]]:
-    """Return formulation, number of runs without a solution, and how they ended."""
     rows = []
     for name in results.formulations:
         ends = [

@@ -68,18 +68,20 @@ def comparison_page(
         inf=inf,
         costs=costs,
         times=cost_table(costs, comparison.reference),
-        meshes=[_mesh(*pair, comparison.reference) for pair in zip(differing, drawings, strict=True)],
+        meshes=[_mesh(*pair) for pair in zip(differing, drawings, strict=True)],
         about=origin(comparison.provenance, _FACTS),
     )
 
 
 def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> str:
     """Return the page of an old report and a new one."""
-    axis = Axis.from_margins(cell.margins for change in changes.changes for cell in (change.old, change.new))
+    axis = Axis.from_margins(cell.margins for change in changes.changes for cell in (change.pair.new, change.pair.old))
     rows = changes_table(changes.changes)
     head = Column("", wrap=True, page_head=Markup("old above new{}").format(ticks(axis)))
-    by_formulation = [each for name in rows.groups for each in changes.changes if each.new.row.formulation == name]
-    rows.insert(4, head, (strip(each.old.margins, axis) + strip(each.new.margins, axis) for each in by_formulation))
+    by_formulation = [each for name in rows.groups for each in changes.changes if each.pair.new.row.formulation == name]
+    rows.insert(
+        4, head, (strip(each.pair.old.margins, axis) + strip(each.pair.new.margins, axis) for each in by_formulation)
+    )
     return render(
         "changes.html.j2",
         changes=changes,
@@ -89,33 +91,28 @@ def changes_page(changes: Changes, examples: Mapping[str, Counterexample]) -> st
             (example, example.replay_command(changes.new.path), _case_figure(example.case, None, None, id_))
             for id_, example in examples.items()
         ],
-        n_others=sum(change.paired is None for change in changes.changes),
+        n_others=sum(not change.same_cases for change in changes.changes),
         old_about=origin(changes.old.run.provenance, _FACTS),
         new_about=origin(changes.new.run.provenance, _FACTS),
     )
 
 
-def _mesh(differing: Differing, drawing: Drawing, reference: str) -> dict[str, Any]:
+def _mesh(differing: Differing, drawing: Drawing) -> dict[str, Any]:
     """Return two figures with a caption each, or one with both."""
-    sides = [
-        (differing.formulation, differing.outcome, differing.margin),
-        (reference, differing.reference_outcome, differing.reference_margin),
-    ]
-    id_ = differing.info.id
+    id_, sides = differing.info.id, differing.sides
     if drawing.solved is not None and drawing.solved.solutions:
         from contactverif_reports.plot.scene_figures import make_scene_figure
 
         figures = [(svg_inline(make_scene_figure(drawing.solved), f"{id_}, solved"), sides)]
     else:
         figures = [
-            (_case_figure(differing.case, forces, drawing.exact, f"{id_}: {side[0]}"), [side])
+            (_case_figure(side[1].case, forces, drawing.exact, f"{id_}: {side[0]}"), (side,))
             for side, forces in zip(sides, (drawing.candidate, drawing.reference), strict=True)
         ]
     return {"differing": differing, "figures": figures}
 
 
 def _case_figure(case: Case, forces: FloatArray | None, exact: FloatArray | None, label: str) -> Markup:
-    """Return the figure of a case: its bodies, or its interface with forces."""
     import matplotlib  # Importing it is slow.
 
     from contactverif_reports.plot.case_figures import make_mesh_figure

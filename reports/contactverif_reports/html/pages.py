@@ -22,7 +22,7 @@ from contactverif.contract.errors import MisuseError, printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, percent
 from contactverif_reports.files import check_writable, checked_name, whole
-from contactverif_reports.tables import Change, Code, Measured, ResultCell, plain_text
+from contactverif_reports.tables import Change, Code, Measured, ResultCell, decimal, plain_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,10 +108,7 @@ def svg_inline(figure: Figure, label: str = "") -> Markup:
 
 def number(value: float, digits: int = 3) -> str:
     """Format a number for a reader: few digits, a true minus sign, – for NaN."""
-    if value != value:
-        return "–"
-    plain = re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
-    return plain.replace("-", "−").replace("inf", "∞")
+    return "–" if value != value else decimal(value, digits).replace("-", "−").replace("inf", "∞")
 
 
 def page_cell(value: Any) -> str:
@@ -149,7 +146,8 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
         loader=ChoiceLoader([PackageLoader(name) for name in packages]),
         autoescape=True,
         undefined=StrictUndefined,
-        finalize=_make_printable,
+        # No control character comes into a page; only `Markup` is of our own making.
+        finalize=lambda value: printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -158,11 +156,6 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
     environment.filters["percent"] = percent
     environment.globals["marks"] = {str(word): mark for word, mark in MARKS.items()}
     return environment
-
-
-def _make_printable(value: Any) -> Any:
-    """Return what a template puts into a page, without control characters; only `Markup` is of our own making."""
-    return printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:

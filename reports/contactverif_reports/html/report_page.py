@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from markupsafe import Markup
 
@@ -12,10 +14,11 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.measurement import CheckedNumber
 from contactverif.contract.property import checked_numbers
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
-from contactverif_reports.comparisons import Iterations, RowNumbers, count_iterations
+from contactverif_reports.comparisons import RowNumbers, count_iterations
 from contactverif_reports.html.margin_strips import Axis, strip, ticks
 from contactverif_reports.html.pages import render, svg_inline
 from contactverif_reports.plot.text import as_text
+from contactverif_reports.tables import WRONG_RESULTS
 
 MOST_FIGURES = 24  # Counterexamples that are drawn as figures, the unexpected ones first; the others are text.
 _WIDTH = 5.4  # The width of a figure in inches: on a phone its labels can still be read.
@@ -36,37 +39,6 @@ class Example:
     # The reason of the failure where the numbers do not say it, else the place of the worst number, if it has one.
     reason: str
     replay: str  # The command that judges the case again.
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Line:
-    """A row of the table of a formulation."""
-
-    cell: RowNumbers  # The row, and its numbers by case.
-    promise: str  # What the formulation states, in a word.
-    strip: Markup  # The distribution of value over tolerance.
-    example: str  # The id of its counterexample, empty if it has none.
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Section:
-    """The part of the page about one formulation."""
-
-    formulation: str  # The name on the command line.
-    number: int  # The number of the section, from 1, for anchors.
-    open: bool  # The section is unfolded.
-    missing: tuple[str, ...]  # Parts of the contract that the formulation does not provide.
-    lines: tuple[Line, ...]  # A line for each property that applies.
-    inapplicable: tuple[tuple[str, list[str]], ...]  # Reasons why properties do not apply, and the properties.
-    examples: tuple[Example, ...]  # Its counterexamples.
-    iterations: tuple[Iterations, ...]  # Newton's iterations where a property solved.
-
-    @property
-    def counts(self) -> str:
-        """The numbers of properties with each result, in words."""
-        results = [line.cell.row.result for line in self.lines]
-        results += [Result.NOT_APPLICABLE for _, ids in self.inapplicable for _ in ids]
-        return ", ".join(f"{results.count(result)} {result}" for result in Result if result in results)
 
 
 def report_page(run: Run, path: str | os.PathLike[str]) -> str:
@@ -108,49 +80,59 @@ def headline(run: Run) -> str:
     """Say in one line how the run came out."""
     if run.promises_kept:
         return f"{run.praise} {run.promises}"
-    counts = (
-        ("formulation with the opposite sign", "formulations with the opposite sign", len(run.opposite_signs)),
-        ("broken promise", "broken promises", run.count(Result.BROKEN_PROMISE)),
-        ("crash", "crashes", sum(row.result is Result.CRASHED for row in run.unexpected)),
-        ("mistake in the traits", "mistakes in the traits", run.count(Result.WRONG_TRAITS)),
-        ("property not judged", "properties not judged", run.count(Result.NOT_JUDGED)),
-        ("plugin not loaded", "plugins not loaded", len(run.not_loaded)),
-    )
-    words = [f"{count} {singular if count == 1 else plural}" for singular, plural, count in counts if count]
+    n_signs, counts = len(run.opposite_signs), Counter(row.result for row in run.unexpected if not row.omitted)
+    counts[Result.NOT_LOADED] = len(run.not_loaded)
+    words = [f"{n_signs} formulation{'s' * (n_signs > 1)} with the opposite sign"] if n_signs else []
+    words += [
+        f"{counts[result]} {text[counts[result] > 1]}" for result, text in WRONG_RESULTS.items() if counts[result]
+    ]
     return f"{', '.join(words)}." if words else "Nothing was checked."
 
 
 def _section(
-    run: Run, name: str, cells: Mapping[tuple[str, str], RowNumbers], examples: Sequence[Example], axis: Axis
-) -> Section:
-    """Return the section of one formulation."""
-    own_cells = [cells[name, row.property_id] for row in run.rows_of(name)]
-    own_examples = [example for example in examples if example.counterexample.formulation == name]
-    example_of = {example.counterexample.property_id: example.counterexample.id for example in own_examples}
-    lines, inapplicable = [], dict[str, list[str]]()
-    for cell in own_cells:
-        id_ = cell.row.property_id
-        if cell.row.result is Result.NOT_APPLICABLE:
-            inapplicable.setdefault(cell.row.reason, []).append(id_)
-        else:
-            promise = _PROMISES[cell.row.promise]
-            lines.append(Line(cell, promise, strip(cell.margins, axis), example_of.get(id_, "")))
-    return Section(
-        formulation=name,
-        number=run.formulations.index(name) + 1,
-        open=len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in run.rows_of(name)),
-        missing=tuple(part for part, provided in run.provided.get(name, {}).items() if not provided),
-        lines=tuple(lines),
-        inapplicable=tuple(inapplicable.items()),
-        examples=tuple(own_examples),
-        iterations=tuple(line for cell in own_cells for line in count_iterations([cell])),
-    )
+    run: Run, name: str, cells: Mapping[tuple[str, str], RowNumbers], every: Sequence[Example], axis: Axis
+) -> dict[str, Any]:
+    rows = list(run.rows_of(name))
+    examples = [example for example in every if example.counterexample.formulation == name]
+    example_of = {example.counterexample.property_id: example.counterexample.id for example in examples}
+    lines, inapplicable = [], dict[str, list[str]]()  # {reason: properties that do not apply}
+    for row in rows:
+        if row.result is Result.NOT_APPLICABLE:
+            inapplicable.setdefault(row.reason, []).append(row.property_id)
+            continue
+        cell = cells[name, row.property_id]
+        lines.append(
+            {
+                "cell": cell,
+                "promise": _PROMISES[row.promise],
+                "strip": strip(cell.margins, axis),
+                "example": example_of.get(row.property_id, ""),
+            }
+        )
+    counts = Counter(row.result for row in rows)
+    return {
+        "formulation": name,
+        "number": run.formulations.index(name) + 1,  # For anchors.
+        "open": len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in rows),
+        "counts": ", ".join(f"{counts[result]} {result}" for result in Result if counts[result]),
+        "missing": [part for part, provided in run.provided.get(name, {}).items() if not provided],
+        "lines": lines,
+        "inapplicable": list(inapplicable.items()),
+        "examples": examples,
+        "iterations": [line for row in rows for line in count_iterations([cells[name, row.property_id]])],
+    }
 
 
 def _examples(run: Run, path: str) -> list[Example]:
     """Return all counterexamples, as many of them drawn as figures as the page holds."""
-    by_id = counterexamples(run)
-    figures = _figures(by_id)
+    by_id, figures = counterexamples(run), dict[str, Markup]()
+    for id_ in sorted(by_id, key=lambda id_: not by_id[id_].row.unexpected)[:MOST_FIGURES]:
+        from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
+
+        case, forces = by_id[id_].case, by_id[id_].row.forces
+        of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
+        figure = make_mesh_figure(case, _WIDTH, forces=of_formulation, exact=exact)
+        figures[id_] = svg_inline(figure, as_text(case).splitlines()[0])
     examples = []
     for id_, counterexample in by_id.items():
         measurement = counterexample.outcome.measurement
@@ -168,22 +150,6 @@ def _examples(run: Run, path: str) -> list[Example]:
             )
         )
     return examples
-
-
-def _figures(examples: Mapping[str, Counterexample]) -> dict[str, Markup]:
-    """Return {id: figure} of as many counterexamples as are drawn."""
-    if not examples:
-        return {}
-    from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
-
-    ids = sorted(examples, key=lambda id_: not examples[id_].row.unexpected)
-    figures = {}
-    for id_ in ids[:MOST_FIGURES]:
-        case, forces = examples[id_].case, examples[id_].row.forces
-        of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
-        figure = make_mesh_figure(case, _WIDTH, forces=of_formulation, exact=exact)
-        figures[id_] = svg_inline(figure, as_text(case).splitlines()[0])
-    return figures
 
 
 def run_view(run: Run, rows: Sequence[Row], remarks: Sequence[str], example: Counterexample | None) -> str:

@@ -98,7 +98,6 @@ def _variable(column: ReportColumn, results: BenchResults) -> Variable:
 
 
 def _labels(results: BenchResults) -> dict[str, Variable]:
-    """Return the names along the dimensions, and what a cell is."""
     cells, scenes = results.cells, {scene: number for number, scene in enumerate(results.scenes)}
     n_targets = max(map(len, results.targets.values()))
     targets = [[*results.targets[scene], *[np.nan] * (n_targets - len(results.targets[scene]))] for scene in scenes]
@@ -175,7 +174,6 @@ def _cells(root: Group, scenes: list[str]) -> tuple[Cell, ...]:
 
 
 def _check(results: BenchResults) -> None:
-    """Check shapes, types and codes, that names are different, and that each scene has all instances on all meshes."""
     lengths: Mapping[str, int] = {
         "formulation": len(results.formulations),
         "cell": len(results.cells),

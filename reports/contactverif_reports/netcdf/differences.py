@@ -34,7 +34,6 @@ def same_data(
 
 
 def _entries(groups: Groups) -> Iterator[tuple[str, Any]]:
-    """Yield (name, value) of every attribute, dimension and variable."""
     for path, dataset in groups.items():
         if path == f"/{schema.TIMING}":
             continue

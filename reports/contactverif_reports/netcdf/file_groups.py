@@ -15,7 +15,6 @@ from typing import Any
 import msgspec
 import netCDF4
 import numpy as np
-from numpy.typing import NDArray
 
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.schema import Group, Variable
@@ -45,7 +44,6 @@ def write_tree(groups: Mapping[str, Group], path: str | os.PathLike[str]) -> Non
 
 
 def _declare(group: Any, name: str, variable: Variable) -> tuple[Any, np.ndarray[Any, Any]]:
-    """Return a new, empty variable of a group, and the values that belong into it."""
     values, dims, attributes = variable.values, variable.dims, dict(variable.attrs)
     compressed = values.ndim > 0 and values.nbytes >= _WORTH_COMPRESSING
     if values.dtype.kind == "S":
@@ -53,23 +51,17 @@ def _declare(group: Any, name: str, variable: Variable) -> tuple[Any, np.ndarray
         values = np.ascontiguousarray(values)[..., np.newaxis].view("S1").reshape(*values.shape, width)
         dims = (*dims, f"string{width}")
     for dim, size in zip(dims, values.shape, strict=True):
-        _declare_dimension(group, dim, size)
+        above = group
+        while above is not None and not (dim in above.dimensions and len(above.dimensions[dim]) == size):
+            above = above.parent
+        if above is None:  # Neither the group nor one above has that dimension.
+            group.createDimension(dim, size)
     fill = attributes.pop("_FillValue", None)
     target = group.createVariable(name, values.dtype, dims, zlib=compressed, complevel=4, fill_value=fill)
     target.set_auto_maskandscale(False)
     target.set_auto_chartostring(False)
     target.setncatts(attributes)
     return target, values
-
-
-def _declare_dimension(group: Any, dim: str, size: int) -> None:
-    """Add a dimension to a group, unless it or a group above has that dimension."""
-    above = group
-    while above is not None:
-        if dim in above.dimensions and len(above.dimensions[dim]) == size:
-            return
-        above = above.parent
-    group.createDimension(dim, size)
 
 
 def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, decode: bool = True) -> dict[str, Group]:
@@ -96,8 +88,13 @@ class _PackedVariable(msgspec.Struct, array_like=True):
 
     def unpack(self, *, decode: bool) -> Variable:
         values, dims = self.values.unpack(), self.dims
-        if decode and values.dtype.kind == "S":
-            values, dims = _words(values), dims[:-1]
+        if decode and values.dtype.kind == "S":  # Characters (..., width) become words (...,).
+            *shape, width = values.shape
+            if values.size:
+                characters = values.view(f"S{width * values.itemsize}").reshape(shape)
+                values, dims = np.strings.decode(characters, "utf-8"), dims[:-1]
+            else:
+                values, dims = np.zeros(shape, dtype=np.str_), dims[:-1]
         if len(dims) != values.ndim:
             raise ValueError(f"{len(dims)} dimensions of an array of shape {values.shape}")
         return Variable(dims, values, _unpack_attributes(self.attrs))
@@ -113,20 +110,8 @@ class _PackedGroup(msgspec.Struct, array_like=True):
 
 
 def _unpack_attributes(attributes: Mapping[str, str | PackedArray]) -> dict[str, Any]:
-    return {name: value if isinstance(value, str) else _unpack_number(value) for name, value in attributes.items()}
-
-
-def _unpack_number(packed: PackedArray) -> Any:
-    values = packed.unpack()
-    return values if values.ndim else values[()]
-
-
-def _words(characters: NDArray[Any]) -> NDArray[Any]:
-    """Return characters (..., width) as words (...,)."""
-    *shape, width = characters.shape
-    if not characters.size:
-        return np.zeros(shape, dtype=np.str_)
-    return np.strings.decode(characters.view(f"S{width * characters.itemsize}").reshape(shape), "utf-8")
+    values = {name: value if isinstance(value, str) else value.unpack() for name, value in attributes.items()}
+    return {name: value if isinstance(value, str) or value.ndim else value[()] for name, value in values.items()}
 
 
 def pack_groups(path: str) -> bytes:
@@ -137,11 +122,17 @@ def pack_groups(path: str) -> bytes:
         raise ValueError(error.strerror) from error
     groups = dict(_walk(file))
     _check_sizes(groups, os.path.getsize(path))
-    return msgspec.msgpack.encode({name: _pack_group(group) for name, group in groups.items()})
+    packed = {}
+    for name, group in groups.items():
+        variables = {
+            key: _PackedVariable(tuple(each.dimensions), PackedArray.pack(each[...], key), _pack_attributes(each))
+            for key, each in group.variables.items()
+        }
+        packed[name] = _PackedGroup(_pack_attributes(group), variables)
+    return msgspec.msgpack.encode(packed)
 
 
 def _walk(group: Any) -> Iterator[tuple[str, Any]]:
-    """Yield (path, group) of a group and all below it."""
     group.set_auto_mask(False)
     group.set_auto_scale(False)
     group.set_auto_chartostring(False)
@@ -151,7 +142,6 @@ def _walk(group: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _check_sizes(groups: Mapping[str, Any], size: int) -> None:
-    """Check that the file may hold all that its variables are said to be."""
     most = LEAST_ALLOWANCE + MOST_EXPANSION * size
     total = 0
     for path, group in groups.items():
@@ -162,14 +152,6 @@ def _check_sizes(groups: Mapping[str, Any], size: int) -> None:
             total += math.prod(variable.shape) * variable.datatype.itemsize
             if total > most:
                 raise ValueError(f"with {place} of shape {variable.shape} it holds more than {size} bytes can")
-
-
-def _pack_group(group: Any) -> _PackedGroup:
-    variables = {}
-    for name, variable in group.variables.items():
-        values = PackedArray.pack(variable[...], name)
-        variables[name] = _PackedVariable(tuple(variable.dimensions), values, _pack_attributes(variable))
-    return _PackedGroup(_pack_attributes(group), variables)
 
 
 def _pack_attributes(owner: Any) -> dict[str, str | PackedArray]:

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactverif.contract import schema
-from contactverif.contract.arrays import IntArray
 from contactverif.contract.case import BODIES, Case
 from contactverif.contract.counterexample import Counterexample, counterexamples, distinct, named_failures, typeable
-from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.interface import PLANE
 from contactverif.contract.result import NodalForces, Run
 from contactverif.contract.schema import Group, Variable, codes, numbers, words
 from contactverif_reports.netcdf.stored_outcomes import coordinates, outcome_axes, outcome_variables
@@ -81,24 +80,22 @@ def _topology(case: Case) -> dict[str, Variable]:
     """Return the mesh of a case with the reference and the current positions of its nodes."""
     interface = case.interface
     axes, in_plane = "xyz"[: interface.dim], interface.dim == PLANE
-    cell = "edge" if in_plane else "face"
+    cell, part = ("edge", "segment") if in_plane else ("face", "face")
+    sides = [surface.faces for surface in (interface.slave, interface.master)]
+    most = max(faces.shape[1] for faces in sides)
+    nodes = np.vstack([np.pad(faces, ((0, 0), (0, most - faces.shape[1])), constant_values=-1) for faces in sides])
+    corners = "corners of each face, counter-clockwise seen from outside its body, then −1"
+    meaning = "first and second node of each segment, body on the left" if in_plane else corners
+    side = [0] * len(interface.slave) + [1] * len(interface.master)
     table = {
         "mesh": numbers([], np.int32(0), "topology of the two surfaces", "1"),
-        f"{cell}_nodes": numbers([cell, "two" if in_plane else "corner"], *_connectivity(interface)),
-        "side": codes(
-            [cell],
-            [0] * len(interface.slave) + [1] * len(interface.master),
-            schema.SIDES,
-            f"surface of each {'segment' if in_plane else 'face'}",
-        ),
+        f"{cell}_nodes": numbers([cell, "two" if in_plane else "corner"], nodes, meaning, "1"),
+        "side": codes([cell], side, schema.SIDES, f"surface of each {part}"),
     }
-    for name, words_of_name, places in (
-        ("node", "reference", interface.nodes),
-        ("current", "current", case.positions),
-    ):
+    for name, state, places in (("node", "reference", interface.nodes), ("current", "current", case.positions)):
         for number, axis in enumerate(axes):
-            long_name = f"{words_of_name} position, {axis}"
-            table[f"{name}_{axis}"] = numbers(["node"], places[:, number], long_name, schema.LENGTH)
+            meaning = f"{state} position, {axis}"
+            table[f"{name}_{axis}"] = numbers(["node"], places[:, number], meaning, schema.LENGTH)
     coordinates_of_nodes = " ".join(f"node_{axis}" for axis in axes)
     table["mesh"].attrs.update(
         {
@@ -117,7 +114,6 @@ def _topology(case: Case) -> dict[str, Variable]:
 
 
 def _forces(forces: NodalForces | None) -> dict[str, Variable]:
-    """Return the forces of the formulation on the nodes of a counterexample, and any exact ones that are known."""
     kinds = [] if forces is None else [("", "force", forces.of_formulation), ("exact_", "exact force", forces.exact)]
     table = {}
     for prefix, words_of_name, values in kinds:
@@ -140,37 +136,24 @@ def read_forces(dataset: Group, case: Case) -> NodalForces | None:
     return NodalForces(*kinds) if kinds else None
 
 
-def _connectivity(interface: Interface) -> tuple[IntArray, str, str]:
-    """Return the nodes of all segments or faces, slave first, −1 behind those of fewer corners; their name and unit."""
-    sides = [surface.faces for surface in (interface.slave, interface.master)]
-    most = max(faces.shape[1] for faces in sides)
-    nodes = np.vstack([np.pad(faces, ((0, 0), (0, most - faces.shape[1])), constant_values=-1) for faces in sides])
-    if interface.dim == PLANE:
-        return nodes, "first and second node of each segment, body on the left", "1"
-    return nodes, "corners of each face, counter-clockwise seen from outside its body, then −1", "1"
-
-
 def case_group(case: Case) -> Group:
     """Return `Case.to_arrays()`; the attribute `case_array` of each variable names the array."""
     arrays = case.to_arrays()
     table: dict[str, Variable] = {}
     for safe, (name, values) in zip(distinct(map(typeable, arrays)), arrays.items(), strict=True):
-        variable = _array(safe, name, values)
-        variable.attrs[ARRAY_NAME] = schema.text(name)
-        table[safe] = variable
+        parameter = name.removeprefix("parameter_")
+        axes = tuple(f"{safe}_axis_{axis}" for axis in range(values.ndim))
+        unit = schema.PARAMETER_UNITS.get(parameter, schema.UNKNOWN)
+        of_parameter = axes, schema.text(f"parameter of the case: {parameter}"), unit
+        dims, long_name, units = _ARRAYS.get(name, of_parameter)
+        if name in _FACES and values.shape[1] != 2:
+            dims, long_name = _FACES[name]
+        if values.dtype.kind in "OU":  # Words, and integers beyond 64 bits.
+            table[safe] = words(dims, values.astype(np.str_).tolist(), long_name)
+        else:
+            table[safe] = numbers(dims, values, long_name, units)
+        table[safe].attrs[ARRAY_NAME] = schema.text(name)
     return Group(table, {"comment": "contactverif.Case.from_arrays makes the case of these"})
-
-
-def _array(safe: str, name: str, values: NDArray[Any]) -> Variable:
-    parameter = name.removeprefix("parameter_")
-    axes, meaning = tuple(f"{safe}_axis_{axis}" for axis in range(values.ndim)), f"parameter of the case: {parameter}"
-    of_parameter = axes, schema.text(meaning), schema.PARAMETER_UNITS.get(parameter, schema.UNKNOWN)
-    dims, long_name, units = _ARRAYS.get(name, of_parameter)
-    if name in _FACES and values.shape[1] != 2:
-        dims, long_name = _FACES[name]
-    if values.dtype.kind in "OU":  # Words, and integers beyond 64 bits.
-        return words(dims, values.astype(np.str_).tolist(), long_name)
-    return numbers(dims, values, long_name, units)
 
 
 def case_of_group(dataset: Group) -> Case:
@@ -215,20 +198,15 @@ def check_bodies(parameters: Mapping[str, NDArray[Any]]) -> None:
     if not packed:
         return
     n_nodes = len(np.atleast_1d(packed["nodes"]))
-    _check_shapes(packed, n_nodes)
-    for name, low, high in (("cells", -1, n_nodes - 1), ("contact", 0, n_nodes - 1), ("count", 1, n_nodes)):
-        numbers = packed[name]
-        if (numbers != np.round(numbers)).any() or not ((numbers >= low) & (numbers <= high)).all():
-            raise ValueError(f"{BODIES}{name} holds a number that no node has")
-    if packed["count"].sum() != n_nodes or (packed["cells"][:, :3] < 0).any():
-        raise ValueError(f"the nodes of {BODIES}count or {BODIES}cells are not those that are there")
-
-
-def _check_shapes(packed: Mapping[str, NDArray[Any]], n_nodes: int) -> None:
-    """Check that all arrays have their shapes, and no NaN or infinity."""
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(_OF_NODES, (n_nodes, 2))
     shapes |= {name: (packed["count"].size, *rest) for name, rest in _OF_BODIES.items()}
     shapes |= {name: (len(np.atleast_1d(packed[name])), width) for name, width in (("cells", 4), ("contact", 2))}
     for name, shape in shapes.items():
         if packed[name].shape != shape or not np.isfinite(packed[name]).all():
             raise ValueError(f"{BODIES}{name} has the shape {packed[name].shape} or NaN; needed {shape}")
+    for name, low, high in (("cells", -1, n_nodes - 1), ("contact", 0, n_nodes - 1), ("count", 1, n_nodes)):
+        numbers = packed[name]
+        if (numbers != np.round(numbers)).any() or not ((numbers >= low) & (numbers <= high)).all():
+            raise ValueError(f"{BODIES}{name} holds a number that no node has")
+    if packed["count"].sum() != n_nodes or (packed["cells"][:, :3] < 0).any():
+        raise ValueError(f"the nodes of {BODIES}count or {BODIES}cells are not those that are there")

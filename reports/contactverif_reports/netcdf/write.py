@@ -115,7 +115,6 @@ def root_attributes(run: Run) -> dict[str, Any]:
 
 
 def _summary(run: Run) -> Group:
-    """Return counts, verdicts, promises, closest numbers, what the formulations provide, and what did not load."""
     table, attributes = dict[str, Variable](), dict[str, Any]()
     if run.not_loaded:
         plugins = [(entry.formulation, entry.reason) for entry in run.not_loaded]
@@ -163,7 +162,6 @@ def _grid(run: Run) -> list[Row | None]:
 
 
 def _formulation_columns(run: Run) -> Table:
-    """Return what is known of whole formulations: the parts of the contract that they have, signs and diagnoses."""
     names, axis = run.formulations, ["formulation"]
     parts = [[run.provided.get(name, {}).get(part, schema.UNSAID) for part in PARTS] for name in names]
     signs = [int(name in run.opposite_signs) for name in names]
@@ -209,7 +207,6 @@ def _timing(run: Run) -> Group:
 
 
 def _property_group(info: PropertyInfo, rows: Mapping[str, Row | None]) -> Group:
-    """Return the group of a property, with the dimensions `formulation`, `case` and `quantity`."""
     outcomes = [() if row is None else row.outcomes for row in rows.values()]
     witnesses = [None if row is None else row.witness for row in rows.values()]
     n_cases = max(map(len, outcomes))
@@ -248,7 +245,6 @@ def _property_group(info: PropertyInfo, rows: Mapping[str, Row | None]) -> Group
 
 
 def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> Table:
-    """Return how many cases of each kind were planned, judged, and so on."""
     counts = np.zeros((len(rows), len(kinds), len(_COUNTED)), dtype=np.int32)
     for i, row in enumerate(rows):
         for kind, cases in (row.tally.kinds if row is not None else {}).items():

@@ -14,7 +14,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
@@ -26,6 +25,7 @@ from contactverif_reports.bench_costs import (
     ROUNDOFF,
     RUNTIME_PICTURE,
     STARTS_PICTURE,
+    Ratio,
     costs_at,
     curve,
     format_share,
@@ -36,7 +36,6 @@ from contactverif_reports.bench_costs import (
 from contactverif_reports.bench_results import BEST, DEEPEST, ERRORS, RULE, VARIANTS, BenchResults
 from contactverif_reports.plot.case_figures import save
 
-_NEVER: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7, "color": "0.45"}
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#8B4513")  # Okabe and Ito's, and brown.
 _MARKERS = "os^vDP"
 _AXES = {"evaluation": "one evaluation / ms", "factorisation": "one factorisation / ms"}
@@ -44,6 +43,8 @@ _GREY: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 0}
 _STYLE: dict[Any, Any] = {"font.size": 8.5, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 3.5}
 _N_COLUMNS = 3
 _STROKES = f"solid: {RULE.penalty:g} E/h, dashed: the best penalty,\ndotted: the best linear pressure, grey: others"
+ROOM = 0.1  # The least distance of two names, over the height of a panel.
+_BESIDE = 1.04  # The place of names, over the width of a panel.
 
 
 def plot_bench(results: BenchResults, folder: Path) -> None:
@@ -68,49 +69,51 @@ def highlights(results: BenchResults) -> dict[str, dict[str, Any]]:
     }
 
 
-def _label_plainly(axis: Axis) -> None:
+def _panels(size: tuple[float, float], rows: int, columns: int, **options: Any) -> tuple[Figure, Any]:
+    """Return a figure and its panels (rows, columns), with a faint grid."""
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes in panels.flat:
+        axes.grid(color="0.93", linewidth=0.5)
+    return figure, panels
+
+
+def _label_plainly(*every: Any) -> None:
     """Write the numbers of a logarithmic axis at 1, 2 and 5 of each power of ten where there is room, else at 1."""
-    low, high = axis.get_view_interval()
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60 * low else (1.0,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-    axis.set_minor_locator(NullLocator())
+    for axis in every:
+        low, high = axis.get_view_interval()
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60 * low else (1.0,)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+        axis.set_minor_locator(NullLocator())
 
 
+@matplotlib.rc_context(_STYLE)
 def make_scene_figure(results: BenchResults, scene: str) -> Figure:
     """Return the three errors of a scene, each against one evaluation and against one factorisation."""
     pens = highlights(results)
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(5.2, 6.6), layout="constrained")
-        panels = figure.subplots(len(ERRORS), len(_AXES), sharex="col", sharey="row")
-        for row, kind in zip(panels, ERRORS, strict=True):
-            for axes, number in zip(row, _AXES, strict=True):
-                axes.set(xscale="log", yscale="log")
-                for name in sorted(results.formulations, key=lambda name: name in pens):
-                    _plot_curve(axes, results, scene, (name, kind, number), pens.get(name))
-                axes.grid(color="0.93", linewidth=0.5)
-            row[0].set_ylabel(f"error of the {kind}")
-        _plot_best_pressure(panels[list(ERRORS).index("pressure")], results, scene)
-        for axes, label in zip(panels[-1], _AXES.values(), strict=True):
-            axes.set_xlabel(label)
-        for axes in panels.reshape(-1):
-            _label_plainly(axes.xaxis)
-            _label_plainly(axes.yaxis)
-        figure.draw_without_rendering()  # Labels stand where the layout has put the panels.
-        for axes in panels[:, -1]:
-            _name_curves(axes, {pen["color"]: name for name, pen in pens.items()})
-        figure.suptitle(_STROKES, fontsize=8, color="0.3")
-    return figure
-
-
-def _plot_best_pressure(panels: Sequence[Axes], results: BenchResults, scene: str) -> None:
-    """Draw what the mesh allows pressures, at the times of the reference."""
+    figure, panels = _panels((5.2, 6.6), len(ERRORS), len(_AXES), sharex="col", sharey="row")
+    for row, kind in zip(panels, ERRORS, strict=True):
+        for axes, number in zip(row, _AXES, strict=True):
+            axes.set(xscale="log", yscale="log")
+            for name in sorted(results.formulations, key=lambda name: name in pens):
+                _plot_curve(axes, results, scene, (name, kind, number), pens.get(name))
+        row[0].set_ylabel(f"error of the {kind}")
     best = np.median(results.best_pressure[results.ladders(scene)], axis=0)
-    if REFERENCE not in results.formulations or not (best > ROUNDOFF).all():  # Uniform pressures have no error.
-        return
-    for axes, number in zip(panels, _AXES, strict=True):
-        x, _ = curve(results, REFERENCE, scene, "pressure", number)
-        axes.plot(1e3 * x, best, color="0.45", linewidth=1.0, linestyle=":", zorder=1)
+    if REFERENCE in results.formulations and (best > ROUNDOFF).all():  # Uniform pressures have no error.
+        # What the mesh allows pressures, at the times of the reference.
+        for axes, number in zip(panels[list(ERRORS).index("pressure")], _AXES, strict=True):
+            x, _ = curve(results, REFERENCE, scene, "pressure", number)
+            axes.plot(1e3 * x, best, color="0.45", linewidth=1.0, linestyle=":", zorder=1)
+    for axes, label in zip(panels[-1], _AXES.values(), strict=True):
+        axes.set_xlabel(label)
+    for axes in panels.flat:
+        _label_plainly(axes.xaxis, axes.yaxis)
+    figure.draw_without_rendering()  # Labels stand where the layout has put the panels.
+    for axes in panels[:, -1]:
+        _name_curves(axes, {pen["color"]: name for name, pen in pens.items()})
+    figure.suptitle(_STROKES, fontsize=8, color="0.3")
+    return figure
 
 
 def _plot_curve(
@@ -129,68 +132,57 @@ def _plot_curve(
     axes.plot(1e3 * x[finite], best[finite], color=pen["color"], linewidth=0.8, linestyle="--")
 
 
+@matplotlib.rc_context(_STYLE)
 def make_each_figure(results: BenchResults, scene: str) -> Figure:
     """Return the error of the forces against one evaluation, a panel for each formulation, the reference in each."""
-    with matplotlib.rc_context(_STYLE):
-        n_rows = ceil(len(results.formulations) / _N_COLUMNS)
-        figure = Figure(figsize=(5.0, 0.7 + 1.25 * n_rows), layout="constrained")
-        panels = figure.subplots(n_rows, _N_COLUMNS, squeeze=False, sharex=True, sharey=True).reshape(-1)
-        for axes, name in zip(panels, results.formulations, strict=False):
-            axes.set(xscale="log", yscale="log")
-            if REFERENCE in results.formulations:
-                _plot_curve(axes, results, scene, (REFERENCE, "forces", "evaluation"), None)
-            _plot_curve(axes, results, scene, (name, "forces", "evaluation"), {"color": "#C2410C", "marker": "o"})
-            axes.set_title(name, fontsize=8, pad=2)
-            axes.grid(color="0.93", linewidth=0.5)
-        for axis in (panels[0].xaxis, panels[0].yaxis):
-            _label_plainly(axis)
-        for axes in panels[len(results.formulations) :]:
-            axes.set_visible(False)
-        figure.supxlabel(f"one evaluation / ms; grey: {REFERENCE}, dashed: best penalty", fontsize=8)
-        figure.supylabel("error of the forces", fontsize=8)
+    n_rows = ceil(len(results.formulations) / _N_COLUMNS)
+    figure, grid = _panels((5.0, 0.7 + 1.25 * n_rows), n_rows, _N_COLUMNS, sharex=True, sharey=True)
+    panels = grid.reshape(-1)
+    for axes, name in zip(panels, results.formulations, strict=False):
+        axes.set(xscale="log", yscale="log")
+        if REFERENCE in results.formulations:
+            _plot_curve(axes, results, scene, (REFERENCE, "forces", "evaluation"), None)
+        _plot_curve(axes, results, scene, (name, "forces", "evaluation"), {"color": "#C2410C", "marker": "o"})
+        axes.set_title(name, fontsize=8, pad=2)
+    _label_plainly(panels[0].xaxis, panels[0].yaxis)
+    for axes in panels[len(results.formulations) :]:
+        axes.set_visible(False)
+    figure.supxlabel(f"one evaluation / ms; grey: {REFERENCE}, dashed: best penalty", fontsize=8)
+    figure.supylabel("error of the forces", fontsize=8)
     return figure
 
 
+@matplotlib.rc_context(_STYLE)
 def make_cost_figure(results: BenchResults) -> Figure:
     """Return what two errors on the first scene cost: ratios of evaluation and factorisation, and linear systems."""
     scene = results.scenes[0]
     targets = results.targets[scene][:2]
     order, costs = rank(results, scene)[::-1], [costs_at(results, scene, target) for target in targets]
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(5.2, 1.3 + 0.22 * len(order)), layout="constrained")
-        panels = figure.subplots(1, 3, sharey=True)
-        for target, each, colour, marker in zip(targets, costs, _COLOURS, _MARKERS, strict=False):
-            for axes, number in zip(panels[[0, 2]], _AXES, strict=True):
-                _plot_ratios(axes, results, (scene, target, number), order, {"color": colour, "marker": marker})
-            counts = [each[name].middle("systems") for name in order]
-            finite = [(count, place) for place, count in enumerate(counts) if count < inf]
-            panels[1].plot(*zip(*finite, strict=True), color=colour, marker=marker, linestyle="none", mfc="none")
-        for place, name in enumerate(order):
-            if not any(cost[name].is_usual for cost in costs):
-                panels[1].text(0.5, place, "never there", transform=panels[1].get_yaxis_transform(), **_NEVER)
-        panels[1].xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
-        panels[1].set_xlim(left=0)
-        titles = (f"one evaluation,\n{REFERENCE} = 1", "linear systems", f"one factorisation,\n{REFERENCE} = 1")
-        for axes, title in zip(panels, titles, strict=True):
-            axes.set_title(title)
-            axes.grid(color="0.93", linewidth=0.5)
-        panels[0].set_yticks(range(len(order)), order, parse_math=False)
-        panels[0].set_ylim(-0.6, len(order) - 0.4)
-        handles = [
-            Line2D(
-                [], [], color=colour, marker=marker, mfc="none", linestyle="none", label=f"error of {format_share(t)}"
-            )
-            for t, colour, marker in zip(targets, _COLOURS, _MARKERS, strict=False)
-        ]
-        figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
+    figure, grid = _panels((5.2, 1.3 + 0.22 * len(order)), 1, 3, sharey=True)
+    (evaluation, systems, factorisation), handles = grid[0], []
+    for target, each, colour, marker in zip(targets, costs, _COLOURS, _MARKERS, strict=False):
+        for axes, number in zip((evaluation, factorisation), _AXES, strict=True):
+            _plot_ratios(axes, ratios_at(results, scene, target, number), order, {"color": colour, "marker": marker})
+        finite = [(count, place) for place, name in enumerate(order) if (count := each[name].middle("systems")) < inf]
+        look: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "mfc": "none"}
+        systems.plot(*zip(*finite, strict=True), **look)
+        handles.append(Line2D([], [], label=f"error of {format_share(target)}", **look))
+    for place, name in enumerate(order):
+        if not any(cost[name].is_usual for cost in costs):
+            never: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7, "color": "0.45"}
+            systems.text(0.5, place, "never there", transform=systems.get_yaxis_transform(), **never)
+    systems.xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
+    systems.set_xlim(left=0)
+    evaluation.set_title(f"one evaluation,\n{REFERENCE} = 1")
+    systems.set_title("linear systems")
+    factorisation.set_title(f"one factorisation,\n{REFERENCE} = 1")
+    evaluation.set_yticks(range(len(order)), order, parse_math=False)
+    evaluation.set_ylim(-0.6, len(order) - 0.4)
+    figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 
-def _plot_ratios(
-    axes: Axes, results: BenchResults, place: tuple[str, float, str], order: list[str], pen: dict[str, Any]
-) -> None:
-    """Draw the ratios of a scene, target and number with their intervals."""
-    ratios = ratios_at(results, *place)
+def _plot_ratios(axes: Axes, ratios: Mapping[str, Ratio], order: list[str], pen: dict[str, Any]) -> None:
     axes.set_xscale("log")
     axes.axvline(1.0, color="0.35", linewidth=0.8)
     for height, name in enumerate(order):
@@ -205,60 +197,53 @@ def _plot_ratios(
     _label_plainly(axes.xaxis)
 
 
+@matplotlib.rc_context(_STYLE)
 def make_runtime_figure(results: BenchResults) -> Figure:
     """Return the share of targets and instances that are reached within all evaluations, or factorisations, so long."""
-    scenes = results.scenes
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(4.6, 1.3 + 1.5 * len(scenes)), layout="constrained")
-        panels = figure.subplots(len(scenes), 2, squeeze=False, sharey=True)
-        pens = highlights(results)
-        for row, scene in zip(panels, scenes, strict=True):
-            for axes, number in zip(row, _AXES, strict=True):
-                axes.set(xscale="log", ylim=(-0.03, 1.03))
-                for name in sorted(results.formulations, key=lambda name: name in pens):
-                    seconds = np.sort(1e3 * runtimes(results, name, scene, number))
-                    finite = seconds[np.isfinite(seconds)]
-                    pen = {"color": pens[name]["color"], "linewidth": 1.2} if name in pens else _GREY
-                    axes.step(finite, np.arange(1, len(finite) + 1) / len(seconds), where="post", **pen)
-                axes.grid(color="0.93", linewidth=0.5)
-                _label_plainly(axes.xaxis)
-            row[0].set_ylabel(scene)
-        for axes, label in zip(panels[-1], ("all evaluations / ms", "all factorisations / ms"), strict=True):
-            axes.set_xlabel(label)
-        figure.supylabel("share of errors and instances that are reached", fontsize=8.5)
-        handles = [Line2D([], [], label=name, color=pen["color"]) for name, pen in pens.items()]
-        if len(pens) < len(results.formulations):
-            handles.append(Line2D([], [], label="others", **_GREY))
-        figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
+    scenes, pens = results.scenes, highlights(results)
+    figure, panels = _panels((4.6, 1.3 + 1.5 * len(scenes)), len(scenes), 2, sharey=True)
+    for row, scene in zip(panels, scenes, strict=True):
+        for axes, number in zip(row, _AXES, strict=True):
+            axes.set(xscale="log", ylim=(-0.03, 1.03))
+            for name in sorted(results.formulations, key=lambda name: name in pens):
+                seconds = np.sort(1e3 * runtimes(results, name, scene, number))
+                finite = seconds[np.isfinite(seconds)]
+                pen = {"color": pens[name]["color"], "linewidth": 1.2} if name in pens else _GREY
+                axes.step(finite, np.arange(1, len(finite) + 1) / len(seconds), where="post", **pen)
+            _label_plainly(axes.xaxis)
+        row[0].set_ylabel(scene)
+    for axes, label in zip(panels[-1], ("all evaluations / ms", "all factorisations / ms"), strict=True):
+        axes.set_xlabel(label)
+    figure.supylabel("share of errors and instances that are reached", fontsize=8.5)
+    handles = [Line2D([], [], label=name, color=pen["color"]) for name, pen in pens.items()]
+    if len(pens) < len(results.formulations):
+        handles.append(Line2D([], [], label="others", **_GREY))
+    figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
     return figure
 
 
+@matplotlib.rc_context(_STYLE)
 def make_starts_figure(results: BenchResults) -> Figure:
     """Return a table of who fails from the deepest start: linear systems, and the share without a solution, shaded."""
     variant = VARIANTS.index(DEEPEST)
     names, scenes = results.formulations, results.scenes
     cells = [results.ladders(scene).reshape(-1) for scene in scenes]
     failed = np.stack([(results.outcomes[:, places, variant] != 0).mean(axis=1) for places in cells], axis=1)
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(1.6 + 0.9 * len(scenes), 0.6 + 0.24 * len(names)), layout="constrained")
-        axes = figure.subplots()
-        axes.pcolormesh(np.where(failed > 0, failed, np.nan), cmap="Reds", vmin=0.0, vmax=1.6)
-        axes.invert_yaxis()
-        for (row, column), share in np.ndenumerate(failed):
-            counts = results.counts_of(names[row], "iterations")[cells[column], variant]
-            solved = counts[results.outcomes[row, cells[column], variant] == 0]
-            words = [f"{np.median(solved):g}"] if len(solved) else []
-            words += [f"{share:.0%} fail"] if share else []
-            axes.text(column + 0.5, row + 0.5, ", ".join(words), ha="center", va="center", fontsize=7.5)
-        axes.set_xticks(np.arange(len(scenes)) + 0.5, scenes, parse_math=False)
-        axes.xaxis.tick_top()
-        axes.set_yticks(np.arange(len(names)) + 0.5, names, parse_math=False)
-        axes.tick_params(length=0)
+    figure = Figure(figsize=(1.6 + 0.9 * len(scenes), 0.6 + 0.24 * len(names)), layout="constrained")
+    axes = figure.subplots()
+    axes.pcolormesh(np.where(failed > 0, failed, np.nan), cmap="Reds", vmin=0.0, vmax=1.6)
+    axes.invert_yaxis()
+    for (row, column), share in np.ndenumerate(failed):
+        counts = results.counts_of(names[row], "iterations")[cells[column], variant]
+        solved = counts[results.outcomes[row, cells[column], variant] == 0]
+        words = [f"{np.median(solved):g}"] if len(solved) else []
+        words += [f"{share:.0%} fail"] if share else []
+        axes.text(column + 0.5, row + 0.5, ", ".join(words), ha="center", va="center", fontsize=7.5)
+    axes.set_xticks(np.arange(len(scenes)) + 0.5, scenes, parse_math=False)
+    axes.xaxis.tick_top()
+    axes.set_yticks(np.arange(len(names)) + 0.5, names, parse_math=False)
+    axes.tick_params(length=0)
     return figure
-
-
-ROOM = 0.1  # The least distance of two names, over the height of a panel.
-_BESIDE = 1.04  # The place of names, over the width of a panel.
 
 
 def _name_curves(axes: Axes, names: Mapping[str, str]) -> None:
@@ -277,17 +262,10 @@ def _name_curves(axes: Axes, names: Mapping[str, str]) -> None:
     colours = sorted(heights, key=lambda colour: heights[colour])
     for colour, height in zip(colours, spread([heights[colour] for colour in colours]), strict=True):
         x, y = ends[colour][0].tolist()
-        axes.annotate(
-            names[colour],
-            (x, y),
-            (_BESIDE, height),
-            textcoords="axes fraction",
-            color=colour,
-            fontsize=7,
-            va="center",
-            parse_math=False,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 2},
-        )
+        look: dict[str, Any] = {"color": colour, "fontsize": 7, "va": "center", "parse_math": False}
+        arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 2}
+        place = (_BESIDE, height)
+        axes.annotate(names[colour], (x, y), place, textcoords="axes fraction", arrowprops=arrow, **look)
 
 
 def spread(heights: Sequence[float]) -> list[float]:

@@ -101,10 +101,17 @@ def make_case_figure(
         labels = [format_number(length, course.roundoff / unit) for length in (its_lengths / unit).tolist()]
         _plot_surface(axes, surface, positions, labels, pen, body=_BODY * size, side=side)
     _plot_arrows(axes, positions, forces, exact, longest=_ARROW * size)
-    axes.set(xlabel=f"x / {unit_name}" if unit_name else "x", ylabel=f"y / {unit_name}" if unit_name else "y")
+    axes.set(**{f"{axis}label": f"{axis} / {unit_name}" if unit_name else axis for axis in "xy"})
     axes.margins(0.05)
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
-    notes = [_gap_note(gaps, course.roundoff) + change]
+    facing = gaps.gap[gaps.facing]
+    if not len(facing):
+        notes = [f"no slave node faces the master{change}"]
+    elif gaps.uniform(course.roundoff):
+        notes = [f"gap {format_number(float(facing.mean()), course.roundoff)}{change}"]
+    else:
+        ends = (format_number(end, course.roundoff) for end in (facing.min(), facing.max()))
+        notes = [f"gap {' to '.join(ends)}{change}"]
     shortest = min(float(its_lengths.min()) for its_lengths in lengths) / unit
     if shortest < _SHORT * size:
         notes.append(f"shortest segment {format_number(shortest, course.roundoff / unit)}")
@@ -141,15 +148,6 @@ def _positions_to_draw(case: Case, gaps: Gaps, roundoff: float, with_forces: boo
     return positions, change
 
 
-def _gap_note(gaps: Gaps, roundoff: float) -> str:
-    facing_gaps = gaps.gap[gaps.facing]
-    if not len(facing_gaps):
-        return "no slave node faces the master"
-    if gaps.uniform(roundoff):
-        return f"gap {format_number(float(facing_gaps.mean()), roundoff)}"
-    return f"gap {format_number(facing_gaps.min(), roundoff)} to {format_number(facing_gaps.max(), roundoff)}"
-
-
 def save(figure: Figure, target: Path) -> None:
     """Write a figure to a file; the same figure gives the same bytes, without a date or random ids."""
     suffix = target.suffix.lower()
@@ -172,10 +170,6 @@ class Pen:
     fill: str
     hatch: str
 
-    def marks(self, size: float) -> dict[str, Any]:
-        """Return the arguments of a plot that draws nodes of that size in points."""
-        return {"color": self.color, "marker": self.marker, "markerfacecolor": self.fill, "markersize": size}
-
 
 SLAVE = Pen("slave", "black", "solid", "o", "black", "///")
 MASTER = Pen("master", "0.4", "dashed", "s", "white", "\\\\\\")
@@ -195,22 +189,18 @@ def _plot_surface(
 
     `side` is 1 for labels and node numbers on the side of the body, −1 for the other side.
     """
-    ends = nodes[surface.segments]  # (n_segments, 2, 2)
     lefts = _lefts(surface, nodes)
-    inside = (nodes + body * lefts)[surface.segments]
-    strips = np.concatenate([ends, inside[:, ::-1]], axis=1)  # (n_segments, 4, 2)
-    axes.add_collection(
-        PolyCollection(list(strips), facecolor="none", edgecolor="0.82", linewidth=0, hatch=pen.hatch, zorder=1)
-    )
-    axes.add_collection(LineCollection(list(ends), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3))
+    hatch(axes, nodes[surface.segments], (nodes + body * lefts)[surface.segments], "0.82", pen.hatch)
     few = len(surface.nodes) <= _NUMBERED
-    marks = pen.marks(5.5 if few else 3)
-    axes.plot(*nodes[surface.nodes].T, linestyle="none", zorder=4, **marks)
-    axes.plot([], [], linestyle=pen.style, label=f"{pen.name} (body hatched {pen.hatch[0]})", **marks)
+    label = f"{pen.name} (body hatched {pen.hatch[0]})"
+    _plot_side(axes, surface.segments, nodes, pen, 5.5 if few else 3, label)
     size = float(np.ptp(nodes, axis=0).max())
-    for node in _spread(surface, nodes, size):
-        style: dict[str, Any] = {"fontsize": 8 if few else 6, "color": pen.color, "zorder": 5}
-        _write(axes, str(node), nodes[node], 11 * side * lefts[node], **style)
+    numbered: list[int] = []  # About twenty nodes at most, none on top of the one before.
+    for node in surface.nodes.tolist()[:: -(-len(surface.nodes) // _NUMBERED)]:
+        if not numbered or np.linalg.norm(nodes[node] - nodes[numbered[-1]]) > _ROOM / 2 * size:
+            numbered.append(node)
+            style: dict[str, Any] = {"fontsize": 8 if few else 6, "color": pen.color, "zorder": 5}
+            _write(axes, str(node), nodes[node], 11 * side * lefts[node], **style)
     if len(surface) > _LABELLED:
         return
     for (first, second), label in zip(surface.segments.tolist(), labels, strict=True):
@@ -218,6 +208,25 @@ def _plot_surface(
             offset = 9 * side * (lefts[first] + lefts[second]) / 2
             style = {"fontsize": 7, "style": "italic", "color": "0.35", "zorder": 4.5}
             _write(axes, label, (nodes[first] + nodes[second]) / 2, offset, **style)
+
+
+def hatch(axes: Axes, ends: FloatArray, inside: FloatArray, color: str, pattern: str) -> FloatArray:
+    """Hatch strips (n, 4, 2) between segments and their copies inside a body, (n, 2, 2) each; return the strips."""
+    strips = np.concatenate([ends, inside[:, ::-1]], axis=1)
+    axes.add_collection(
+        PolyCollection(list(strips), facecolor="none", edgecolor=color, linewidth=0, hatch=pattern, zorder=1)
+    )
+    return strips
+
+
+def _plot_side(axes: Axes, edges: IntArray, nodes: FloatArray, pen: Pen, size: float, label: str) -> None:
+    """Draw segments (n, 2) with their nodes, whose markers are `size` points wide, and an entry of the legend."""
+    look: dict[str, Any] = {"color": pen.color, "marker": pen.marker, "markerfacecolor": pen.fill, "markersize": size}
+    axes.add_collection(
+        LineCollection(list(nodes[edges]), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3)
+    )
+    axes.plot(*nodes[np.unique(edges)].T, linestyle="none", zorder=4, **look)
+    axes.plot([], [], linestyle=pen.style, label=label, **look)
 
 
 def _plot_arrows(
@@ -260,26 +269,9 @@ def _size_in_words(size: float, exact: float, slack: float) -> str:
 
 def _write(axes: Axes, words: str, place: FloatArray, offset: FloatArray, **style: Any) -> None:
     """Write words beside a place; `offset` is in points."""
-    axes.annotate(
-        words,
-        (float(place[0]), float(place[1])),
-        xytext=(float(offset[0]), float(offset[1])),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
-        **style,
-    )
-
-
-def _spread(surface: Surface, nodes: FloatArray, size: float) -> list[int]:
-    """Return the nodes that get their numbers: about twenty at most, none on top of the one before."""
-    numbered: list[int] = []
-    numbers = surface.nodes.tolist()
-    for node in numbers[:: -(-len(numbers) // _NUMBERED)]:
-        if not numbered or np.linalg.norm(nodes[node] - nodes[numbered[-1]]) > _ROOM / 2 * size:
-            numbered.append(node)
-    return numbered
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}
+    at, moved = ((float(x), float(y)) for x, y in (place, offset))
+    axes.annotate(words, at, moved, textcoords="offset points", ha="center", va="center", bbox=box, **style)
 
 
 def _lefts(surface: Surface, nodes: FloatArray) -> FloatArray:
@@ -297,9 +289,12 @@ def _lefts(surface: Surface, nodes: FloatArray) -> FloatArray:
 def _surface_figure(
     case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float
 ) -> Figure:
-    """Return the figure: the slave on the left and the master on the right, in one scale and one view."""
     places, stretch = widen(view_from_above(case))
-    errors = _node_errors(case, forces, exact)
+    errors = None  # (n_nodes,) The error of each nodal force over the largest exact one, if both are known.
+    if forces is not None and exact is not None:
+        difference = (forces - exact).reshape(case.interface.nodes.shape)
+        largest = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
+        errors = np.linalg.norm(difference, axis=1) / (largest or 1.0)
     figure = Figure(figsize=(width, width / 2 + 1.2), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     interface = case.interface
@@ -315,22 +310,15 @@ def _surface_figure(
         axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors="0.8", linewidths=0.5, zorder=0))
         axes.autoscale_view()
     lines = [surfaces_headline(case) + (f", drawn {format_number(stretch)} times wider across" if stretch > 1 else "")]
-    lines += _force_notes(forces, errors)
+    if forces is not None:
+        lines.append(
+            "at the nodes: number, force" + (" and, where it differs, exact force" if errors is not None else "")
+        )
+    if errors is not None:
+        share = f"up to {errors.max():.3g} of the largest exact force" if np.isfinite(errors).all() else "not finite"
+        lines.append(f"shade: error of the nodal forces, {share}")
     figure.suptitle("\n".join([*textwrap.wrap(title, 92), *lines]), fontsize=9, x=0.02, ha="left", parse_math=False)
     return figure
-
-
-def _force_notes(forces: FloatArray | None, errors: FloatArray | None) -> list[str]:
-    """Say what the numbers at the nodes and the shades of the faces are."""
-    if forces is None:
-        return []
-    if errors is None:
-        return ["at the nodes: number, force"]
-    largest = f"up to {errors.max():.3g} of the largest exact force" if np.isfinite(errors).all() else "not finite"
-    return [
-        "at the nodes: number, force and, where it differs, exact force",
-        f"shade: error of the nodal forces, {largest}",
-    ]
 
 
 def view_from_above(case: Case) -> FloatArray:
@@ -356,16 +344,6 @@ def widen(places: FloatArray) -> tuple[FloatArray, float]:
     return (places @ axes.T) * [1.0, factor], factor
 
 
-def _node_errors(case: Case, forces: FloatArray | None, exact: FloatArray | None) -> FloatArray | None:
-    """Return the error (n_nodes,) of each nodal force over the largest exact one, if both are known."""
-    if forces is None or exact is None:
-        return None
-    difference = (forces - exact).reshape(case.interface.nodes.shape)
-    largest = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
-    errors: FloatArray = np.linalg.norm(difference, axis=1) / (largest or 1.0)
-    return errors
-
-
 def _force_labels(surface: Surface, forces: FloatArray | None, exact: FloatArray | None) -> dict[int, str]:
     """Return {node: its number, its force, and the exact one if that differs}; numbers alone for a large surface."""
     if forces is None or len(surface.nodes) > _MEASURED:
@@ -384,7 +362,6 @@ def _force_labels(surface: Surface, forces: FloatArray | None, exact: FloatArray
 def _plot_faces(
     axes: Axes, surface: Surface, places: FloatArray, errors: FloatArray | None, labels: dict[int, str]
 ) -> None:
-    """Draw the faces of a surface with their numbers, shaded by the errors (n_nodes,) at corners, and its nodes."""
     collection = PolyCollection(list(places[surface.faces]), facecolors="white", edgecolors="black", linewidths=0.8)
     if errors is not None and np.isfinite(errors).all():
         collection.set_array(errors[surface.faces].max(axis=1))
@@ -400,16 +377,10 @@ def _plot_faces(
     for node, label in labels.items():
         axes.plot(*places[node], "o", markersize=2.5, color="black")
         right, upper = (places[node] >= middle).tolist()
-        axes.annotate(
-            label,
-            places[node],
-            (0, 3 if upper else -3),
-            textcoords="offset points",
-            ha="right" if right else "left",
-            va="bottom" if upper else "top",
-            fontsize=7,
-            fontweight="bold",
-        )
+        aligned: dict[str, Any] = {"ha": "right" if right else "left", "va": "bottom" if upper else "top"}
+        offset = (0, 3 if upper else -3)
+        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "fontweight": "bold"}
+        axes.annotate(label, places[node], offset, **aligned, **style)
 
 
 def make_mesh_figure(
@@ -439,7 +410,11 @@ def make_outline_figure(case: Case, width: float) -> Figure:
     first = packed["axis"][of_body]  # (n_nodes, 2)
     second = np.column_stack([-first[:, 1], first[:, 0]])
     rigid = ~np.isin(of_body, of_body[cells[cells >= 0]])  # (n_nodes,); a triangle has −1 for a fourth corner
-    _plot_body_surfaces(axes, packed["contact"].astype(np.int64), nodes, is_slave, rigid)
+    contact = packed["contact"].astype(np.int64)
+    for pen, side in ((MASTER, False), (SLAVE, True)):
+        edges = contact[is_slave[contact[:, 0]] == side]
+        label = pen.name + " (rigid)" * bool(rigid[edges].all())
+        _plot_side(axes, edges, nodes, pen, 4.5 if len(edges) <= 30 else 2, label)
     fixed = (packed["fixed"] != 0) & ~rigid[:, None]
     bars: list[FloatArray] = []  # A short one across each direction in which a node is fixed.
     for component, across in ((0, second), (1, first)):
@@ -449,35 +424,17 @@ def make_outline_figure(case: Case, width: float) -> Figure:
         axes.add_collection(LineCollection(bars, colors="black", linewidths=2.2, zorder=5))
         axes.plot([], [], color="black", linewidth=2.2, label="support")
     loads = packed["load"][:, :1] * first + packed["load"][:, 1:] * second
-    _plot_loads(axes, nodes, loads, _LOAD * size)
+    sizes = np.linalg.norm(loads, axis=1)
+    if sizes.max(initial=0.0) > 0:  # Arrows end at the nodes.
+        arrows, at = loads[sizes > 0] * (_LOAD * size / sizes.max()), nodes[sizes > 0]
+        look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.004, "zorder": 6}
+        axes.quiver(*(at - arrows).T, *arrows.T, color="0.25", **look)
+        axes.plot(*(at - arrows).T, linestyle="none")
+        axes.plot([], [], marker=r"$\downarrow$", linestyle="none", color="0.25", label="load")
     axes.set(xlabel="x", ylabel="y")
     axes.margins(0.06)
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure
-
-
-def _plot_body_surfaces(axes: Axes, contact: IntArray, nodes: FloatArray, is_slave: Any, rigid: Any) -> None:
-    for pen, side in ((MASTER, False), (SLAVE, True)):
-        edges = contact[is_slave[contact[:, 0]] == side]
-        look = pen.marks(4.5 if len(edges) <= 30 else 2)
-        axes.add_collection(
-            LineCollection(list(nodes[edges]), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3)
-        )
-        axes.plot(*nodes[np.unique(edges)].T, linestyle="none", zorder=4, **look)
-        axes.plot([], [], linestyle=pen.style, label=pen.name + " (rigid)" * bool(rigid[edges].all()), **look)
-
-
-def _plot_loads(axes: Axes, nodes: FloatArray, loads: FloatArray, longest: float) -> None:
-    """Draw arrows that end at the nodes."""
-    sizes = np.linalg.norm(loads, axis=1)
-    if not sizes.max(initial=0.0) > 0:
-        return
-    arrows, at = loads[sizes > 0] * (longest / sizes.max()), nodes[sizes > 0]
-    axes.quiver(
-        *(at - arrows).T, *arrows.T, angles="xy", scale_units="xy", scale=1, width=0.004, color="0.25", zorder=6
-    )
-    axes.plot(*(at - arrows).T, linestyle="none")
-    axes.plot([], [], marker=r"$\downarrow$", linestyle="none", color="0.25", label="load")
 
 
 def save_plainly(figure: Figure, target: Any, **options: Any) -> None:

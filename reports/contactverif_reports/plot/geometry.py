@@ -6,7 +6,6 @@ Rule: a drawing may be rough where a judge may not; nothing here is used for a v
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -15,6 +14,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Surface
+from contactverif_reports.tables import decimal
 
 NEARLY_FLAT = 0.05  # A surface is drawn as a straight line if its rise is at most this share of its length.
 
@@ -118,7 +118,7 @@ def format_number(value: float, slack: float = 0.0, digits: int = 4) -> str:
         return "–"
     slack = min(slack, 1e-6 * abs(value))
     texts = [text for text, number in _candidates(value, digits) if abs(number - value) <= slack]
-    return min(texts, key=len, default=_decimal(value, digits))
+    return min(texts, key=len, default=decimal(value, digits))
 
 
 def one_digit(value: float) -> float:
@@ -137,12 +137,11 @@ def unit_of(lengths: FloatArray) -> tuple[float, str]:
 
 
 def _candidates(value: float, digits: int) -> list[tuple[str, float]]:
-    """Return short texts near a number, each with the number that it says."""
     candidates = []
     if abs(value) < 1e6:
         fraction = Fraction(value).limit_denominator(_LARGEST_DENOMINATOR)
         candidates += [(f"{round(value)}", float(round(value))), (str(fraction), float(fraction))]
-    candidates += [(text, float(text)) for text in (_decimal(value, count) for count in range(1, digits + 1))]
+    candidates += [(text, float(text)) for text in (decimal(value, count) for count in range(1, digits + 1))]
     if value:
         significand, exponent = math.frexp(value)
         odd, power = round(significand * 1024), exponent - 10
@@ -150,17 +149,6 @@ def _candidates(value: float, digits: int) -> list[tuple[str, float]]:
             odd, power = odd // 2, power + 1
         if abs(power) > 3:
             times = {1: "", -1: "-"}.get(odd, f"{odd}·")
-            candidates += [(f"{times}2^{power}", _times(odd, power))]
+            with np.errstate(over="ignore"):
+                candidates += [(f"{times}2^{power}", float(np.ldexp(float(odd), power)))]
     return candidates
-
-
-def _decimal(value: float, digits: int) -> str:
-    """Return a number with so many digits, and a plain exponent: 1e-5, 1e6."""
-    return re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), f"{value:.{digits}g}")
-
-
-def _times(odd: int, power: int) -> float:
-    try:
-        return math.ldexp(odd, power)
-    except OverflowError:
-        return math.inf

@@ -24,7 +24,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif_reports.files import checked_name
-from contactverif_reports.plot.case_figures import SUFFIXES, save
+from contactverif_reports.plot.case_figures import SUFFIXES, hatch, save
 from contactverif_reports.plot.geometry import Gaps, format_number, one_digit
 from contactverif_reports.plot.solved_scene import Solution, SolvedScene, pressures_across
 
@@ -108,7 +108,6 @@ def _plot_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "mas
 
 
 def _plot_history(axes: Axes, solved: SolvedScene, quantity: Literal["residuals", "energies"]) -> None:
-    """Draw a norm against the iterates of Newton's method, for each formulation."""
     for number, solution in enumerate(solved.solutions):
         values = getattr(solution, quantity)
         floors = solution.floors if quantity == "residuals" else np.full_like(values, np.finfo(float).tiny)
@@ -122,12 +121,10 @@ def _plot_history(axes: Axes, solved: SolvedScene, quantity: Literal["residuals"
     last = max(len(solution.residuals) for solution in solved.solutions) - 1
     axes.set_xlim(-0.3, max(last, 1) + 0.3)
     if quantity == "residuals":
-        axes.axhspan(
-            0, max(float(solution.floors[-1]) for solution in solved.solutions), color="0.92", zorder=0, linewidth=0
-        )
-    axes.set_ylabel(
-        {"residuals": "largest residual\n(force)", "energies": "energy of the step\n(force × length)"}[quantity]
-    )
+        floor = max(float(solution.floors[-1]) for solution in solved.solutions)
+        axes.axhspan(0, floor, color="0.92", zorder=0, linewidth=0)
+    labels = {"residuals": "largest residual\n(force)", "energies": "energy of the step\n(force × length)"}
+    axes.set_ylabel(labels[quantity])
 
 
 def _plot_points(axes: Axes, solved: SolvedScene, solution: Solution, color: str) -> None:
@@ -137,9 +134,8 @@ def _plot_points(axes: Axes, solved: SolvedScene, solution: Solution, color: str
     pressures = solution.points.pressure
     here = np.isfinite(pressures)
     known = here & np.isfinite(areas).all(axis=1)
-    axes.hlines(
-        pressures[known], areas[known].min(axis=1), areas[known].max(axis=1), color=color, linewidth=0.8, zorder=2
-    )
+    low, high = areas[known].min(axis=1), areas[known].max(axis=1)
+    axes.hlines(pressures[known], low, high, color=color, linewidth=0.8, zorder=2)
     bare = here & ~known
     axes.plot(places[bare], pressures[bare], ls="none", marker=".", ms=4, color=color, zorder=2)
 
@@ -186,7 +182,14 @@ def _plot_meshes(figure: SubFigure, solved: SolvedScene, rows: int, across: int)
     panels = figure.subplots(rows, across, squeeze=False, sharex=box is None, sharey=box is None)
     if box is not None:
         whole = panels.ravel()[0]
-        _plot_overview(whole, solved, box)
+        for body in solved.bodies:
+            cells = list(body.nodes[body.cells])
+            whole.add_collection(PolyCollection(cells, facecolor="none", edgecolor="0.35", linewidth=0.15, zorder=2))
+        size = np.ptp(box, axis=0).tolist()
+        whole.add_patch(Rectangle(box[0].tolist(), *size, fill=False, linewidth=1.2, zorder=3))
+        whole.set_aspect("equal", adjustable="box")
+        whole.margins(0.04)
+        whole.autoscale_view()
         whole.set_title("all of the meshes; the frame\nis drawn on the right")
         _bare(whole, alone=True)
     from_near = panels.ravel()[int(box is not None) :]
@@ -216,16 +219,14 @@ def _plot_curves(figure: SubFigure, solved: SolvedScene) -> None:
         end = f"{solution.formulation}: {solution.end}{' after' if solution.converged else ','} {times}"
         handles.append(Line2D([], [], label=end, **choose_pen(number).look(1)))
     if any(solution.points is not None for solution in solved.solutions):
-        handles.append(
-            Line2D([], [], color="0.3", linewidth=0.8, marker=".", label="pressure at contact points, over their areas")
-        )
+        label = "pressure at contact points, over their areas"
+        handles.append(Line2D([], [], color="0.3", linewidth=0.8, marker=".", label=label))
     if solved.pressures:
         exact = " and ".join(map(format_number, solved.pressures))  # A penalty and multipliers may have one each.
         handles.append(Line2D([], [], color="0.6", linewidth=2.2, label=f"exact pressure {exact}"))
     handles.append(Patch(color="0.92", label="roundoff of the residual"))
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=2 if len(handles) > 3 else len(handles), frameon=False
-    )
+    n_columns = 2 if len(handles) > 3 else len(handles)
+    figure.legend(handles=handles, loc="outside lower center", ncols=n_columns, frameon=False)
 
 
 def _bare(axes: Axes, *, alone: bool) -> None:
@@ -266,9 +267,7 @@ class Magnification:
 def magnifications(solved: SolvedScene) -> dict[str, Magnification]:
     """Return {formulation: magnification}, the same for all solutions that stay near, so that they can be compared."""
     near = [
-        solution
-        for solution in solved.solutions
-        if all(np.abs(u).max(initial=0.0) < solved.size for u in solution.displacements)
+        each for each in solved.solutions if all(np.abs(u).max(initial=0.0) < solved.size for u in each.displacements)
     ]
     shared = Magnification.for_solutions(solved, near) if near else Magnification(1.0, 1.0)
     return {
@@ -279,12 +278,13 @@ def magnifications(solved: SolvedScene) -> dict[str, Magnification]:
 
 def colour_scale(solved: SolvedScene) -> ScalarMappable:
     """Return a scale over the pressures of all cells of all solutions; a single exact pressure is in the middle."""
-    values = [
-        pressures_across(body, s)
-        for solution in solved.solutions
-        for body, s in zip(solved.bodies, solution.stresses, strict=True)
-    ]
-    pressures = np.concatenate(values)
+    pressures = np.concatenate(
+        [
+            pressures_across(body, s)
+            for solution in solved.solutions
+            for body, s in zip(solved.bodies, solution.stresses, strict=True)
+        ]
+    )
     pressures = pressures[np.isfinite(pressures)]
     low, high = (float(pressures.min()), float(pressures.max())) if len(pressures) else (0.0, 1.0)
     if len(solved.pressures) == 1:
@@ -300,31 +300,16 @@ def close_up(solved: SolvedScene) -> FloatArray | None:
     """Return the lower left and upper right corner (2, 2) of a square around the contact; None if it is not small."""
     if solved.course.flat:
         return None
-    touching = [
-        solution.z.reshape(-1, 2)[np.flatnonzero(_gaps(solved, solution.z).gap < 0)] for solution in solved.solutions
-    ]
-    places = np.vstack(
-        [nodes for nodes in touching if np.ptp(nodes, axis=0).max(initial=0.0) < solved.size] or touching
-    )
+    states = [(solution.z.reshape(-1, 2), _gaps(solved, solution.z).gap < 0) for solution in solved.solutions]
+    touching = [positions[np.flatnonzero(inside)] for positions, inside in states]
+    near = [nodes for nodes in touching if np.ptp(nodes, axis=0).max(initial=0.0) < solved.size]
+    places = np.vstack(near or touching)
     extent = float(np.ptp(places, axis=0).max()) if len(places) > 1 else 0.0
     if not 0 < extent < _SMALL_CONTACT * solved.size:
         return None
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
     box: FloatArray = middle + np.array([[-1.0], [1.0]]) * _AROUND * extent / 2
     return box
-
-
-def _plot_overview(axes: Axes, solved: SolvedScene, box: FloatArray) -> None:
-    """Draw all of the undeformed meshes, and a frame around the enlarged part."""
-    for body in solved.bodies:
-        axes.add_collection(
-            PolyCollection(list(body.nodes[body.cells]), facecolor="none", edgecolor="0.35", linewidth=0.15, zorder=2)
-        )
-    (left, low), (right, high) = box
-    axes.add_patch(Rectangle((left, low), right - left, high - low, fill=False, linewidth=1.2, zorder=3))
-    axes.set_aspect("equal", adjustable="box")
-    axes.margins(0.04)
-    axes.autoscale_view()
 
 
 def plot_bodies(
@@ -344,7 +329,11 @@ def plot_bodies(
         if side == "slave":
             nodes = nodes + _carry_along(solved, index, shifts)
         if body.rigid:
-            _plot_rigid(axes, body, nodes, _SUPPORT * solved.size)
+            ends = nodes[body.contact]  # (n_segments, 2, 2)
+            chords = ends[:, 1] - ends[:, 0]
+            lefts = np.column_stack([-chords[:, 1], chords[:, 0]]) / np.linalg.norm(chords, axis=1)[:, None]
+            strips = hatch(axes, ends, ends + _SUPPORT * solved.size * lefts[:, None], "0.5", "////")
+            axes.plot(*strips.reshape(-1, 2).T, linestyle="none")  # The axes reach around it.
         else:
             _plot_cells(axes, nodes[body.cells], pressures_across(body, solution.stresses[index]), scale, box)
         _plot_contact_side(axes, body, nodes, side)
@@ -372,22 +361,13 @@ def _plot_cells(
 
 
 def _plot_contact_side(axes: Axes, body: Body, nodes: FloatArray, side: str) -> None:
-    """Draw the segments and the nodes of a body that may touch: the slave solid and black, the master dashed."""
-    style = "solid" if side == "slave" else (0, (4, 1.5))
-    axes.add_collection(
-        LineCollection(list(nodes[body.contact]), colors="black", linewidths=1.3, linestyles=[style], zorder=5)
-    )
-    contact_nodes = nodes[body.contact_nodes]
-    axes.plot(
-        *contact_nodes.T,
-        ls="none",
-        marker="o" if side == "slave" else "s",
-        ms=3.6 if len(contact_nodes) <= _MANY_NODES else 1.5,
-        mfc="black" if side == "slave" else "white",
-        mec="black",
-        mew=0.8,
-        zorder=6,
-    )
+    style: Any = "solid" if side == "slave" else (0, (4, 1.5))
+    edges = list(nodes[body.contact])
+    axes.add_collection(LineCollection(edges, colors="black", linewidths=1.3, linestyles=[style], zorder=5))
+    at = nodes[body.contact_nodes]
+    look: dict[str, Any] = {"marker": "o", "mfc": "black"} if side == "slave" else {"marker": "s", "mfc": "white"}
+    size = 3.6 if len(at) <= _MANY_NODES else 1.5
+    axes.plot(*at.T, ls="none", ms=size, mec="black", mew=0.8, zorder=6, **look)
 
 
 def _gaps(solved: SolvedScene, z: FloatArray) -> Gaps:
@@ -406,18 +386,6 @@ def _carry_along(solved: SolvedScene, index: int, shifts: FloatArray) -> FloatAr
     return np.column_stack([np.interp(along, places, at_nodes[order, axis]) for axis in (0, 1)])
 
 
-def _plot_rigid(axes: Axes, body: Body, nodes: FloatArray, width: float) -> None:
-    """Draw a hatched strip behind the surface."""
-    ends = nodes[body.contact]  # (n_segments, 2, 2)
-    chords = ends[:, 1] - ends[:, 0]
-    lefts = np.column_stack([-chords[:, 1], chords[:, 0]]) / np.linalg.norm(chords, axis=1)[:, None]
-    strips = np.concatenate([ends, (ends + width * lefts[:, None])[:, ::-1]], axis=1)
-    axes.add_collection(
-        PolyCollection(list(strips), facecolor="none", edgecolor="0.5", linewidth=0, hatch="////", zorder=1)
-    )
-    axes.plot(*strips.reshape(-1, 2).T, linestyle="none")  # The axes reach around it.
-
-
 def _plot_penetration(axes: Axes, solved: SolvedScene, slave: FloatArray, gap: FloatArray, normal: FloatArray) -> None:
     """Hatch what lies between the slave's surface and the master's where the slave penetrates."""
     feet = slave - gap[:, None] * normal
@@ -426,8 +394,5 @@ def _plot_penetration(axes: Axes, solved: SolvedScene, slave: FloatArray, gap: F
     if not len(inside):
         return
     quads = np.concatenate([slave[inside], feet[inside[:, ::-1]]], axis=1)
-    axes.add_collection(
-        PolyCollection(
-            list(quads), facecolor="white", edgecolor="black", linewidth=0, hatch="xxxxxx", alpha=0.55, zorder=4
-        )
-    )
+    look: dict[str, Any] = {"facecolor": "white", "edgecolor": "black", "linewidth": 0, "hatch": "xxxxxx"}
+    axes.add_collection(PolyCollection(list(quads), alpha=0.55, zorder=4, **look))

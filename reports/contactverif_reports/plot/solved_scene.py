@@ -14,7 +14,6 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Surface
 from contactverif_reports.plot.geometry import Course
 
 _SLIVER = 1e-6  # A smaller share of a segment under the other side counts as none.
@@ -130,7 +129,8 @@ class SolvedScene:
         for surface, other in ((interface.slave, interface.master), (interface.master, interface.slave)):
             facing = along[other.nodes] if flat else np.array([-np.inf, np.inf])
             firsts, seconds = _shape_integrals(along[surface.segments], float(facing.min()), float(facing.max()))
-            lefts = _lefts(surface, positions)
+            chords = positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
+            lefts = np.column_stack([-chords[:, 1], chords[:, 0]])  # Into the body, as long as the segments.
             np.add.at(shares, surface.segments[:, 0], firsts[:, None] * lefts)
             np.add.at(shares, surface.segments[:, 1], seconds[:, None] * lefts)
         return shares
@@ -145,12 +145,6 @@ def pressures_across(body: Body, stresses: FloatArray) -> FloatArray:
     xx, yy, xy = stresses.T
     pressures: FloatArray = 2 * x * y * xy - y * y * xx - x * x * yy
     return pressures
-
-
-def _lefts(surface: Surface, positions: FloatArray) -> FloatArray:
-    """Return vectors (n_segments, 2) into the body, as long as the segments."""
-    chords = positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
-    return np.column_stack([-chords[:, 1], chords[:, 0]])
 
 
 def _shape_integrals(ends: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:

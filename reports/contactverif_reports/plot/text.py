@@ -88,7 +88,6 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _describe_gaps(gaps: Gaps, course: Course, unit: float) -> str:
-    """Return how deep the slave nodes that face the master are in it, in words."""
     facing_gaps = gaps.gap[gaps.facing] / unit
     if not len(facing_gaps):
         return "no slave node faces the master"
@@ -134,7 +133,6 @@ def surfaces_headline(case: Case) -> str:
 
 
 def _surfaces(case: Case, width: int) -> str:
-    """Return the numbers of faces, the nodes with their current positions, and the corners of the faces."""
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     unit, unit_name = unit_of(np.array([case.shortest_segment, case.diameter]))
     lines = [surfaces_headline(case)]
@@ -161,8 +159,6 @@ def _surfaces(case: Case, width: int) -> str:
 
 
 class _Link(NamedTuple):
-    """A segment between two places along the line, whose columns are not known yet, and its label."""
-
     start: int
     end: int
     label: str
@@ -177,7 +173,13 @@ def _draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[l
     width -= _MARGIN + len(str(case.interface.n_nodes)) - 1  # The last node number ends behind its node.
     surfaces = (case.interface.slave, case.interface.master)
     for digits in (4, 2):
-        links = [_links(surface, number, case.positions, course, unit, digits) for surface in surfaces]
+        links = []
+        for surface in surfaces:
+            lengths = (surface.lengths(case.positions) / unit).tolist()
+            ends = [sorted((number[first], number[second])) for first, second in surface.segments.tolist()]
+            labels = [format_number(length, course.roundoff / unit, digits) for length in lengths]
+            its_links = (_Link(start, end, label) for (start, end), label in zip(ends, labels, strict=True))
+            links.append(sorted(its_links, key=lambda link: link.start))
         columns, note = _columns(places, [*links[0], *links[1]], width)
         if columns is not None:
             break
@@ -213,17 +215,6 @@ def _places(course: Course, n_slave: int) -> tuple[FloatArray, list[int]]:
             places.append(position)
         number[node] = last_of_side[side] = len(places) - 1
     return np.array(places), number
-
-
-def _links(
-    surface: Surface, number: Sequence[int], positions: FloatArray, course: Course, unit: float, digits: int
-) -> list[_Link]:
-    lengths = (surface.lengths(positions) / unit).tolist()
-    links = []
-    for (first, second), length in zip(surface.segments.tolist(), lengths, strict=True):
-        start, end = sorted((number[first], number[second]))
-        links.append(_Link(start, end, format_number(length, course.roundoff / unit, digits)))
-    return sorted(links, key=lambda link: link.start)
 
 
 def _columns(places: FloatArray, links: Sequence[_Link], width: int) -> tuple[list[int] | None, str]:

@@ -89,7 +89,6 @@ def write_surfaces(case: Case, forces: NodalForces | None, path: str | os.PathLi
 
 
 def _write(path: str | os.PathLike[str], **arrays: Any) -> None:
-    """Write the arguments of a `meshio.Mesh`."""
     import meshio
 
     target = checked_name(path, (".vtu",))
