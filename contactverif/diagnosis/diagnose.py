@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,9 +14,12 @@ from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
-_OF_MEMORY = ("purity",)
 _OF_TANGENTS = ("tangent.", "newton.")
-_OF_DIGITS = ("stability.",)
+_SCALES = range(4, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
+# A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
+_SAME_SCALED = 2.0**-20
+_TILT = 2.0**-4  # The slope of a slave that has other normals.
+_SLIDE = 0.625  # The way along the surface after which most slave nodes face another segment.
 
 
 def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> str:
@@ -27,7 +30,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
     """
     try:
         with np.errstate(all="ignore"):
-            if property_id.startswith(_OF_MEMORY):  # Other patterns mean nothing then.
+            if property_id.startswith("purity"):  # Other patterns mean nothing then.
                 return _diagnose_memory(subject)
             every = (property_id, *others)
             if all(name.startswith(_OF_TANGENTS) for name in every):
@@ -36,16 +39,11 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             in_full = property_id.startswith("patch.") or subject.traits.promises.patch.flat is True
             text = diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
-            if not text and not property_id.startswith((*_OF_DIGITS, *_OF_TANGENTS)):
+            if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
                 text = _diagnose_scale(subject)
             return text or (diagnose_tangent(subject) if property_id.startswith(_OF_TANGENTS) else "")
     except ContractError:
         return ""
-
-
-_SCALES = range(0, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
-# A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
-_SAME_SCALED = 2.0**-20
 
 
 def _diagnose_scale(subject: Subject) -> str:
@@ -54,7 +52,7 @@ def _diagnose_scale(subject: Subject) -> str:
         return ""
     reference = _scaled_forces(subject, 1.0)
     for sign, word in ((-1, "smaller"), (1, "larger")):
-        for power in _SCALES[1:]:
+        for power in _SCALES:
             factor = 2.0 ** (sign * power)
             forces = _scaled_forces(subject, factor)
             if np.abs(forces - reference).max() > _SAME_SCALED * np.abs(reference).max():
@@ -72,10 +70,6 @@ def _scaled_forces(subject: Subject, factor: float) -> FloatArray:
     return forces / factor**2  # A force is ε̂ |g| times a length.
 
 
-_TILT = 2.0**-4  # The slope of a slave that has other normals.
-_SLIDE = 0.625  # The way along the surface after which most slave nodes face another segment.
-
-
 def _diagnose_memory(subject: Subject) -> str:
     """Return which call lets a later one answer otherwise; empty if none of these does."""
     state = flat_state()
@@ -87,24 +81,17 @@ def _diagnose_memory(subject: Subject) -> str:
         "at which nodes face other segments": slid,
     }
     for call in ("residual", "tangent") if "tangent" in subject.provides else ("residual",):
-        if text := _what_changes(call, subject, interface, z, others):
-            return text
-    return ""
-
-
-def _what_changes(call: str, subject: Subject, interface: Interface, z: Array, others: Mapping[str, Array]) -> str:
-    """Return which call lets one answer otherwise at a state than a new instance does."""
-    first = _answer(call, subject.for_interface(interface, PENALTY), interface, z)
-    if not np.array_equal(_answer(call, subject.for_interface(interface, PENALTY), interface, z), first):
-        return f"something is kept outside of the instance: `{call}` of a new one answers otherwise"
-    before = {"when it is asked the same again": (call, z)}
-    for words, at in others.items():
-        before |= {f"after `{other}` of a state {words}": (other, at) for other in ("pair", call)}
-    for words, (other, at) in before.items():
-        formulation = subject.for_interface(interface, PENALTY)
-        _answer(other, formulation, interface, at)
-        if not np.array_equal(_answer(call, formulation, interface, z), first):
-            return f"something is kept between calls: `{call}` answers otherwise {words}"
+        first = _answer(call, subject.for_interface(interface, PENALTY), interface, z)
+        if not np.array_equal(_answer(call, subject.for_interface(interface, PENALTY), interface, z), first):
+            return f"something is kept outside of the instance: `{call}` of a new one answers otherwise"
+        before = {"when it is asked the same again": (call, z)}
+        for words, at in others.items():
+            before |= {f"after `{other}` of a state {words}": (other, at) for other in ("pair", call)}
+        for words, (other, at) in before.items():
+            formulation = subject.for_interface(interface, PENALTY)
+            _answer(other, formulation, interface, at)
+            if not np.array_equal(_answer(call, formulation, interface, z), first):
+                return f"something is kept between calls: `{call}` answers otherwise {words}"
     return ""
 
 

@@ -37,8 +37,8 @@ class FlatState:
     pieces: FloatArray  # (n_pieces, n_nodes) The size of the force by which the pressure on a piece pushes each node.
     starts: FloatArray  # (n_pieces,) The place along the interface where a piece begins, and its length.
     lengths: FloatArray
-    slave_segment: IntArray  # (n_pieces,) The segments that face each other there.
-    master_segment: IntArray
+    segments: tuple[IntArray, IntArray]  # (n_pieces,) The segments of slave and master that face each other there.
+    ends: tuple[IntArray, IntArray]  # (n_pieces, 2) The nodes of these segments.
     n_slave_nodes: int  # The slave nodes come first.
 
     @property
@@ -52,19 +52,6 @@ class FlatState:
         """The places (n_nodes,) of the nodes along the interface."""
         along: FloatArray = self.case.positions[:, 0]
         return along
-
-    def swap(self, *, master: bool) -> FloatArray:
-        """Return the forces (n_nodes,) if the two shape functions of each segment of a side are exchanged."""
-        forces, interface = self.exact.copy(), self.case.interface
-        surface = interface.master if master else interface.slave
-        of_pieces = self.master_segment if master else self.slave_segment
-        nodes = surface.segments.reshape(-1)
-        forces[np.unique(nodes)] = 0.0
-        for piece, segment in enumerate(of_pieces):
-            first, second = surface.segments[segment]
-            forces[first] += self.pieces[piece, second]
-            forces[second] += self.pieces[piece, first]
-        return forces
 
 
 def flat_state(
@@ -88,19 +75,16 @@ def flat_state(
     low, high = max(slave[0], master[-1]), min(slave[-1], master[0])
     ends = np.unique(along[(along >= low) & (along <= high)])
     middles = (ends[1:] + ends[:-1]) / 2
-    slave_segment = np.searchsorted(slave, middles) - 1
-    master_segment = len(master) - 1 - np.searchsorted(master[::-1], middles)
+    segments = np.searchsorted(slave, middles) - 1, len(master) - 1 - np.searchsorted(master[::-1], middles)
+    nodes = interface.slave.segments[segments[0]], interface.master.segments[segments[1]]
     pieces = np.zeros((len(middles), len(along)))
     for piece, (first, last) in enumerate(pairwise(ends)):
         for x in (first + last) / 2 + _GAUSS * (last - first) / 2:
             force = PENALTY * max(np.interp(x, slave, depths), 0.0) * (last - first) / 2
-            for nodes in (
-                interface.slave.segments[slave_segment[piece]],
-                interface.master.segments[master_segment[piece]],
-            ):
-                share = (x - along[nodes[0]]) / (along[nodes[1]] - along[nodes[0]])
-                pieces[piece, nodes] += force * np.array([1 - share, share])
-    return FlatState(case, pieces, ends[:-1], np.diff(ends), slave_segment, master_segment, n_slave)
+            for one, other in (side[piece] for side in nodes):
+                share = (x - along[one]) / (along[other] - along[one])
+                pieces[piece, [one, other]] += force * np.array([1 - share, share])
+    return FlatState(case, pieces, ends[:-1], np.diff(ends), segments, nodes, n_slave)
 
 
 def pushes_of(subject: Subject, state: FlatState) -> FloatArray:

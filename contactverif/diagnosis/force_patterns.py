@@ -1,9 +1,13 @@
-"""Tell in what pattern the forces of a formulation with springs are wrong on a flat interface."""
+"""Tell in what pattern the forces of a formulation with springs are wrong.
+
+The flat state comes first. Then the slave is moved along the master or tilted, a segment of it is open, all is turned
+by a quarter, or places change by little: forces that are wrong on one of these alone show what they depend on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,21 +17,15 @@ from contactverif.diagnosis.flat_state import (
     COARSE,
     DEPTH,
     FINE,
+    MASTER,
     PENALTY,
     SAME,
+    SLAVE,
     FlatState,
     equal,
     flat_state,
     pushes_of,
     same,
-)
-from contactverif.diagnosis.other_states import (
-    diagnose_balance,
-    diagnose_digits,
-    diagnose_law,
-    diagnose_lost_places,
-    diagnose_open_segment,
-    diagnose_turned,
 )
 
 _MEANINGS = {  # {factor: what it may mean}
@@ -35,6 +33,16 @@ _MEANINGS = {  # {factor: what it may mean}
     0.5: "a factor ½, such as a mean of two sides that is taken once too often",
     -1.0: "the sign",
 }
+_MOST_POINTS = 4  # More points of integration are used by hardly anybody.
+# The slave is moved along the master by these lengths. Its nodes pass nearly all of it, and face no node.
+_SHIFTS = (np.arange(-61, 61) + 0.5) / 128
+_TILT = 0.25  # The slope of a slave whose forces must balance, too.
+# A change of places near 1 that single precision, with digits of 2^-24, does not see, and one that it sees.
+_TOO_SMALL, _LARGE = 2.0**-26, 2.0**-12
+# The penetrations of a law are 2 to the power of minus these, small against all segments.
+_POWERS = range(16, 4, -1)
+# The penetrations of the slave's nodes, over DEPTH, in which the segment of that number is open.
+_OPEN = {0: np.array([-1.0, 0.0, 1.0, 1.0]), len(SLAVE) - 2: np.array([1.0, 1.0, 0.0, -1.0])}
 
 
 def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
@@ -46,175 +54,156 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     rules, patch = subject.traits.rules, subject.traits.promises.patch
     if rules.enforcement != "penalty":
         return ""
-    if text := diagnose_lost_places(subject):
+    if text := _lost_places(subject):
         return text
     if rules.penalty == "nodal" or patch.flat is False:
         return ""  # Other forces than the consistent ones are right there.
-    patterns = (
-        diagnose_digits,
-        diagnose_law,
-        partial(_diagnose_uniform, in_full=in_full),
-        _diagnose_linear,
-        partial(_on_other_meshes, in_full=in_full),
-        diagnose_turned,
-        diagnose_open_segment,
-        diagnose_balance,
-    )
-    return next(filter(None, (pattern(subject) for pattern in patterns)), "")
+    return next(filter(None, _patterns(subject, in_full=in_full)), "")
 
 
-def _diagnose_uniform(subject: Subject, *, in_full: bool) -> str:
-    """Return the pattern of the forces of a uniform penetration, on the mesh on which no two segments are alike."""
+def _patterns(subject: Subject, *, in_full: bool) -> Iterator[str]:
+    yield _digits(subject)
+    yield _law(subject)
     state = flat_state()
     forces = pushes_of(subject, state)
-    if text := _uniform_pattern(state, forces, in_full=in_full):
-        return text
+    yield _uniform_pattern(state, forces, in_full=in_full)
     if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
-        return "the forces have a part along the surface, where both normals are the same"
-    return ""
-
-
-def _diagnose_linear(subject: Subject) -> str:
-    """Return the pattern of the forces of a penetration that grows along the slave."""
+        yield "the forces have a part along the surface, where both normals are the same"
     state = flat_state(slope=1.0)
     pushes = pushes_of(subject, state)[:, 1]
-    if same(pushes, state.exact):
-        return ""
-    # Other rules of integration give other forces, and are not wrong.
-    return _exchange(state, pushes, master=False) or _exchange(state, pushes, master=True)
-
-
-def _on_other_meshes(subject: Subject, *, in_full: bool) -> str:
-    """Return the pattern on a slave that is finer than its master, or coarser."""
+    if not same(pushes, state.exact):  # Other rules of integration give other forces, and are not wrong.
+        yield _exchange(state, pushes, 0) or _exchange(state, pushes, 1)
     for places, words in ((FINE, "finer"), (COARSE, "coarser")):
         state = flat_state(places=places)
         if text := _uniform_pattern(state, pushes_of(subject, state), in_full=in_full):
-            return f"on a slave that is {words} than its master: {text}"
-    return ""
+            yield f"on a slave that is {words} than its master: {text}"
+    yield _turned(subject)
+    for number, depths in _OPEN.items():
+        pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
+        if free := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
+            nodes = f"slave node{'s' * (len(free) > 1)} {', '.join(map(str, free))}"
+            yield f"where slave segment {number} is open, nothing pushes {nodes}, which penetrate"
+    if subject.traits.promises.conserves_force:
+        yield _imbalance(subject)
 
 
 def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> str:
     """Return the pattern of the forces of a uniform penetration; empty if they are right."""
-    pushes, exact, n = forces[:, 1], state.exact, state.n_slave_nodes
+    pushes, n = forces[:, 1], state.n_slave_nodes
     if not forces.any():
         return "there is no force at all where the surfaces penetrate"
-    if same(pushes, exact):
+    if same(pushes, state.exact):
         return ""
-    text = (
-        _factor(pushes, exact)
-        or _node_pattern(pushes[:n], exact[:n])
-        or _length_pattern(state, pushes)
-        or _segment_pattern("slave", state.pieces, state.slave_segment, pushes)
-        or _segment_pattern("master", state.pieces, state.master_segment, pushes)
-        or _exchange(state, pushes, master=True)
-    )
-    if text or not in_full:
-        return text or _whole_springs(pushes[:n])
-    return (
-        _single_piece(state, pushes)
-        or _piece_factors(state, pushes)
-        or _halves(state, pushes)
-        or _nearest_nodes(state, pushes)
-        or _whole_segments(state, pushes)
-        or _shifted_points(state, pushes)
-        or _whole_springs(pushes[:n])
-        or _side_pattern(state, pushes)
-    )
+    text = next(filter(None, _plain_patterns(state, pushes)), "")
+    if not text and in_full:
+        text = next(filter(None, _patterns_of_pieces(state, pushes)), "")
+    if not text and same(pushes[:n], np.full(n, PENALTY * DEPTH)):
+        text = "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
+    return text or (_side_pattern(state, pushes) if in_full else "")
 
 
-def _whole_springs(pushes: FloatArray) -> str:
-    if not same(pushes, np.full(len(pushes), PENALTY * DEPTH)):
+def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
+    """Yield the patterns of mistakes that are wrong in any formulation: by node, or by whole segments."""
+    exact, n = state.exact, state.n_slave_nodes
+    factor = float(pushes @ exact / (exact @ exact))
+    if same(pushes, factor * exact):
+        near = [words for known, words in _MEANINGS.items() if abs(factor - known) <= SAME * abs(known)]
+        yield f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
+    is_right = equal(pushes[:n], exact[:n])
+    ends = [node for node in (0, n - 1) if not is_right[node]]
+    if is_right[1:-1].all() and ends:
+        words = " and ".join(f"{_times(pushes[node] / exact[node])} at slave node {node}" for node in ends)
+        yield f"only free ends are wrong: {words}"
+    _, factors = _segment_factors(state, pushes, 0)
+    lengths = np.diff(state.along[:n])
+    if factors is not None and len(factors) > 1:
+        for power, words in ((-1, "is missing"), (1, "is counted twice")):
+            if same(factors, lengths**power):
+                size = f"its force has {_times(factors[1])} the exact size on segment 1"
+                yield f"the length of a slave segment {words}: {size}"
+        sizes = factors * lengths
+        if same(sizes, np.full(len(factors), sizes.mean())):
+            words = ", the mean" if same(sizes[0], lengths.mean()) else ""
+            yield f"each slave segment counts with the same length, {sizes[0]:.4g}{words}, whatever its own"
+    yield _segment_pattern(state, pushes, 0)
+    yield _segment_pattern(state, pushes, 1)
+    yield _exchange(state, pushes, 1)
+
+
+def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
+    """Yield the patterns of mistakes in the pieces on which two segments face each other, or in their integration."""
+    exact, n = state.exact, state.n_slave_nodes
+    parts = [*state.pieces]
+    for numbers in state.segments:
+        parts += [state.pieces[numbers == segment].sum(axis=0) for segment in np.unique(numbers)]
+    alike = [np.abs(part - pushes) <= SAME * np.abs(exact).max() for part in parts]
+    if (np.any(alike, axis=0) & (pushes != 0))[~equal(pushes, exact)].all():
+        several = "nodes that belong to several pieces"
+        yield f"{several} have the force of one alone: the others are overwritten, and not added"
+    yield _piece_factors(state, pushes)
+    halves = np.zeros(len(pushes))
+    np.add.at(halves, state.ends[1], state.pieces[:, n:].sum(axis=1)[:, None] / 2)
+    if same(pushes[:n], exact[:n]) and same(pushes[n:], halves[n:]):
+        yield "both nodes of a master segment take half of its force, wherever it acts: the shape functions are ½"
+    rules = [np.polynomial.legendre.leggauss(n_points) for n_points in range(1, _MOST_POINTS + 1)]
+    for side, ends, nodes in zip(("slave", "master"), state.ends, (slice(None, n), slice(n, None)), strict=True):
+        for places, weights in rules:
+            forces = np.zeros(len(pushes))
+            for start, length, of_piece in zip(state.starts, state.lengths, ends, strict=True):
+                distances = np.abs(state.along[of_piece] - (start + (places[:, None] + 1) / 2 * length))
+                np.add.at(forces, of_piece[distances.argmin(axis=1)], PENALTY * DEPTH * length * weights / 2)
+            if same(pushes[nodes], forces[nodes]):
+                yield f"the whole force of a point of integration goes to the nearer node of the {side} segment"
+    for places, weights in rules:
+        if same(pushes, _sum_at_points(state, (places + 1) / 2, weights / 2)):
+            points = f"the {len(places)} of whole slave segments"
+            yield f"the points of integration are {points}, not cut at the master's nodes"
+    shifts = np.zeros(len(pushes))  # The change of the forces if each piece's acts its whole length beside the middle.
+    for ends in state.ends:
+        change = PENALTY * DEPTH * state.lengths**2 / (state.along[ends[:, 1]] - state.along[ends[:, 0]])
+        np.add.at(shifts, ends, np.stack([-change, change], axis=1))
+    share = float(shifts @ (pushes - exact) / (shifts @ shifts))
+    if same(pushes, exact + share * shifts):
+        yield (
+            f"the force of each part acts {abs(share):.3g} of its length nearer to the part's "
+            f"{'end' if share > 0 else 'start'}: look at the places of the points of integration and at their weights"
+        )
+
+
+def _exchange(state: FlatState, pushes: FloatArray, side: int) -> str:
+    """Return whether the two shape functions of each segment of a side, 0 or 1, are exchanged."""
+    ends, nodes = state.ends[side], (slice(state.n_slave_nodes), slice(state.n_slave_nodes, None))[side]
+    swapped = np.zeros(len(pushes))
+    np.add.at(swapped, ends[:, ::-1], np.take_along_axis(state.pieces, ends, axis=1))
+    if not same(pushes[nodes], swapped[nodes]):
         return ""
-    return "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
-
-
-def _exchange(state: FlatState, pushes: FloatArray, *, master: bool) -> str:
-    nodes = slice(state.n_slave_nodes, None) if master else slice(state.n_slave_nodes)
-    if not same(pushes[nodes], state.swap(master=master)[nodes]):
-        return ""
-    if master:
+    if side:
         return "the two shape functions of each master segment are exchanged: ξ where 1 − ξ belongs"
     return "the two shape functions of each slave segment are exchanged: a node has what belongs to its neighbour"
 
 
-def _length_pattern(state: FlatState, pushes: FloatArray) -> str:
-    """Return whether the parts of the slave's segments lack the length of their segment, or have another one."""
-    factors = _factors(state.pieces, state.slave_segment, pushes)
-    if factors is None:
-        return ""
-    lengths = np.diff(state.along[: state.n_slave_nodes])
-    for power, words in ((-1, "is missing"), (1, "is counted twice")):
-        if len(factors) > 1 and same(factors, lengths**power):
-            return (
-                f"the length of a slave segment {words}: its force has {_times(factors[1])} the exact size on segment 1"
-            )
-    if len(factors) > 1 and same(factors * lengths, np.full(len(factors), (factors * lengths).mean())):
-        words = "" if not same(factors[0] * lengths[0], lengths.mean()) else ", the mean"
-        return f"each slave segment counts with the same length, {factors[0] * lengths[0]:.4g}{words}, whatever its own"
-    return ""
+def _segment_factors(state: FlatState, pushes: FloatArray, side: int) -> tuple[IntArray, FloatArray | None]:
+    """Return the segments of a side, and the factors of their parts whose sum the forces are; None if they are none."""
+    numbers, pieces = state.segments[side], state.pieces
+    segments = np.unique(numbers)
+    parts = np.stack([pieces[numbers == segment].sum(axis=0) for segment in segments], axis=1)
+    factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
+    return segments, factors if same(parts @ factors, pushes) else None
 
 
-def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
-    """Return on which side the forces are wrong, and whether their sum is."""
-    exact, n = state.exact, state.n_slave_nodes
-    slave_is_right, master_is_right = same(pushes[:n], exact[:n]), same(pushes[n:], exact[n:])
-    if slave_is_right:
-        return "the forces on the slave are right, those on the master are not" + _total(pushes[n:], exact[n:])
-    if master_is_right:
-        return "the forces on the master are right, those on the slave are not" + _total(pushes[:n], exact[:n])
-    total, along = _total(pushes[:n], exact[:n]), state.along
-    sums = [
-        np.array([part.sum(), part @ places]) for part, places in ((pushes[:n], along[:n]), (pushes[n:], along[n:]))
-    ]
-    if same(*sums):  # What is integrated acts alike on both sides.
-        total += "; the sides balance, in moments too: look at the points of integration, their weights and their range"
-    return f"the forces are wrong on both sides{total}"
-
-
-def _node_pattern(pushes: FloatArray, exact: FloatArray) -> str:
-    """Return what factor the ends of the slave have, if all nodes between them are right."""
-    inner = equal(pushes, exact)[1:-1].all()
-    ends = [node for node in (0, len(exact) - 1) if not equal(pushes, exact)[node]]
-    if not inner or not ends:
-        return ""
-    factors = pushes[ends] / exact[ends]
-    words = " and ".join(f"{_times(factor)} at slave node {node}" for node, factor in zip(ends, factors, strict=True))
-    return f"only free ends are wrong: {words}"
-
-
-def _segment_pattern(side: str, pieces: FloatArray, of_pieces: IntArray, pushes: FloatArray) -> str:
+def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
     """Return what factors the segments of a side have, if the forces are the sum of their parts with such factors."""
-    segments, factors = np.unique(of_pieces), _factors(pieces, of_pieces, pushes)
+    segments, factors = _segment_factors(state, pushes, side)
     if factors is None or (wrong := ~equal(factors, np.ones(len(factors)))).all():
         return ""
+    name = ("slave", "master")[side]
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
-        listed = f"{side} segment{'s' * (len(missed) > 1)} {', '.join(map(str, missed))}"
+        listed = f"{name} segment{'s' * (len(missed) > 1)} {', '.join(map(str, missed))}"
         return f"{listed} {'is' if len(missed) == 1 else 'are'} left out{_ends(missed, len(segments))}"
-    words = ", ".join(f"{side} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
+    words = ", ".join(f"{name} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
     ends = _ends(segments[wrong].tolist(), len(segments))
     return f"segments have forces of another size: {words} the exact one, all others right{ends}"
-
-
-def _factors(pieces: FloatArray, of_pieces: IntArray, pushes: FloatArray) -> FloatArray | None:
-    """Return the factors (n_segments,) of the parts of the segments whose sum the forces are; None if they are none."""
-    parts = np.stack([pieces[of_pieces == segment].sum(axis=0) for segment in np.unique(of_pieces)], axis=1)
-    factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
-    return factors if same(parts @ factors, pushes) else None
-
-
-def _factor(pushes: FloatArray, exact: FloatArray) -> str:
-    """Return the factor that all forces have, and what it may mean, if they have one."""
-    factor = float(pushes @ exact / (exact @ exact))
-    if not same(pushes, factor * exact):
-        return ""
-    near = [words for known, words in _MEANINGS.items() if abs(factor - known) <= SAME * abs(known)]
-    return f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
-
-
-def _total(pushes: FloatArray, exact: FloatArray) -> str:
-    factor = float(pushes.sum() / exact.sum())
-    return "; their sum is right" if abs(factor - 1) <= SAME else f"; their sum is {_times(factor)} the exact one"
 
 
 def _ends(numbers: Sequence[int], total: int) -> str:
@@ -225,20 +214,12 @@ def _ends(numbers: Sequence[int], total: int) -> str:
     return f"; {'it is' if len(numbers) == 1 else 'they are'} {words} of {total}"
 
 
-def _times(factor: float) -> str:
-    return f"{factor:.4g} times"
-
-
-_MOST_POINTS = 4  # More are used by hardly anybody.
-
-
 def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
     """Return which pieces are left out, or whether a length of the master is counted, if the pieces have factors."""
     factors = np.asarray(np.linalg.lstsq(state.pieces.T, pushes, rcond=None)[0], dtype=np.float64)
     if not same(state.pieces.T @ factors, pushes):
         return ""
-    of_slave = np.diff(state.along[: state.n_slave_nodes])[state.slave_segment]
-    of_master = -np.diff(state.along[state.n_slave_nodes :])[state.master_segment]
+    of_slave, of_master = (np.abs(np.diff(state.along[ends])[:, 0]) for ends in state.ends)
     lengths = {
         "is counted, too": of_master,
         "divides the force": 1 / of_master,
@@ -247,92 +228,159 @@ def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
     for words, ratios in lengths.items():
         if same(factors, ratios):
             return f"the length of the master segment {words}"
-    places = [
-        f"slave segment {slave} on master segment {master}"
-        for slave, master, factor in zip(state.slave_segment, state.master_segment, factors, strict=True)
-        if abs(factor) < SAME
-    ]
-    rest = factors[np.abs(factors) >= SAME]
-    return f"parts are left out: {', '.join(places)}" if places and same(rest, np.ones(len(rest))) else ""
-
-
-def _single_piece(state: FlatState, pushes: FloatArray) -> str:
-    parts = [*state.pieces]
-    for of_pieces in (state.slave_segment, state.master_segment):
-        parts += [state.pieces[of_pieces == segment].sum(axis=0) for segment in np.unique(of_pieces)]
-    wrong = ~equal(pushes, state.exact)
-    alike = [np.abs(part - pushes) <= SAME * np.abs(state.exact).max() for part in parts]
-    if not (np.any(alike, axis=0) & (pushes != 0))[wrong].all():
+    missed = np.abs(factors) < SAME
+    if not missed.any() or not same(factors[~missed], np.ones(len(factors) - missed.sum())):
         return ""
-    return "nodes that belong to several pieces have the force of one alone: the others are overwritten, and not added"
+    pairs = zip(*(numbers[missed] for numbers in state.segments), strict=True)
+    return f"parts are left out: {', '.join(f'slave segment {a} on master segment {b}' for a, b in pairs)}"
 
 
-def _halves(state: FlatState, pushes: FloatArray) -> str:
-    n, halves = state.n_slave_nodes, np.zeros(len(pushes))
-    for piece, segment in zip(state.pieces, state.master_segment, strict=True):
-        halves[state.case.interface.master.segments[segment]] += piece[n:].sum() / 2
-    if not same(pushes[:n], state.exact[:n]) or not same(pushes[n:], halves[n:]):
-        return ""
-    return "both nodes of a master segment take half of its force, wherever it acts: the shape functions are ½"
+def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
+    """Return on which side the forces are wrong, and whether their sum is."""
+    n = state.n_slave_nodes
+    slave, master = ((pushes[nodes], state.exact[nodes], state.along[nodes]) for nodes in (slice(n), slice(n, None)))
+    if same(*slave[:2]):
+        return "the forces on the slave are right, those on the master are not" + _total(*master[:2])
+    total = _total(*slave[:2])
+    if same(*master[:2]):
+        return "the forces on the master are right, those on the slave are not" + total
+    sums = [np.array([part.sum(), part @ places]) for part, _, places in (slave, master)]
+    if same(*sums):  # What is integrated acts alike on both sides.
+        total += "; the sides balance, in moments too: look at the points of integration, their weights and their range"
+    return f"the forces are wrong on both sides{total}"
 
 
-def _nearest_nodes(state: FlatState, pushes: FloatArray) -> str:
-    interface, along, n = state.case.interface, state.along, state.n_slave_nodes
-    sides = {
-        "slave": (interface.slave.segments[state.slave_segment], slice(None, n)),
-        "master": (interface.master.segments[state.master_segment], slice(n, None)),
-    }
-    for side, (segments, nodes) in sides.items():
-        for n_points in range(1, _MOST_POINTS + 1):
-            forces = np.zeros(len(pushes))
-            for start, length, of_piece in zip(state.starts, state.lengths, segments, strict=True):
-                places, weights = np.polynomial.legendre.leggauss(n_points)
-                distances = np.abs(along[of_piece] - (start + (places[:, None] + 1) / 2 * length))
-                np.add.at(forces, of_piece[distances.argmin(axis=1)], PENALTY * DEPTH * length * weights / 2)
-            if same(pushes[nodes], forces[nodes]):
-                return f"the whole force of a point of integration goes to the nearer node of the {side} segment"
-    return ""
+def _total(pushes: FloatArray, exact: FloatArray) -> str:
+    factor = float(pushes.sum() / exact.sum())
+    return "; their sum is right" if abs(factor - 1) <= SAME else f"; their sum is {_times(factor)} the exact one"
 
 
-def _whole_segments(state: FlatState, pushes: FloatArray) -> str:
-    for n_points in range(1, _MOST_POINTS + 1):
-        places, weights = np.polynomial.legendre.leggauss(n_points)
-        if same(pushes, _sum_at_points(state, (places + 1) / 2, weights / 2)):
-            return (
-                f"the points of integration are the {n_points} of whole slave segments, not cut at the master's nodes"
-            )
-    return ""
-
-
-def _shifted_points(state: FlatState, pushes: FloatArray) -> str:
-    """Return by which share of its length the force of each piece acts beside the middle, if it is the same for all."""
-    shifts = np.zeros(len(pushes))  # The change of the forces if the share is 1.
-    interface, along = state.case.interface, state.along
-    sides = (interface.slave.segments[state.slave_segment], interface.master.segments[state.master_segment])
-    for segments in sides:
-        change = PENALTY * DEPTH * state.lengths**2 / (along[segments[:, 1]] - along[segments[:, 0]])
-        np.add.at(shifts, segments, np.stack([-change, change], axis=1))
-    share = float(shifts @ (pushes - state.exact) / (shifts @ shifts))
-    if not same(pushes, state.exact + share * shifts):
-        return ""
-    end = "end" if share > 0 else "start"
-    return (
-        f"the force of each part acts {abs(share):.3g} of its length nearer to the part's {end}: look at the places of "
-        "the points of integration and at their weights"
-    )
+def _times(factor: float) -> str:
+    return f"{factor:.4g} times"
 
 
 def _sum_at_points(state: FlatState, places: FloatArray, weights: FloatArray) -> FloatArray:
     """Return the forces (n_nodes,) of a uniform pressure that is summed at places 0 to 1 of each slave segment."""
     interface, along, forces = state.case.interface, state.along, np.zeros(len(state.along))
+    master = interface.master.segments
     for nodes in interface.slave.segments:
         length = along[nodes[1]] - along[nodes[0]]
         for place, weight in zip(places, weights, strict=True):
-            x = along[nodes[0]] + place * length
-            shares = (x - along[interface.master.segments[:, 0]]) / np.diff(along[interface.master.segments], axis=1)[
-                :, 0
-            ]
+            shares = (along[nodes[0]] + place * length - along[master[:, 0]]) / np.diff(along[master], axis=1)[:, 0]
             (segment,) = np.flatnonzero((shares >= 0) & (shares < 1))
-            for ends, share in ((nodes, place), (interface.master.segments[segment], shares[segment])):
+            for ends, share in ((nodes, place), (master[segment], shares[segment])):
                 forces[ends] += PENALTY * DEPTH * length * weight * np.array([1 - share, share])
     return forces
+
+
+def _lost_places(subject: Subject) -> str:
+    """Return the places along the master at which a slave node has no force; empty if there are none.
+
+    Each node must have the exact force or a whole spring elsewhere: else the places mean nothing.
+    """
+    all_idle = []
+    for shift in _SHIFTS:
+        state = flat_state(places=(SLAVE + shift, MASTER))
+        pushes, exact = pushes_of(subject, state)[: len(SLAVE), 1], state.exact[: len(SLAVE)]
+        no_force = np.abs(pushes) <= SAME * exact.max()
+        if not (no_force | equal(pushes, exact) | equal(pushes, np.full(len(exact), PENALTY * DEPTH))).all():
+            return ""
+        all_idle.append(no_force)
+    places, idle = np.add.outer(_SHIFTS, SLAVE).reshape(-1), np.concatenate(all_idle)
+    parts = {}
+    for segment, (first, last) in enumerate(pairwise(MASTER)):
+        xi = (places - first) / (last - first)
+        inside = (xi > 0) & (xi < 1)
+        without, right = xi[inside & idle], xi[inside & ~idle]
+        if len(without):
+            low = right[right < without.min()].max(initial=0.0)
+            parts[segment] = low, right[right > without.max()].min(initial=1.0)
+    if not parts or idle.all():
+        return ""
+    if len(parts) == len(MASTER) - 1:  # Then the parts are alike, but for the places that were asked.
+        lows, highs = zip(*parts.values(), strict=True)
+        return f"slave nodes have no force between ξ = {min(lows):.2g} and {max(highs):.2g} of a master segment"
+    words = [
+        f"master segment {segment}" + (f" between ξ = {low:.2g} and {high:.2g}" if (low, high) != (0.0, 1.0) else "")
+        for segment, (low, high) in parts.items()
+    ]
+    return f"slave nodes that face {', or '.join(words)} have no force; all others are right"
+
+
+def _turned(subject: Subject) -> str:
+    """Return by how many quarters the flat state must be turned until its forces do not turn with it."""
+    state = flat_state()
+    interface, positions = state.case.interface, state.case.positions
+    expected = None
+    for degrees, x, y in ((0, 1, 0), (90, 0, 1), (180, -1, 0), (270, 0, -1)):
+        turn = np.array([[x, y], [-y, x]], dtype=np.float64)  # So it takes rows to rows, without any rounding.
+        turned, z = interface.at(interface.nodes @ turn), (positions @ turn).reshape(-1)
+        formulation = subject.for_interface(turned, state.case.penalty)
+        forces = formulation.residual(turned, formulation.pair(turned, z), z).reshape(-1, 2) @ turn.T
+        expected = forces if expected is None else expected
+        if not same(forces, expected):
+            words = "are reversed" if same(forces, -expected) else "do not turn with it"
+            return f"on a mesh that is turned by {degrees}° the forces {words}: look at the normal, and at angles"
+    return ""
+
+
+def _digits(subject: Subject) -> str:
+    """Return whether the forces do not see a change of places that has its digit in double precision alone."""
+    state = flat_state()
+    formulation, interface = subject.for_case(state.case), state.case.interface
+
+    def forces(change: float) -> FloatArray:
+        z = state.case.z.copy()
+        z[2 * np.arange(1, len(SLAVE) - 1)] += change
+        return formulation.residual(interface, formulation.pair(interface, z), z)
+
+    before = forces(0.0)
+    if np.array_equal(forces(_TOO_SMALL), before) and not np.array_equal(forces(_LARGE), before):
+        return f"places near 1 that change by {_TOO_SMALL:.1e} change no force: numbers have single precision"
+    return ""
+
+
+def _imbalance(subject: Subject) -> str:
+    """Return how the forces on a tilted slave do not balance: by their directions, or by their moments."""
+    state = flat_state(slope=_TILT, depth=1.0)
+    n, pushes = state.n_slave_nodes, pushes_of(subject, state)
+    on_slave, on_master = pushes[:n].sum(axis=0), pushes[n:].sum(axis=0)
+    if not same(on_slave, on_master):
+        words = f"along {_direction(on_slave)} normal on the slave, along {_direction(on_master)} normal on the master"
+        return f"the forces on the sides of a tilted slave do not balance: they are {words}"
+    x, y = state.case.positions.T
+    moments = x * pushes[:, 1] - y * pushes[:, 0]
+    if not subject.traits.promises.conserves_moment or same(moments[:n].sum(), moments[n:].sum()):
+        return ""
+    return (
+        "the forces on the sides of a tilted slave balance, and their moments do not: the points that push each other "
+        f"do not face each other along the force, which is along {_direction(on_slave)} normal: look at the projection"
+    )
+
+
+def _direction(force: FloatArray) -> str:
+    normals = {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
+    size = np.linalg.norm(force)
+    names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
+    return next(names, "another")
+
+
+def _law(subject: Subject) -> str:
+    """Return how the force depends on a uniform penetration, where it is not proportional to it."""
+    depths = np.array([2.0**-power for power in _POWERS])
+    states = [flat_state(depth=depth) for depth in depths]
+    shares = np.array([pushes_of(subject, state)[:, 1].sum() / state.exact.sum() for state in states])
+    if same(shares, np.full(len(shares), shares[0])):
+        return ""
+    powers = np.diff(np.log2(np.abs(shares)))
+    if np.isfinite(powers).all() and same(powers, np.full(len(powers), powers[0])):
+        power = f"{1 + powers[0]:.3g}"
+        return f"the force grows like the penetration to the power {power}, and should be proportional to it"
+    changed = int(np.argmax(np.abs(shares - shares[0]) > SAME * abs(shares[0])))
+    before, after = depths[changed - 1], depths[changed]
+    if not shares[0]:
+        return f"there is no force up to a penetration of {before:.2g}, and from {after:.2g} on there is one"
+    return (
+        f"the force is proportional to the penetration up to {before:.2g}, and from {after:.2g} on it has "
+        f"{shares[changed] / shares[0]:.3g} times this size, on segments of length 1: look for a limit of depths"
+    )

@@ -7,13 +7,13 @@ and of the length of a segment grow like g and stand in n–t or t–n.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, dense
+from contactverif.contract.arrays import BoolArray, FloatArray, dense
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state
 
@@ -56,47 +56,53 @@ def diagnose_tangent(subject: Subject) -> str:
     pair = _measure(subject, [flat_state(depth=depth) for depth in DEPTHS])
     if pair.scale == 0:
         return ""
-    if _is_small(pair.errors, pair.scale):
-        return _past_an_end(subject) or _where_apart(subject)
-    patterns = (_as_a_whole, _one_line, _one_side, _of_differences, _one_part)
-    return next(filter(None, (pattern(pair) for pattern in patterns)), "")
-
-
-def _past_an_end(subject: Subject) -> str:
+    if not _is_small(pair.errors, pair.scale):
+        return next(filter(None, _patterns(pair)), "")
     pair = _measure(subject, [flat_state(depth=DEPTHS[0], places=(SLAVE, _SHORT_MASTER))])
-    columns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=0) > SAME * pair.scale)
-    if not columns.size:
-        return ""
-    return (
-        "the tangent is wrong only where the slave reaches past an end of the master, in columns of "
-        f"{_nodes(columns, pair)}: look at the derivative of the limits between which the force is integrated"
-    )
-
-
-def _where_apart(subject: Subject) -> str:
+    if nodes := _wrong_nodes(pair, axis=0):
+        return (
+            f"the tangent is wrong only where the slave reaches past an end of the master, in columns of {nodes}: look "
+            "at the derivative of the limits between which the force is integrated"
+        )
     pair = _measure(subject, [flat_state(slope=_PARTLY_APART, depth=DEPTHS[0])])
-    if _is_small(pair.errors, pair.scale):
-        return ""
-    rows = np.flatnonzero(np.abs(pair.errors[0]).max(axis=1) > SAME * pair.scale)
-    words = f"in rows of {_nodes(rows, pair)}"
-    return f"the tangent is wrong only where a part of the slave is apart from the master, and open: {words}"
+    if nodes := _wrong_nodes(pair, axis=1):
+        words = f"in rows of {nodes}"
+        return f"the tangent is wrong only where a part of the slave is apart from the master, and open: {words}"
+    return ""
 
 
 def _measure(subject: Subject, states: Sequence[FlatState]) -> Tangents:
     tangents, derivatives, curvatures, n_slave = [], [], [], 0
     for state in states:
         case, formulation = state.case, subject.for_case(state.case)
-        pairing = formulation.pair(case.interface, case.z)
-        moves = STEP * np.eye(case.z.size)
-        residuals = formulation.residual(case.interface, pairing, np.concatenate([case.z + moves, case.z - moves]))
-        derivatives.append((residuals[: case.z.size] - residuals[case.z.size :]).T / (2 * STEP))
-        bends = _BEND * np.eye(case.z.size)
-        around = formulation.residual(case.interface, pairing, np.concatenate([case.z + bends, case.z - bends]))
-        middle = formulation.residual(case.interface, pairing, case.z)
-        curvatures.append((around[: case.z.size] + around[case.z.size :] - 2 * middle).T / _BEND**2)
-        tangents.append(dense(formulation.tangent(case.interface, pairing, case.z)))
+        interface, z, n = case.interface, case.z, case.z.size
+        pairing = formulation.pair(interface, z)
+        at = [
+            formulation.residual(interface, pairing, np.concatenate([z + step * np.eye(n), z - step * np.eye(n)]))
+            for step in (STEP, _BEND)
+        ]
+        derivatives.append((at[0][:n] - at[0][n:]).T / (2 * STEP))
+        middle = formulation.residual(interface, pairing, z)
+        curvatures.append((at[1][:n] + at[1][n:] - 2 * middle).T / _BEND**2)
+        tangents.append(dense(formulation.tangent(interface, pairing, z)))
         n_slave = 2 * state.n_slave_nodes
     return Tangents(np.stack(tangents), np.stack(derivatives), np.stack(curvatures), n_slave)
+
+
+def _patterns(pair: Tangents) -> Iterator[str]:
+    yield _as_a_whole(pair)
+    yield _one_line(pair)
+    number = np.arange(pair.tangents.shape[1])
+    for side, columns in (("slave", number < pair.n_slave), ("master", number >= pair.n_slave)):
+        if not pair.tangents[:, :, columns].any() and _is_small(pair.errors[:, :, ~columns], pair.scale):
+            yield f"the columns of all {side} nodes are missing: the tangent takes the {side} for rigid"
+    # One-sided differences err by half a step times the second derivative, and what follows it is smaller by the step
+    # over the size of a segment.
+    step = 2 * float((pair.errors * pair.curvatures).sum() / (pair.curvatures**2).sum())
+    rest = np.abs(pair.errors - step / 2 * pair.curvatures).max()
+    if rest <= _DIFFERENCES * np.abs(pair.errors).max():  # It is NaN where forces are linear.
+        yield f"the tangent is of one-sided differences with a step of about {abs(step):.1g}, on segments of length 1"
+    yield _one_part(pair)
 
 
 def _as_a_whole(pair: Tangents) -> str:
@@ -136,76 +142,48 @@ def _one_line(pair: Tangents) -> str:
     return ""
 
 
-def _one_side(pair: Tangents) -> str:
-    number = np.arange(pair.tangents.shape[1])
-    for side, columns in (("slave", number < pair.n_slave), ("master", number >= pair.n_slave)):
-        if not pair.tangents[:, :, columns].any() and _is_small(pair.errors[:, :, ~columns], pair.scale):
-            return f"the columns of all {side} nodes are missing: the tangent takes the {side} for rigid"
-    return ""
-
-
-def _of_differences(pair: Tangents) -> str:
-    """Return the step of the one-sided differences that the tangent is made of, if its errors are those of one."""
-    # Half a step times the second derivative, and what follows it is smaller by the step over the size of a segment.
-    step = 2 * float((pair.errors * pair.curvatures).sum() / (pair.curvatures**2).sum())
-    rest = np.abs(pair.errors - step / 2 * pair.curvatures).max()
-    if not rest <= _DIFFERENCES * np.abs(pair.errors).max():  # It is NaN where forces are linear.
-        return ""
-    return f"the tangent is of one-sided differences with a step of about {abs(step):.1g}, on segments of length 1"
-
-
 def _unknown(number: int, pair: Tangents) -> str:
     node, axis = divmod(number, 2)
     return f"{'xy'[axis]} of {'slave' if number < pair.n_slave else 'master'} node {node}"
 
 
-def _nodes(unknowns: IntArray, pair: Tangents) -> str:
+def _wrong_nodes(pair: Tangents, axis: int) -> str:
+    """Return the nodes of the rows (axis 1) or columns (axis 0) that are wrong at the first depth, in words."""
+    unknowns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=axis) > SAME * pair.scale)
     nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
     sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
-    words = (
+    return " and ".join(
         f"{side} node{'s' * (len(part) > 1)} {', '.join(map(str, part))}" for side, part in sides.items() if len(part)
     )
-    return " and ".join(words)
 
 
 def _one_part(pair: Tangents) -> str:
     """Return the part of the tangent that is wrong, if its size, its place and its growth are those of one part."""
-    blocks, powers = _blocks(pair), _powers_of_wrong_blocks(pair)
+    numbers = {axis: np.arange("tn".index(axis), pair.errors.shape[1], 2) for axis in "tn"}  # t is x, and n is y.
+    blocks = {
+        rows + columns: np.ix_(np.arange(len(DEPTHS)), numbers[rows], numbers[columns])
+        for rows, columns in product("tn", repeat=2)
+    }
+    powers = {}
+    for name, block in blocks.items():
+        if not _is_small(errors := pair.errors[block], pair.scale):
+            sizes = np.abs(errors).max(axis=(1, 2))
+            powers[name] = float(np.log2(sizes[0] / sizes[-1]) / (len(DEPTHS) - 1)) if sizes[-1] > 0 else np.inf
+    # A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
+    powers = {name: power for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER}
     if len(powers) != 1:
         listed = " and ".join(f"{name[0]}–{name[1]}" for name in powers)
         return f"entries in {listed} are wrong (n along the normal, t along the surface)" if powers else ""
     ((name, power),) = powers.items()
-    errors = pair.errors[blocks[name]]
+    errors, n = pair.errors[blocks[name]], pair.n_slave // 2
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
         return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"
-    if name == "nn" and _is_lumped(errors, pair):
+    sides = (errors[:, :, :n], errors[:, :, n:])
+    if name == "nn" and all(_is_small(side.sum(axis=2), pair.scale) for side in sides):
         return f"{part}, stands at other nodes, as if it were lumped: it is right for a motion of a whole side alone"
     return f"{part}, {_change(pair.tangents[blocks[name]], pair.derivatives[blocks[name]], pair.scale)}"
-
-
-def _powers_of_wrong_blocks(pair: Tangents) -> dict[str, float]:
-    """Return {block: power of the penetration with which its errors grow} of the blocks that are wrong by themselves.
-
-    A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
-    """
-    errors = {name: pair.errors[block] for name, block in _blocks(pair).items()}
-    powers = {name: _power_of_depth(part) for name, part in errors.items() if not _is_small(part, pair.scale)}
-    return {name: power for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER}
-
-
-def _is_lumped(errors: FloatArray, pair: Tangents) -> bool:
-    """Return whether the errors of a block add up to nothing where all nodes of a side move alike."""
-    n = pair.n_slave // 2
-    return all(_is_small(part.sum(axis=2), pair.scale) for part in (errors[:, :, :n], errors[:, :, n:]))
-
-
-def _blocks(pair: Tangents) -> dict[str, tuple[IntArray, ...]]:
-    """Return the rows and columns of the blocks t–t, t–n, n–t and n–n, for all depths."""
-    numbers = {axis: np.arange("tn".index(axis), pair.errors.shape[1], 2) for axis in "tn"}  # t is x, and n is y.
-    names = product("tn", repeat=2)
-    return {rows + columns: np.ix_(np.arange(len(DEPTHS)), numbers[rows], numbers[columns]) for rows, columns in names}
 
 
 def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
@@ -227,12 +205,6 @@ def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
             both = owner == "slave" and not _is_small(on_master, pair.scale)
             return f"the part of δn, in t–n on the columns of {'both sides' if both else f'the {owner}'}"
     return ""
-
-
-def _power_of_depth(errors: FloatArray) -> float:
-    """Return the power of the penetration with which the largest error grows."""
-    sizes = np.abs(errors).max(axis=(1, 2))
-    return float(np.log2(sizes[0] / sizes[-1]) / (len(DEPTHS) - 1)) if sizes[-1] > 0 else np.inf
 
 
 def _change(tangents: FloatArray, derivatives: FloatArray, scale: float) -> str:
