@@ -370,8 +370,8 @@ def _check_chains(segments: IntArray) -> None:
         raise MisuseError("segments", f"node number {segments.min()}", "node numbers ≥ 0")
     loops = np.flatnonzero(segments[:, 0] == segments[:, 1])
     if len(loops):
-        found = f"segment {loops[0]} that begins and ends at node {segments[loops[0], 0]}"
-        raise MisuseError("segments", found, "two nodes")
+        loop = f"segment {loops[0]} that begins and ends at node {segments[loops[0], 0]}"
+        raise MisuseError("segments", loop, "two nodes")
     for end, verb in ((0, "begin"), (1, "end")):
         numbers = np.sort(segments[:, end])
         if (numbers[1:] == numbers[:-1]).any():

@@ -326,14 +326,12 @@ class CheckedFormulation:
         if len(points.gap) > (most := POINTS_A_SEGMENT * int(counts.sum())):
             raise ContractError(f"contact_points: {len(points.gap)} of them; needed at most {most} on this interface")
         for role, name in enumerate(("slave_segment", "master_segment")):
-            numbers, limits = (
-                getattr(points, name),
-                counts[role ^ points.on_master],
-            )  # A second pass exchanges the roles.
+            numbers = getattr(points, name)
+            limits = counts[role ^ points.on_master]  # A second pass exchanges the roles.
             outliers = np.flatnonzero((numbers < -1) | (numbers >= limits))
             if len(outliers):
-                found, limit = numbers[outliers[0]], limits[outliers[0]]
-                raise ContractError(f"contact_points: {name} {found}; needed −1 to {limit - 1}")
+                first = outliers[0]
+                raise ContractError(f"contact_points: {name} {numbers[first]}; needed −1 to {limits[first] - 1}")
         return points
 
     def answers(self, calls: Sequence[Call]) -> list[Any]:
@@ -414,8 +412,7 @@ def _check_forces(verb: str, forces: Any, z: Array) -> Array:
 def _check_finite(verb: str, values: Array) -> None:
     if not np.isfinite(values).all():
         bad = np.flatnonzero(~np.isfinite(values).reshape(-1))
-        found = f"{values.reshape(-1)[bad[0]]} in {len(bad)} of {values.size} entries"
-        raise NonFiniteError(f"{verb}: {found}")
+        raise NonFiniteError(f"{verb}: {values.reshape(-1)[bad[0]]} in {len(bad)} of {values.size} entries")
 
 
 def copy_entries(verb: str, tangent: Any) -> Any:

@@ -28,10 +28,9 @@ def test_what_a_body_is() -> None:
 
 def test_what_is_left_out_is_free_and_unloaded() -> None:
     bare = Body(BLOCK.nodes, BLOCK.cells, BLOCK.contact)
-    assert not bare.fixed.any()
-    assert not bare.imposed.any()
-    assert not bare.load.any()
-    assert bare.fixed.shape == bare.imposed.shape == bare.load.shape == (9, 2)
+    for values in (bare.fixed, bare.imposed, bare.load):
+        assert not values.any()
+        assert values.shape == (9, 2)
 
 
 @pytest.mark.parametrize(("young", "poisson", "modulus"), [(3.0, 0.2, 10 / 3), (1.0, 0.0, 1.0), (1.0, -0.5, 1.5)])
@@ -202,12 +201,8 @@ def test_wrong_blocks(make: Callable[[], Body], message: str) -> None:
 
 @pytest.mark.parametrize("contact", ["bottom", "top"])
 def test_the_body_is_on_the_left_of_its_contact_edges(contact: str) -> None:
-    body = block(
-        Rectangle([0, 1, 3], [0, 2]),
-        contact=contact,
-        approach=0.0,
-        placing=Placing(axis=LEANING, shift=(5, -1), scale=2.0),
-    )
+    placing = Placing(axis=LEANING, shift=(5, -1), scale=2.0)
+    body = block(Rectangle([0, 1, 3], [0, 2]), contact=contact, approach=0.0, placing=placing)
     first, second = np.swapaxes(body.nodes[body.contact], 0, 1)
     along, to_centre = second - first, body.nodes.mean(axis=0) - first
     assert (along[:, 0] * to_centre[:, 1] - along[:, 1] * to_centre[:, 0] > 0).all()
@@ -226,14 +221,8 @@ def test_pressure_on_the_far_side(contact: str, down: float) -> None:
 
 
 def test_an_approach_of_the_far_side_with_a_tilt() -> None:
-    body = block(
-        Rectangle([0, 1, 4], [0, 1]),
-        contact="bottom",
-        approach=0.25,
-        tilt=0.125,
-        lowered=0.5,
-        placing=Placing(scale=2.0),
-    )
+    moves: dict[str, Any] = {"approach": 0.25, "tilt": 0.125, "lowered": 0.5, "placing": Placing(scale=2.0)}
+    body = block(Rectangle([0, 1, 4], [0, 1]), contact="bottom", **moves)
     assert body.imposed.tolist() == [[0, 0]] * 3 + [[0, -0.25], [0, -0.375], [0, -0.75]]
     assert body.fixed[:3, 1].tolist() == [False] * 3
     assert body.fixed[3:, 1].all()
@@ -255,9 +244,8 @@ def test_pressure_beside_what_presses() -> None:
 
 
 def test_where_a_block_lies() -> None:
-    quarter = block(
-        Rectangle([0, 1], [0, 2]), contact="bottom", approach=0.0, placing=Placing(axis=(0, 1), shift=(1, 0), scale=2.0)
-    )
+    placing = Placing(axis=(0, 1), shift=(1, 0), scale=2.0)
+    quarter = block(Rectangle([0, 1], [0, 2]), contact="bottom", approach=0.0, placing=placing)
     assert quarter.nodes.tolist() == [[2, 0], [2, 2], [-2, 0], [-2, 2]]
     points = np.array([[3.0, 4.0]])
     turned = Placing(LEANING, (1, 2), 0.5).place(points)

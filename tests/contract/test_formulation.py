@@ -1,13 +1,23 @@
 """The contract holds its own rules: a pairing is bounded integers, a promise is data, points of contact are whole."""
 
 from dataclasses import MISSING, FrozenInstanceError, fields
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 
-from contactverif import ContactPoints, ContractError, Interface, MisuseError, Pairing
-from contactverif.contract.traits import Abilities, PatchPromises, Promises, Rules, Traits, traits_behind
+from contactverif import ContactPoints, ContractError, Evidence, Interface, MisuseError, Pairing
+from contactverif.contract.traits import (
+    Abilities,
+    PatchPromises,
+    Promises,
+    Rules,
+    Traits,
+    format_forces,
+    parse_forces,
+    traits_behind,
+)
 
 PAIR = Interface.from_chains([[0, 0], [1, 0]], [[1, 0], [0, 0]])  # eight unknowns
 
@@ -209,3 +219,20 @@ def test_the_traits_behind_a_statement_are_those_without_which_it_would_be_anoth
     both = traits_behind(lambda stated: stated.rules.penalty == "nodal" and stated.rules.area is not None, traits)
     assert both == {"penalty": "nodal", "area": "current"}
     assert traits_behind(lambda stated: True, traits) == {}
+
+
+def test_text_becomes_fractions_and_text_again() -> None:
+    slave, master = parse_forces("1 2 1; 5/3 7/3")
+    assert (slave, master) == ((1, 2, 1), (Fraction(5, 3), Fraction(7, 3)))
+    assert format_forces(slave, master) == "1 2 1; 5/3 7/3"
+
+
+@pytest.mark.parametrize("text", ["", "1 2 1", "1 2 1;", "1; 2; 3", "one; two", "1/0; 1", None, 3])
+def test_other_texts_break_the_contract(text: object) -> None:
+    with pytest.raises(ContractError, match=r"published_forces: found .*; needed fractions on the slave nodes"):
+        Traits(evidence=Evidence(published_forces={"a1": text}))  # type: ignore[dict-item]
+
+
+def test_forces_belong_to_names() -> None:
+    with pytest.raises(ContractError, match=r"published_forces: found a str; needed \{name of a flat case: forces\}"):
+        Traits(evidence=Evidence(published_forces="1 2 1; 2 2"))  # type: ignore[arg-type]

@@ -1,4 +1,7 @@
-"""An interface is either right or refused with one clear line; what it precomputes is what one would draw."""
+"""An interface is either right or refused with one clear line; what it precomputes is what one would draw.
+
+Interfaces of segments in the plane come first, then those of faces in space.
+"""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -6,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from contactverif import Interface, MisuseError, Surface
+from contactverif import Case, Interface, MisuseError, Rules, Subject, Surface, Traits
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[4, 0], [2, 0], [1.5, 0.5], [-1, 0]])
 
@@ -36,31 +39,11 @@ def test_an_open_chain() -> None:
     assert len(chain) == 3
 
 
-def test_a_closed_chain() -> None:
-    ring = surface((0, 1), (2, 0), (1, 2))
-    assert ring.neighbours.tolist() == [[1, 2], [2, 0], [0, 1]]
-    assert ring.chain_order.tolist() == [0, 2, 1]
-
-
 def test_several_chains_open_ones_first() -> None:
     chains = surface((0, 1), (1, 0), (4, 5), (2, 3), (3, 8))
     assert chains.chain_order.tolist() == [2, 3, 4, 0, 1]
     assert chains.chain_starts.tolist() == [0, 1, 3]
     assert chains.neighbours.tolist() == [[1, 1], [0, 0], [-1, -1], [-1, 4], [3, -1]]
-
-
-def test_neighbours_and_order_agree_on_random_chains() -> None:
-    random = np.random.default_rng(1)
-    for _ in range(20):
-        numbers = random.permutation(12)
-        pieces = [numbers[:5], numbers[5:9], numbers[9:]]
-        segments = np.vstack([np.column_stack([piece[:-1], piece[1:]]) for piece in pieces])
-        chains = Surface(segments[random.permutation(len(segments))])
-        assert sorted(chains.chain_order.tolist()) == list(range(len(chains)))
-        for segment, other in zip(chains.chain_order[:-1], chains.chain_order[1:], strict=True):
-            follows = chains.segments[segment, 1] == chains.segments[other, 0]
-            assert follows == (chains.neighbours[segment, 1] == other) == (chains.neighbours[other, 0] == segment)
-        assert (chains.neighbours < 0).sum() == 2 * len(pieces)
 
 
 def test_an_interface() -> None:
@@ -113,6 +96,16 @@ SURFACES = {
     "fork": ([[0, 1], [1, 2], [1, 3]], "segments: found segments 1, 2 that all begin at node 1; needed chains"),
     "join": ([[0, 2], [1, 2], [2, 3]], "segments: found segments 0, 1 that all end at node 2; needed chains"),
     "one against the other": ([[0, 1], [2, 1]], r"segments: .* end at node 1; needed chains: .*body on the left"),
+    "negative corner": ([[0, 1, -1]], "faces: found node number -1; needed node numbers ≥ 0"),
+    "corner twice": (
+        [[0, 1, 2], [1, 3, 1]],
+        r"faces: found face 1 with the corners \[1, 3, 1\]; needed different corners",
+    ),
+    "edge of three": ([[0, 1, 2], [1, 0, 3], [0, 1, 4]], r"faces: found faces 0, 1, 2 on the edge \[0, 1\]; needed a"),
+    "turned": (
+        [[0, 1, 2], [0, 1, 3]],
+        r"faces: found faces 0 and 1, which both run along the edge \[0, 1\]; needed corners counter-clockwise",
+    ),
 }
 
 
@@ -122,29 +115,32 @@ def test_wrong_surfaces(segments: object, message: str) -> None:
         Surface(segments)  # type: ignore[arg-type]
 
 
+SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]])
+BELOW = SQUARE - [0, 0, 1]
+TRIANGLES = [[0, 2, 1], [0, 3, 2]]  # Seen from below, since the slave body is on top.
+SOLID = Interface.from_faces(SQUARE, TRIANGLES, BELOW, [[0, 1, 2, 3]])
+LINE = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+DART = np.array([[0.0, 0, 0], [2, 0, 0], [0.5, 0.5, 0], [0, 2, 0]])
+
+
+def pair(slave: np.ndarray, faces: list[list[int]]) -> Interface:
+    return Interface.from_faces(slave, faces, BELOW, [[0, 1, 2, 3]])
+
+
 INTERFACES: dict[str, tuple[Callable[[], Interface], str]] = {
-    "nan": (
-        lambda: interface(moved_nodes(1, np.nan, 0)),
-        r"nodes: found node 1 at \(nan, 0.0\); needed finite coordinates",
-    ),
+    "nan": (lambda: interface(moved_nodes(1, np.nan, 0)), r"nodes: found node 1 at \(nan, 0.0\); needed finite coord"),
     "infinity": (lambda: interface(moved_nodes(4, 0, -np.inf)), r"nodes: found node 4 at \(0.0, -inf\)"),
     "three coordinates": (
         lambda: interface(np.zeros((5, 3))),
         "slave: found faces of 2 corners and nodes with 3 coordinates; needed segments in the plane",
     ),
-    "four coordinates": (
-        lambda: interface(np.zeros((5, 4))),
-        r"nodes: found an array of shape \(5, 4\); needed shape",
-    ),
+    "four coordinates": (lambda: interface(np.zeros((5, 4))), r"nodes: found an array of shape \(5, 4\); needed shape"),
     "flat": (lambda: interface(np.zeros(10)), r"nodes: found an array of shape \(10,\)"),
     "ragged": (lambda: Interface([[0, 0], [1]], surface((0, 1)), surface((2, 3))), "nodes: found rows of different"),  # type: ignore[arg-type]
     "complex": (lambda: interface(NODES * 1j), "nodes: found dtype complex128; needed real numbers"),
     "text": (lambda: interface(NODES.astype(str)), "nodes: found dtype <U32; needed real numbers"),
     "no surface": (lambda: Interface(NODES, [[0, 1]], surface((3, 4))), "slave: found a list; needed a Surface"),  # type: ignore[arg-type]
-    "zero length": (
-        lambda: interface(moved_nodes(1, 0, 0)),
-        "slave: found segment 0 of zero length; needed two different end",
-    ),
+    "zero length": (lambda: interface(moved_nodes(1, 0, 0)), "slave: found segment 0 of zero length; needed two diff"),
     "zero length of the master": (lambda: interface(moved_nodes(4, 2, 1)), "master: found segment 0 of zero length"),
     "coincident": (
         lambda: interface(moved_nodes(2, 0, 0)),
@@ -166,6 +162,24 @@ INTERFACES: dict[str, tuple[Callable[[], Interface], str]] = {
     "chain of text": (lambda: Interface.from_chains(NODES, [["a", "b"]] * 3), "nodes: found dtype <U32; needed real"),
     "ragged chain": (lambda: Interface.from_chains(NODES, [[0, 0], [1]]), "master: found rows of different lengths"),
     "moved to nowhere": (lambda: PAIR.at(PAIR.nodes[:3]), "master: found nodes 3, 4, 5, 6; needed"),
+    "no area": (lambda: pair(LINE, [[0, 1, 2]]), "slave: found face 0 of no area; needed corners"),
+    "dart": (lambda: pair(DART, [[0, 1, 2, 3]]), "slave: found face 0, a quadrilateral that is not convex"),
+    "points of a plane": (
+        lambda: pair(SQUARE[:, :2], TRIANGLES),
+        r"slave: found an array of shape \(4, 2\); needed shape \(n_po",
+    ),
+    "coincident in space": (
+        lambda: pair(np.vstack([SQUARE, SQUARE[:1]]), [[0, 2, 1], [4, 3, 2]]),
+        r"slave: found coincident nodes 0, 4 at \(0.0, 0.0, 0.0\)",
+    ),
+    "faces in the plane": (
+        lambda: Interface(SQUARE[:, :2], Surface([[0, 1, 2]]), Surface([[3, 4, 5]])),
+        "slave: found faces of 3 corners and nodes with 2 coordinates; needed segments in the plane",
+    ),
+    "unused in space": (
+        lambda: pair(np.vstack([SQUARE, [[9.0, 9, 9]]]), TRIANGLES),
+        "master: found nodes 5, 6, 7, 8; needed",
+    ),
 }
 
 
@@ -215,3 +229,83 @@ def test_neighbours_and_chains_of_any_numbering_are_those_of_a_walk() -> None:
         assert surface.neighbours.tolist() == neighbours
         assert surface.chain_order.tolist() == order
         assert surface.neighbours.dtype == surface.chain_order.dtype == np.int64
+
+
+def test_faces_know_what_lies_across_each_edge() -> None:
+    fan = Surface([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+    assert fan.neighbours.tolist() == [[2, -1, 1], [0, -1, 2], [1, -1, 0]]
+    assert fan.nodes.tolist() == [0, 1, 2, 3]
+    assert len(fan.chain_order) == len(fan.chain_starts) == 0
+    strip = Surface([[0, 1, 4, 3], [1, 2, 5, 4]])
+    assert strip.neighbours.tolist() == [[-1, 1, -1, -1], [-1, -1, -1, 0]]
+
+
+def test_neighbours_of_any_triangles_are_those_of_a_search() -> None:
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        n = int(random.integers(2, 5))
+        corner = np.arange(n * n).reshape(n, n)
+        lower = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:]], -1).reshape(-1, 3)
+        upper = np.stack([corner[:-1, :-1], corner[1:, 1:], corner[:-1, 1:]], -1).reshape(-1, 3)
+        faces = random.permutation(np.vstack([lower, upper]))
+        edges = [[{row[i], row[(i + 1) % 3]} for i in range(3)] for row in faces.tolist()]
+        for face, row in enumerate(Surface(faces).neighbours.tolist()):
+            for edge, neighbour in enumerate(row):
+                across = [other for other, theirs in enumerate(edges) if other != face and edges[face][edge] in theirs]
+                assert across == ([] if neighbour < 0 else [neighbour])
+
+
+def test_an_interface_in_space() -> None:
+    assert (SOLID.dim, SOLID.n_nodes, SOLID.n_slave_nodes, SOLID.n_unknowns) == (3, 8, 4, 24)
+    assert SOLID.master.faces.tolist() == [[4, 5, 6, 7]]
+    assert SOLID.slave.measures(SOLID.nodes).tolist() == [1, 1]
+    assert SOLID.master.measures(SOLID.nodes) == pytest.approx([2])
+    twice = SOLID.swap_roles().swap_roles()
+    assert np.array_equal(twice.nodes, SOLID.nodes)
+    assert np.array_equal(twice.slave.faces, SOLID.slave.faces)
+    assert SOLID.at(2 * SOLID.nodes).slave is SOLID.slave
+
+
+def test_segments_have_faces_and_lengths_as_measures() -> None:
+    plane = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[4, 0], [0, 0]])
+    assert plane.slave.faces is plane.slave.segments
+    for measure in (plane.slave.measures, plane.slave.heights):
+        assert measure(plane.nodes).tobytes() == plane.slave.lengths(plane.nodes).tobytes()
+    with pytest.raises(MisuseError, match="segments: found faces of 3 corners; needed `faces` of a surface in space"):
+        _ = SOLID.slave.segments
+
+
+def test_areas_of_bilinear_faces() -> None:
+    """The area of the hyperbolic paraboloid z = x y over the unit square is known by quadrature to many digits."""
+    saddle = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]])
+    kite = np.array([[0.0, 0, 0], [3, 1, 0], [4, 4, 0], [1, 3, 0]])
+    nodes = np.vstack([saddle, kite])
+    areas = Surface([[0, 1, 2, 3], [4, 5, 6, 7]]).measures(nodes)
+    assert areas == pytest.approx([1.280789, 8.0], rel=1e-5)
+
+
+def test_heights_are_the_least_distances_of_corners_from_edges() -> None:
+    needle = np.array([[0.0, 0, 0], [8, 0, 0], [4, 0.25, 0]])
+    assert Surface([[0, 1, 2]]).heights(needle) == pytest.approx([0.25])
+    assert SOLID.master.heights(SOLID.nodes) == pytest.approx([1.0])
+
+
+def test_a_case_in_space_has_heights_areas_and_faces_in_its_lengths() -> None:
+    case = Case(SOLID, SOLID.nodes.reshape(-1), penalty=8.0)
+    assert case.shortest_segment == pytest.approx(2 / np.sqrt(5))  # The height of a triangle over its diagonal.
+    assert case.slave_length == pytest.approx(np.sqrt(2))
+    assert case.n_segments == 3
+    again = Case.from_arrays(case.to_arrays())
+    assert again.interface.master.faces.tolist() == [[4, 5, 6, 7]]
+    assert again.z.tobytes() == case.z.tobytes()
+
+
+def test_a_nodal_penalty_is_the_stiffness_of_the_area_of_a_node() -> None:
+    class Nodal:
+        traits = Traits(rules=Rules(penalty="nodal"))
+
+        def residual(self, interface: Interface, pairing: object, z: np.ndarray) -> np.ndarray:
+            return 0 * z
+
+    case = Case(SOLID, SOLID.nodes.reshape(-1), penalty=8.0)
+    assert Subject("nodal", lambda *, penalty: Nodal()).penalty(case) == pytest.approx(8.0 * 2 / 4)

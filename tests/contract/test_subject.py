@@ -124,13 +124,10 @@ VERBS = ["pair", "residual", "tangent", "residual_and_tangent", "contact_points"
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_plugin_that_raises(verb: str) -> None:
-    with pytest.raises(
-        PluginError, match=rf"^{verb}: ZeroDivisionError: by nothing \(test_subject\.py, line \d+\)$"
-    ) as caught:
+    message = rf"^{verb}: ZeroDivisionError: by nothing \(test_subject\.py, line \d+\)$"
+    with pytest.raises(PluginError, match=message) as caught:
         answer_to(verb, **{verb: raising})
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
-    assert isinstance(caught.value, ContractError)
-    assert not isinstance(caught.value, MisuseError)
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -178,6 +175,7 @@ def broken_compressed(format_: str, **arrays: Any) -> Any:
 
 
 MOST = 2**31 - 1
+OUT_OF_RANGE = broken_compressed("csr", indices=[*range(9), 10])
 NAN, INF = np.where(np.arange(10) == 3, np.nan, Z), np.where(np.arange(10) < 2, -np.inf, Z)
 
 
@@ -200,10 +198,7 @@ WRONG_ANSWERS: dict[tuple[str, type[ContractError]], list[tuple[Any, str]]] = {
         (np.eye(10).tolist(), "tangent: returned a list; needed an array or scipy.sparse"),
         (np.eye(9), r"tangent: returned shape \(9, 9\); needed \(10, 10\)"),
         (np.eye(10, dtype=np.float32), "tangent: returned dtype float32; needed float64"),
-        (
-            broken_compressed("csr", indices=[*range(9), 10]),
-            "tangent: returned a broken csr matrix: .*ind(ices|ex values) must be < 10",
-        ),
+        (OUT_OF_RANGE, "tangent: returned a broken csr matrix: .*ind(ices|ex values) must be < 10"),
         (broken_compressed("csc", indices=[-1, *range(9)]), "broken csc matrix: .*ind(ices|ex values) must"),
         (broken_compressed("csr", indptr=range(10)), "broken csr matrix: index pointer size"),
         (broken_compressed("csr", indptr=[0, 2, *range(1, 9), 10]), "non-decreasing"),
@@ -211,10 +206,7 @@ WRONG_ANSWERS: dict[tuple[str, type[ContractError]], list[tuple[Any, str]]] = {
             broken_compressed("csr", indptr=np.array([0, MOST, -MOST - 1, -1, *range(4, 11)], np.int32)),
             "non-decreasing",
         ),
-        (
-            broken_compressed("coo", coords=([0, 12], [1, 1]), data=[1.0, 1.0]),
-            "broken coo matrix: axis 0 index 12 exceeds",
-        ),
+        (broken_compressed("coo", coords=([0, 12], [1, 1]), data=[1.0, 1.0]), "broken coo matrix: axis 0 index 12 exc"),
     ],
     ("tangent", NonFiniteError): [
         (np.diag(NAN), "tangent: nan in 1 of 100 entries"),
@@ -229,8 +221,8 @@ WRONG_ANSWERS: dict[tuple[str, type[ContractError]], list[tuple[Any, str]]] = {
         ((Z, np.eye(9)), r"residual_and_tangent\[1\]: returned shape \(9, 9\); needed \(10, 10\)"),
         ((Z, np.eye(10, dtype=int)), "returned dtype int64; needed float64"),
         (
-            (Z, broken_compressed("csr", indices=[*range(9), 10])),
-            r"residual_and_tangent\[1\]: returned a broken csr matrix: .*ind(ices|ex values) must be < 10",
+            (Z, OUT_OF_RANGE),
+            r"residual_and_tangent\[1\]: returned a broken csr matrix: .*ind(ices|ex values) must be <",
         ),
     ],
     ("residual_and_tangent", NonFiniteError): [
@@ -266,15 +258,12 @@ def test_both_in_one_call_where_the_plugin_offers_it() -> None:
     calls: list[Any] = []
     with_it, without = subject(residual_and_tangent=both), subject()
     assert with_it.provides == without.provides | {"residual_and_tangent"}
-    for formulation in (with_it.for_case(CASE), with_it.for_case(CASE).plugin):
-        residual, tangent = evaluate_both(formulation, PAIR, None, Z)
-        assert residual.tolist() == (3 * Z).tolist()
-        assert dense(tangent).tolist() == (3 * np.eye(10)).tolist()
+    for springs, stiffness in ((with_it, 3), (without, 10)):
+        for formulation in (springs.for_case(CASE), springs.for_case(CASE).plugin):
+            residual, tangent = evaluate_both(formulation, PAIR, None, Z)
+            assert residual.tolist() == (stiffness * Z).tolist()
+            assert dense(tangent).tolist() == (stiffness * np.eye(10)).tolist()
     assert calls == [(10,), (10,)]
-    for formulation in (without.for_case(CASE), without.for_case(CASE).plugin):
-        residual, tangent = evaluate_both(formulation, PAIR, None, Z)
-        assert residual.tolist() == (10 * Z).tolist()
-        assert dense(tangent).tolist() == (10 * np.eye(10)).tolist()
     with pytest.raises(ContractError, match=r"^residual_and_tangent: the plugin has no `tangent`; needed both$"):
         subject(residual_and_tangent=both, tangent=None)
 
@@ -289,10 +278,6 @@ def test_one_bad_state_of_a_batch() -> None:
             guarded.residual(PAIR, None, BATCH)
 
 
-class WithoutResidual:
-    """No plugin at all."""
-
-
 class Misspelt:
     """A plugin whose method has another name."""
 
@@ -300,29 +285,20 @@ class Misspelt:
         return z
 
 
+def springs_with(**parts: Any) -> Callable[..., Any]:
+    return lambda *, penalty: Springs(penalty, **parts)
+
+
 @pytest.mark.parametrize(
     ("make", "error", "message"),
     [
         (raising, PluginError, "make: ZeroDivisionError: by nothing"),
-        (
-            lambda: Springs(1.0),
-            ContractError,
-            r"make: found <lambda>\(\) \(.*\); needed <lambda>\(\*, penalty\)",
-        ),
+        (lambda: Springs(1.0), ContractError, r"make: found <lambda>\(\) \(.*\); needed <lambda>\(\*, penalty\)"),
         (lambda *, penalty: Misspelt(), ContractError, "without a `residual`; the nearest name is `residuals`"),
         (lambda *, penalty: None, ContractError, "make: returned a NoneType without a `residual`"),
-        (lambda *, penalty: WithoutResidual(), ContractError, "make: returned a WithoutResidual without a `residual`"),
-        (
-            lambda *, penalty: Springs(penalty, residual=Z),
-            ContractError,
-            "make: returned a Springs without a `residual`",
-        ),
-        (
-            lambda *, penalty: Springs(penalty, traits={"tangent": "exact"}),
-            ContractError,
-            "traits: found a dict; needed",
-        ),
-        (lambda *, penalty: Springs(penalty, traits=None), ContractError, "traits: found a NoneType; needed"),
+        (springs_with(residual=Z), ContractError, "make: returned a Springs without a `residual`"),
+        (springs_with(traits={"tangent": "exact"}), ContractError, "traits: found a dict; needed"),
+        (springs_with(traits=None), ContractError, "traits: found a NoneType; needed"),
     ],
 )
 def test_a_wrong_factory(make: Callable[..., Any], error: type[ContractError], message: str) -> None:
@@ -388,14 +364,7 @@ def test_a_state_of_the_wrong_size_never_reaches_a_plugin() -> None:
     case, formulation = named_case("c"), load_formulation("nts-lm")
     assert isinstance(formulation, Subject)
     guarded = formulation.for_case(case)
-    for ask in (
-        lambda: guarded.pair(case.interface, case.z),
-        lambda: guarded.residual(case.interface, None, case.z),
-        lambda: guarded.tangent(case.interface, None, case.z),
-        lambda: guarded.residual_and_tangent(case.interface, None, case.z),
-        lambda: guarded.contact_points(case.interface, None, case.z),
-    ):
-        with pytest.raises(
-            MisuseError, match=r"z: found shape \(20,\); needed \(\.\.\., 25\), 20 positions and 5 mult"
-        ):
-            ask()
+    state = case.interface, None, case.z
+    for ask, arguments in [(guarded.pair, state[::2]), *((getattr(guarded, verb), state) for verb in VERBS[1:])]:
+        with pytest.raises(MisuseError, match=r"z: found shape \(20,\); needed \(\.\.\., 25\), 20 positions and 5 m"):
+            ask(*arguments)
