@@ -45,7 +45,7 @@ def from_energy(energy: Element, *, pair: Pair, traits: Traits | None = None) ->
         ``decisions`` holds, by name, the row of this element of each other array of the pairing. ``penalty`` is a
         number.
     pair : Callable
-        The function ``pair(interface, z)`` that decides who touches whom, in numpy. It returns a mapping of arrays with
+        The function ``pair(interface, z)`` that decides which nodes touch. It returns a mapping of numpy arrays with
         a row for each element: ``"nodes"``, int64 (n_elements, n_nodes_of_element), and any others of int64 or bool. A
         node may occur twice in a row, where an element has fewer nodes than others.
     traits : Traits | None

@@ -13,7 +13,7 @@ kernel again if its own file has changed. The code of all that it calls is store
 modules that it reads; a change of these counts here, too.
 
 A process that has another folder for what it compiles (NUMBA_CACHE_DIR) reads the usual stores, too, and leaves them as
-they are. So a plugin in a box, which may write to a folder of its own alone, compiles what nobody has compiled.
+they are. So a plugin in a box, which may write to a folder of its own alone, compiles what no store holds.
 
 Rule for the next editor: only this file knows the inside of numba's cache. Where a version of numba has another inside,
 kernels are stored as numba does it, unchecked.

@@ -1,7 +1,7 @@
 """The control: springs between the bodies in the Gauss points of a common mesh of both surfaces, and nothing clever.
 
-It is an engine whose answers are right to the accuracy of its mesh. An accusation of another code stands only if the
-same scene accuses this one not. scikit-fem assembles the stiffness of the bodies.
+It is an engine whose answers are right to the accuracy of its mesh. A failure of another code is believed only if this
+engine passes on the same scene. scikit-fem assembles the stiffness of the bodies.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ class FedooContact:
     def __init__(self, penalty: float, kind: str, reach: float, tol: float) -> None:
         with warnings.catch_warnings():  # It warns that its own solver of linear systems is slow.
             warnings.simplefilter("ignore")
-            import fedoo  # An extra, and whoever does not ask for it need not have it.
+            import fedoo  # An optional dependency.
 
         self.penalty, self.kind, self.reach, self.tol = penalty, kind, reach, tol
         self._fedoo = fedoo

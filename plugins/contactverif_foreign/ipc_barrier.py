@@ -25,7 +25,7 @@ class IpcBarrier:
     """A barrier of ipctk between the nodes of one surface and the segments of the other, both ways."""
 
     def __init__(self, penalty: float, activation: float, kind: str, areas: bool) -> None:
-        import ipctk  # An extra, and whoever does not ask for it need not have it.
+        import ipctk  # An optional dependency.
 
         self.penalty, self.activation, self.areas = penalty, activation, areas
         ipctk.set_num_threads(1)  # Sums whose order depends on threads would differ in their last bits.

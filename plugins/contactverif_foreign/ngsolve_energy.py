@@ -41,7 +41,7 @@ class NGSolveContact:
 
     def __init__(self, penalty: float, is_energy: bool, order: int, reach: float) -> None:
         import netgen.meshing
-        import ngsolve  # An extra, and whoever does not ask for it need not have it.
+        import ngsolve  # An optional dependency.
 
         self.penalty, self.is_energy, self.order, self.reach = penalty, is_energy, order, reach
         self._ng, self._meshing = ngsolve, netgen.meshing

@@ -38,7 +38,7 @@ class OpenSeesContact:
     )
 
     def __init__(self, penalty: float, element: str) -> None:
-        import openseespy.opensees as ops  # An extra, and whoever does not ask for it need not have it.
+        import openseespy.opensees as ops  # An optional dependency.
 
         self.penalty, self.element = penalty, element
         self._ops = ops

@@ -38,8 +38,8 @@ def find_file(file: str) -> Path:
     """Return the absolute path of a shared library; a relative one is looked for in the working folder."""
     path = Path.cwd() / Path(file).expanduser()
     if not path.is_file():
-        found = f"{'a folder' if path.is_dir() else 'no such file'}: {path}"
-        raise MisuseError("option file", found, "a shared library, such as gcc -shared or gfortran -shared makes")
+        place = f"{'a folder' if path.is_dir() else 'no such file'}: {path}"
+        raise MisuseError("option file", place, "a shared library, such as gcc -shared or gfortran -shared makes")
     return path
 
 
@@ -57,7 +57,7 @@ def find_function(library: ctypes.CDLL, path: Path, *names: str) -> Any:
     """Return the first of the functions that the library has."""
     for name in names:
         if hasattr(library, name):
-            return library[name]  # A new object, so that nobody else changes its types.
+            return library[name]  # A new object: its types belong to the caller.
     raise MisuseError("option file", f"{path.name} without the function {names[0]}", f"one of {', '.join(names)}")
 
 

@@ -107,10 +107,10 @@ def find_cells(
         length, _, _ = frame(view.x_a, view.x_b)
         reach = min(farthest, max(length / 16, 4 * depth))
         while True:
-            strip = make_strip(view, reach)
+            strip = _make_strip(view, reach)
             if not _holds(region, strip):
                 region = _make_region(strip, tree[1])
-            count = collect_segments(strip, region.box, tree, waiting, members)
+            count = _collect_segments(strip, region.box, tree, waiting, members)
             count = _find_candidates(x, masters, view, count, slave_longest[s], members, table)
             if reach >= farthest or _hides(table, count, reach / 2):
                 break
@@ -263,7 +263,7 @@ class Strip(NamedTuple):
 
 
 @compile_part
-def make_strip(view: SlaveView, reach: float) -> Strip:
+def _make_strip(view: SlaveView, reach: float) -> Strip:
     """Return the strip over all that a slave segment sees within a reach."""
     a, b, n_a, n_b, straight = view
     d = minus(b, a)
@@ -330,7 +330,7 @@ def _in_rectangle(origin: Vector, low: Vector, high: Vector, box: FloatArray) ->
 
 
 @compile_inline
-def collect_segments(strip: Strip, begin: int, tree: Tree, waiting: IntArray, members: IntArray) -> int:
+def _collect_segments(strip: Strip, begin: int, tree: Tree, waiting: IntArray, members: IntArray) -> int:
     """Write the segments below the box `begin` that may meet the strip, and some more, and return how many there are.
 
     `waiting` (64,) is room for the boxes still to open, and `members` has room for all segments. They come in the

@@ -234,7 +234,7 @@ class Quadrature:
 
 
 def read_only(array: Any) -> Any:
-    """Return a view that nobody writes to: a kernel is compiled once for all arrays."""
+    """Return a read-only view: a kernel is compiled once for all arrays."""
     view = array.view()
     view.flags.writeable = False
     return view

@@ -140,8 +140,8 @@ def _traits(inner: Traits) -> Traits:
     without: they are those of trapezoids between neighbours in the union of the nodes that face a segment.
     """
     passes, kinked, independent, converges, inf_sup, locks = None, None, None, None, None, None
-    # In the second pass nodes of the master enter past the ends of the slave. Who does not cover an overhang counts
-    # such a node at once, so that its force jumps.
+    # In the second pass nodes of the master enter past the ends of the slave. A formulation that does not cover an
+    # overhang counts such a node at once, so that its force jumps.
     continuity = inner.promises.continuity
     if continuity != "jumps" and not inner.promises.patch.overhang:
         continuity = None

@@ -124,8 +124,8 @@ def find_face_cells(
         # A cell's gap is that in its middle, so the question reaches farther than rule 4 by the longest master edge.
         reach = REACH * (slave_edge[s] + longest) + longest
         question[0, 2], question[1, 2] = -reach, reach
-        seen = x, master, origin, axes, on_master
-        n_facing = _collect_facing(members, seen, question, tree)
+        masters = x, master, origin, axes, on_master
+        n_facing = _collect_facing(members, masters, question, tree)
         if count + n_facing > room:
             room = 2 * (count + n_facing)
             old_faces, old_corners = faces, corners
@@ -144,14 +144,14 @@ def find_face_cells(
                 if abs(gap) <= REACH * (slave_edge[s] + master_edge[m]):
                     faces[count, 0], faces[count, 1] = s, m
                     count, most_corners = count + 1, max(most_corners, n_corners)
-        count = _drop_hidden(faces, corners, first, count, table, seen)
+        count = _drop_hidden(faces, corners, first, count, table, masters)
     return faces[:count], corners[:count, :most_corners]
 
 
 @compile_part
-def _collect_facing(members: IntArray, seen: Fields, question: FloatArray, tree: Tree) -> int:
+def _collect_facing(members: IntArray, masters: Fields, question: FloatArray, tree: Tree) -> int:
     """Write the master faces that may overlap a slave face, in ascending order, and return how many."""
-    x, master, origin, axes, on_master = seen
+    x, master, origin, axes, on_master = masters
     n_facing = 0
     for place in range(_collect_boxes(members, tree, origin, axes, question)):
         m = members[place]
@@ -327,9 +327,9 @@ def _height_at(row: FloatArray, x: float, y: float) -> float:
 
 
 @compile_part
-def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, table: FloatArray, seen: Fields) -> int:
+def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, table: FloatArray, masters: Fields) -> int:
     """Keep the cells, from the first one of a slave face on, in whose middle no other master face is nearer."""
-    x, master, origin, axes, on_master = seen
+    x, master, origin, axes, on_master = masters
     for other in range(first, count):
         view_face(on_master, x, master[faces[other, 1]], origin, axes, True)
         for cell in range(first, count):

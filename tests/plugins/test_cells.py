@@ -8,10 +8,9 @@ import pytest
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 from contactverif import Interface, Surface
-from contactverif.geometry.projection import search_tree
 from contactverif_mortar import sts
 from contactverif_mortar.cell_geometry import SlaveView
-from contactverif_mortar.cell_search import collect_segments, make_strip, overlap
+from contactverif_mortar.cell_search import overlap
 from contactverif_mortar.integration_cells import GAP, WEIGHT, C, Cells, Quadrature
 
 MIDPOINT = Quadrature.gauss(1, current=True)
@@ -72,25 +71,6 @@ def test_the_search_finds_what_brute_force_finds() -> None:
             expected += [(s, m) for m, (low, high) in enumerate(every) if low < high]
         # On these surfaces no master lies behind another and none is far away.
         assert sorted(zip(cells.slave, cells.master, strict=True)) == expected
-
-
-def test_the_strip_holds_all_segments_that_have_a_node_in_it() -> None:
-    random = np.random.default_rng(5)
-    for _ in range(200):
-        master = np.column_stack([np.linspace(4, -4, 40), random.normal(size=40)])
-        interface = Interface.from_chains([[0, 9], [1, 9]], master)
-        x = interface.nodes
-        (a, b), lean = random.normal(size=(2, 2)) * 2, random.uniform(-0.5, 0.5)
-        t = (b - a) / np.linalg.norm(b - a)
-        turns = [np.array([[np.cos(w), -np.sin(w)], [np.sin(w), np.cos(w)]]) for w in (lean, -lean)]
-        n_a, n_b = (turn @ [t[1], -t[0]] for turn in turns)
-        strip = make_strip(SlaveView(tuple(a), tuple(b), tuple(n_a), tuple(n_b), straight=False), 1.5)
-        computed = np.empty(len(interface.master), dtype=np.int64)
-        count = collect_segments(strip, 1, search_tree(interface.master, x), np.empty(64, dtype=np.int64), computed)
-        p = x[interface.master.segments]  # (n_segments, 2, 2)
-        near = np.linalg.norm(p - a - np.clip((p - a) @ t, 0, np.linalg.norm(b - a))[..., None] * t, axis=2) < 1.5
-        inside = near & ((p - a) @ [-n_a[1], n_a[0]] > 0) & ((p - b) @ [-n_b[1], n_b[0]] < 0)
-        assert set(np.flatnonzero(inside.any(axis=1))) <= set(computed[:count])
 
 
 def test_the_far_side_of_a_ring_is_not_touched() -> None:

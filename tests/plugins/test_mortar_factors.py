@@ -67,7 +67,7 @@ def test_a_tangent_that_fits_into_no_memory_is_refused_with_its_size(name: str, 
     with pytest.raises(MisuseError, match=r"tangent: found about 161 GiB .* 60003 nodes .* at most 32 GiB; use"):
         plugin.tangent(interface, pairing, z)
     assert np.isfinite(plugin.factors(interface, pairing, z) @ z).all()
-    check_product(np.zeros(3, dtype=np.int64))  # Nobody is active.
+    check_product(np.zeros(3, dtype=np.int64))  # No node is active.
 
 
 @pytest.mark.parametrize("n_finer", [72, 400])

@@ -1,4 +1,4 @@
-"""Lagrange multipliers: the forces of springs and of the paper's tables, who is active, and what they solve."""
+"""Lagrange multipliers: the forces of springs, which points are active, and what they solve."""
 
 import numpy as np
 import pytest
@@ -73,7 +73,9 @@ def test_a_point_that_lets_go_has_its_multiplier_for_a_row(name: str) -> None:
     ],
 )
 @pytest.mark.parametrize("name", SPRINGS)
-def test_who_is_active(name: str, penetration: float, multiplier: float, active: bool) -> None:
+def test_a_point_is_active_where_its_multiplier_outweighs_its_gap(
+    name: str, penetration: float, multiplier: float, active: bool
+) -> None:
     formulation, (interface, z) = load(name, C), make_flat([2, 2], [3, 1])
     x = z.reshape(-1, 2).copy()
     x[: interface.n_slave_nodes, 1] = -penetration
@@ -87,7 +89,7 @@ def test_they_are_counted() -> None:
     assert {name: load(name).n_multipliers(interface) for name in counts} == counts
 
 
-# Solved. `tests/paper/test_paper_table.py` asks who passes on the paper's scenes, and what the multipliers are there.
+# `tests/paper/test_paper_table.py` asks which formulations pass on the paper's scenes, and for their multipliers.
 
 PRESSURE = 100.0
 ROUNDOFF = 1e-11  # The largest error of a stress or a multiplier over the pressure, on even meshes.

@@ -9,7 +9,6 @@ from surfaces import make_bent
 
 from contactverif import Interface
 from contactverif.geometry import threads
-from contactverif_nts.vts_ppt_tangent import WHOLE, list_couplings
 
 NAMES = ("vts-ppt", "vts-ppt:n=3", "vts-ppt-balanced", "vts-ppt-lm")
 H = 2.0**-100  # The length of a complex step.
@@ -43,15 +42,6 @@ def test_the_tangent_grows_with_the_number_of_master_segments_and_not_with_its_s
         interface, z = make_one_over_many(n_master)
         entries.append(formulation.tangent(interface, formulation.pair(interface, z), z).nnz)
     assert entries[1] <= 2.1 * entries[0]
-
-
-@pytest.mark.parametrize(("n_master", "kinds"), [(5, "whole segments"), (22, "points"), (40, "single segments")])
-def test_couplings_become_smaller_where_they_have_too_many_nodes(n_master: int, kinds: str) -> None:
-    formulation, (interface, z) = load("vts-ppt"), make_one_over_many(n_master)
-    surfaces, areas, _ = formulation._arguments(interface, formulation.pair(interface, z), z)
-    _, _, first, end, segment = list_couplings(surfaces, areas, 2, 2, -1)
-    expected = {"whole segments": (2, True), "points": (1, True), "single segments": (1, False)}[kinds]
-    assert ((end - first).max(), bool((segment == WHOLE).all())) == expected
 
 
 @pytest.mark.parametrize("name", NAMES)

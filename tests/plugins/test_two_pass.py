@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from every_formulation import bent_state, load
 from subjects import load_subject
-from surfaces import DEPTH, contact_forces, make_bent, make_flat
+from surfaces import DEPTH, contact_forces, make_flat
 from test_forces import PENALTY
 
-import contactverif_nts
 from contactverif import Abilities, Interface, Pairing, Promises, Scene, Subject, Trace, Traits, solve, two_blocks
 from contactverif.contract.errors import ContractError
 from contactverif.mechanics.bodies import Rectangle
@@ -17,21 +17,7 @@ from contactverif.problems.catalogue import make_scene
 from contactverif.problems.uniform_stress import stress_error
 from contactverif_nts import two_pass
 
-INNERS = ["nts", "nts_ar", "vts_g", "vts_me", "vts_ppt", "vts_ppt_balanced", "nts_lm", "vts_me_lm", "vts_ppt_lm"]
-
-
-def make_two_pass(name: str, **options: Any) -> Any:
-    def inner(*, penalty: float) -> Any:
-        return getattr(contactverif_nts, name)(penalty=penalty, **options)
-
-    return two_pass(penalty=PENALTY, inner=inner)
-
-
-def state(formulation: Any, seed: int) -> tuple[Interface, Any]:
-    """Return a bent scene, with random multipliers where there are any."""
-    interface, z = make_bent(seed)
-    multipliers = np.random.default_rng(seed).uniform(-1, 1, formulation.n_multipliers(interface))
-    return interface, np.append(z, multipliers)
+INNERS = ["nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced", "nts-lm", "vts-me-lm", "vts-ppt-lm"]
 
 
 def swapped_places(formulation: Any, interface: Interface) -> Any:
@@ -44,9 +30,9 @@ def swapped_places(formulation: Any, interface: Interface) -> Any:
 
 @pytest.mark.parametrize("name", INNERS)
 def test_it_is_the_sum_of_both_passes(name: str) -> None:
-    formulation, inner = make_two_pass(name), getattr(contactverif_nts, name)(penalty=PENALTY)
+    formulation, inner = load(f"two-pass/{name}"), load(name)
     for seed in range(20):
-        interface, z = state(formulation, seed)
+        interface, z = bent_state(formulation, seed)
         swapped, n, there = interface.swap_roles(), interface.n_unknowns, 2 * interface.n_slave_nodes
         first = inner.n_multipliers(interface)
         x, multipliers = z[:n], z[n:]
@@ -62,9 +48,9 @@ def test_it_is_the_sum_of_both_passes(name: str) -> None:
 
 @pytest.mark.parametrize("name", INNERS)
 def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
-    formulation, in_contact = make_two_pass(name), 0
+    formulation, in_contact = load(f"two-pass/{name}"), 0
     for seed in range(50):
-        interface, z = state(formulation, seed)
+        interface, z = bent_state(formulation, seed)
         places, swapped = swapped_places(formulation, interface), interface.swap_roles()
         pairing, other = formulation.pair(interface, z), formulation.pair(swapped, z[places])
         forces = formulation.residual(interface, pairing, z)
@@ -76,11 +62,11 @@ def test_exchanging_the_roles_changes_no_force_bitwise(name: str) -> None:
     assert in_contact > 30
 
 
-@pytest.mark.parametrize("name", ["nts_ar", "vts_ppt_balanced", "nts_lm"])
+@pytest.mark.parametrize("name", ["nts-ar", "vts-ppt-balanced", "nts-lm"])
 def test_the_forces_at_its_points_add_up_to_those_on_the_slave(name: str) -> None:
-    formulation = make_two_pass(name)
+    formulation = load(f"two-pass/{name}")
     for seed in range(20):
-        interface, z = state(formulation, seed)
+        interface, z = bent_state(formulation, seed)
         pairing = formulation.pair(interface, z)
         points = formulation.contact_points(interface, pairing, z)
         on_slave = -formulation.residual(interface, pairing, z)[: 2 * interface.n_slave_nodes].reshape(-1, 2)
@@ -94,10 +80,10 @@ def test_the_forces_at_its_points_add_up_to_those_on_the_slave(name: str) -> Non
 
 
 def test_names_of_a_pairing_say_whose_they_are() -> None:
-    formulation = make_two_pass("vts_ppt")
-    interface, z = state(formulation, 0)
+    formulation = load("two-pass/vts-ppt")
+    interface, z = bent_state(formulation, 0)
     pairing = formulation.pair(interface, z)
-    part = contactverif_nts.vts_ppt(penalty=PENALTY).pair(interface, z)
+    part = load("vts-ppt").pair(interface, z)
     assert {name.partition(".")[2] for name in pairing} == set(part)
     assert np.array_equal(pairing["pass_1.first"], part["first"])
     assert len(pairing["pass_2.first"]) == 2 * len(interface.master)
@@ -142,7 +128,7 @@ def test_the_least_plugin_in_two_passes() -> None:
     assert np.array_equal(formulation.residual(interface, None, states), expected)
 
 
-def test_parts_that_a_stranger_does_provide() -> None:
+def test_parts_that_a_plugin_does_provide() -> None:
     subject = wrap(tangent=dense_tangent, pair=lambda interface, z: {"a": np.arange(len(interface.slave))})
     assert subject.provides == {"tangent", "pair"}
     interface, z = make_flat([2, 2, 1], [3, 2])
@@ -165,7 +151,7 @@ def test_parts_that_a_stranger_does_provide() -> None:
         ({"pair": lambda interface, z: {"a": np.array([99])}}, "pair: 'a' holds 99"),
     ],
 )
-def test_what_a_stranger_breaks_is_said_of_it(parts: dict[str, Any], message: str) -> None:
+def test_a_broken_contract_is_that_of_the_inner_formulation(parts: dict[str, Any], message: str) -> None:
     interface, z = make_flat([2, 2], [3, 1])
     formulation = wrap(**parts).with_penalty(3.0)
     with pytest.raises(ContractError, match=message):
@@ -173,28 +159,16 @@ def test_what_a_stranger_breaks_is_said_of_it(parts: dict[str, Any], message: st
 
 
 def test_what_it_promises() -> None:
-    def traits_of(name: str) -> Traits:
-        traits: Traits = make_two_pass(name).traits
-        return traits
-
-    springs = traits_of("nts_ar")
-    inner: Traits = contactverif_nts.nts_ar(penalty=1.0).traits
-    unchanged = (
-        "tangent",
-        "symmetric",
-        "conserves_force",
-        "conserves_moment",
-        "penalty",
-        "takes_complex",
-        "enforcement",
-    )
-    assert all(springs.by_name()[name] == inner.by_name()[name] for name in unchanged)
+    traits = {name: load_subject(f"two-pass/{name}").traits for name in ("nts-ar", "vts-ppt", "nts-lm", "vts-ppt-lm")}
+    springs, inner = traits["nts-ar"], load_subject("nts-ar").traits
+    unchanged = ("tangent", "symmetric", "conserves_force", "conserves_moment", "penalty", "takes_complex")
+    assert all(springs.by_name()[name] == inner.by_name()[name] for name in (*unchanged, "enforcement"))
     assert (springs.promises.patch.flat, springs.rules.area, springs.witness("patch.flat.solve")) == (False, None, "a1")
-    assert traits_of("vts_ppt").promises.patch.flat is False  # springs that act twice
-    assert traits_of("vts_ppt").witness("balance.force") == "tilted"
-    assert traits_of("nts_lm").promises.patch.flat is True
-    assert traits_of("nts_lm").promises.independent_multipliers is False
-    assert traits_of("vts_ppt_lm").promises.patch.flat is None  # λ of which pass?
+    # Springs that act twice, nodal multipliers, and multipliers λ of which pass?
+    flat = [traits[name].promises.patch.flat for name in ("vts-ppt", "nts-lm", "vts-ppt-lm")]
+    assert flat == [False, True, None]
+    assert traits["vts-ppt"].witness("balance.force") == "tilted"
+    assert traits["nts-lm"].promises.independent_multipliers is False
 
 
 def test_by_name_with_options_and_nested() -> None:
@@ -210,7 +184,7 @@ def test_by_name_with_options_and_nested() -> None:
 
 def test_springs_act_twice_and_where_meshes_match_that_is_all() -> None:
     interface, z = make_flat([2, 1, 4], [2, 1, 4])
-    forces = contact_forces(make_two_pass("nts_ar"), interface, z)
+    forces = contact_forces(load("two-pass/nts-ar"), interface, z)
     assert forces[:4, 1].tolist() == [2, 3, 5, 4]
     assert forces[4:, 1].tolist() == [-4, -5, -3, -2]
     assert DEPTH * PENALTY == 1
