@@ -59,7 +59,7 @@ BARE_NODES = Quantity(
 
 
 @cache
-def rings() -> tuple[Case, ...]:
+def _rings() -> tuple[Case, ...]:
     """Return the coarser of both meshes, with either ring as the slave, at two penalties; one case on finer meshes."""
     choices = [(slave, penalty, COARSE, "") for slave, penalty in product(ROLES, PENALTIES)]
     choices.append((ROLES[0], PENALTIES[0], FINE, ", finer"))
@@ -80,25 +80,23 @@ def bound_of_rings(refine: int, penalty: float, traits: Traits) -> float:
     return HALF_PASSES if half_passes and penalty == PENALTIES[1] else BOUNDS[refine]
 
 
-def refuse_unknown_mean(traits: Traits) -> str:
+def _refuse_unknown_mean(traits: Traits) -> str:
     """Return why the mean pressure is unknown from the traits, or an empty string if they say enough."""
     if traits.rules.enforcement == "multiplier":
         return refuse_dependent_multipliers(traits)
     return refuse_unknown_total(traits)
 
 
-def promise_mean(traits: Traits) -> bool | None:
+def _promise_mean(traits: Traits) -> bool | None:
     """Return True where the traits say what the mean pressure is.
 
     Of multipliers it is known if they are unique, unless their inf-sup constant falls as meshes are refined: then
     pressures that alternate from node to node are part of the solution, and what they add to the mean is no second
     order of the mesh.
     """
-    promises = traits.promises
+    promises, multiplier = traits.promises, traits.rules.enforcement == "multiplier"
     unsure = not promises.independent_multipliers or promises.inf_sup is False
-    if refuse_unknown_mean(traits) or (traits.rules.enforcement == "multiplier" and unsure):
-        return None
-    return True
+    return None if _refuse_unknown_mean(traits) or (multiplier and unsure) else True
 
 
 @Property.define(
@@ -106,9 +104,9 @@ def promise_mean(traits: Traits) -> bool | None:
     rank=470,
     family="patch",
     quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES),
-    cases=Cases.from_list(rings),
-    promise=promise_mean,
-    applicable=refuse_unknown_mean,
+    cases=Cases.from_list(_rings),
+    promise=_promise_mean,
+    applicable=_refuse_unknown_mean,
     bodies=True,
     engines=True,
 )
@@ -163,11 +161,11 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
 
 def _measure(study: RingStudy, coarser: int, subject: Subject, quarters: Literal[1, 4]) -> Measurement:
     """Solve a quarter of the rings, or whole ones, on a mesh and one that is twice as fine, and return their errors."""
-    fits = study.fits(subject.traits)
+    fits, meshes = study.fits(subject.traits), (coarser, 2 * coarser)
     means: list[FloatArray] = []  # For each fit: of the slave, of the master, and as reported
     details: dict[str, float] = {}
     bare = 0
-    for refine in (coarser, 2 * coarser):
+    for refine in meshes:
         instance = study.pose(refine, subject.traits, quarters=quarters)
         solution = solve_for_accuracy(instance.scene, subject)
         if not solution.balanced:
@@ -178,25 +176,20 @@ def _measure(study: RingStudy, coarser: int, subject: Subject, quarters: Literal
         details[f"E_F at refine = {refine}"] = instance.errors(solution)[FORCES[0]]
     nearest = np.abs(4 * means[1] - means[0])[:, :2].max(axis=1).argmin()  # The fit that the forces come nearest to.
     coarse, fine = means[0][nearest], means[1][nearest]
-    details |= {
-        f"e_{refine}": float(mean[0]) for refine, mean in zip((coarser, 2 * coarser), (coarse, fine), strict=True)
-    }
+    details |= {f"e_{refine}": float(mean[0]) for refine, mean in zip(meshes, (coarse, fine), strict=True)}
     details["rate"] = float(np.log2(abs(coarse[0] / fine[0]))) if coarse[0] * fine[0] else inf
     slave, master, reported = (np.abs(4 * fine - coarse) / 3).tolist()  # Without their parts of second order
     values = {SLAVE_MEAN: slave, MASTER_MEAN: master}
     if not np.isnan(fine[2]):
         values |= {REPORTED: reported, BESIDE: float(abs(fine[2] - fine[0]))}
-    if isinstance(subject, EngineSubject):
-        numbers = [*check_all(values, WHOLE_CODES), BARE_NODES.check(float(bare), 4.0)]
-        return Measurement(numbers, details=details)
-    return Measurement(check_all(values, bound_of_rings(coarser, study.penalty, subject.traits)), details=details)
+    is_code = isinstance(subject, EngineSubject)
+    bound = WHOLE_CODES if is_code else bound_of_rings(coarser, study.penalty, subject.traits)
+    nodes = (BARE_NODES.check(float(bare), 4.0),) if is_code else ()
+    return Measurement([*check_all(values, bound), *nodes], details=details)
 
 
 def count_bare(interface: Interface, forces: FloatArray) -> int:
-    """Return how many slave nodes have less than a tenth of the force that the lengths of their segments give them.
-
-    The forces are those on all nodes (n_nodes, 2).
-    """
+    """Return how many slave nodes have less than a tenth of the force that the lengths of their segments give them."""
     n_slave = interface.n_slave_nodes
     shares = shape_integrals(interface.slave, interface.nodes)[:n_slave]
     sizes = np.linalg.norm(forces[:n_slave], axis=1)
@@ -263,7 +256,7 @@ FALL = Quantity(
 
 
 @cache
-def kinked_cases() -> tuple[Case, ...]:
+def _kinked_cases() -> tuple[Case, ...]:
     """Return blocks on three broken lines, either block as the slave."""
     return tuple(
         replace(
@@ -279,7 +272,7 @@ def kinked_cases() -> tuple[Case, ...]:
     rank=500,
     family="patch",
     quantities=(STRESS, SLAVE, MASTER, PRESSURE, APPROACH, CUT, FALL),
-    cases=Cases.from_list(kinked_cases),
+    cases=Cases.from_list(_kinked_cases),
     promise=lambda traits: traits.promises.patch.kinked,
     bodies=True,
     exact=lambda case: uniform_forces(case.interface, patch_of(case)[0].pressure),
@@ -319,49 +312,43 @@ def patch_kinked(case: Case, subject: Subject) -> Measurement:
     was judged, and nobody knows whether a solution is near.
     """
     problem, upper_slave = patch_of(case)
-    measurement = _measure_two_normals(problem, upper_slave, case.penalty, subject)
-    fails = any(number.value > number.tolerance for number in measurement.numbers)
-    return _add_three_normals(measurement, fails, problem, upper_slave, subject)
+    return _add_three_normals(_measure_two_normals(case, subject), problem, upper_slave, subject)
 
 
-def _measure_two_normals(problem: KinkedPatch, upper_slave: bool, penalty: float, subject: Subject) -> Measurement:
+def _measure_two_normals(case: Case, subject: Subject) -> Measurement:
     """Return the errors of the uniform state, which is exact."""
-    scene = kinked_patch(problem, upper_slave=upper_slave, penalty=penalty)
-    traits, pressure, gap = subject.traits, problem.pressure, problem.pressure / penalty
+    problem, upper_slave = patch_of(case)
+    penalty, traits, pressure = case.penalty, subject.traits, problem.pressure
+    scene, gap = kinked_patch(problem, upper_slave=upper_slave, penalty=penalty), pressure / penalty
     start = Case(scene.interface, scene.positions(scene.start), penalty)
     formulation, multiplier = subject.for_case(start), traits.rules.enforcement == "multiplier"
     uniform = exact_unknowns(problem, scene, 0.0 if multiplier else gap)
     trace, u, singular = _solve(scene, formulation, uniform, gap)
     q, multipliers = u[: scene.n_free], u[scene.n_free :]
-    end = replace(start, z=scene.positions(q)).with_multipliers(multipliers)
-    contact = FrozenState.at(formulation, end)
-    by_contact = -contact.forces
+    contact = FrozenState.at(formulation, replace(start, z=scene.positions(q)).with_multipliers(multipliers))
+    by_contact, by_bodies = -contact.forces, scene.nodal_forces(q)
     exact, n_slave = uniform_forces(scene.interface, pressure), scene.interface.n_slave_nodes
-    by_bodies = scene.nodal_forces(q)
     errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
-    errors /= np.linalg.norm(exact, axis=1).max()
-    values = {
-        STRESS: kink_stress_error(problem, scene, q),
-        SLAVE: float(errors[:n_slave].max()),
-        MASTER: float(errors[n_slave:].max()),
-    }
-    if _knows_its_pressure(contact, traits):
+    slave, master = np.split(errors / np.linalg.norm(exact, axis=1).max(), [n_slave])
+    values = {STRESS: _kink_stress_error(problem, scene, q), SLAVE: float(slave.max()), MASTER: float(master.max())}
+    unique = not multiplier or traits.promises.independent_multipliers is True
+    # Nobody says how two passes share the pressure.
+    if unique and traits.rules.penalty == "distributed" and contact.has_points and not contact.points.on_master.any():
         values[PRESSURE] = _pressure_error(contact.points, pressure)
-    floor = kink_floor(problem, start, gap)
+    floor = _kink_floor(problem, start, gap)
     tolerances = dict.fromkeys(values, floor + problem.contraction) | {STRESS: floor}
     if multiplier or not refuse_unknown_total(traits):
-        values[APPROACH] = _approach_error(scene, q, uniform[: scene.n_free], gap)
-        tolerances[APPROACH] = _approach_tolerance(problem, start, floor)
+        # The mean motion of the slave's nodes past those of the master, less that of the uniform state, over g.
+        motion = (scene.positions(q) - scene.positions(uniform[: scene.n_free])).reshape(-1, 2) / gap
+        of_slave, of_master = (part.mean(axis=0) for part in np.split(motion, [n_slave]))
+        values[APPROACH] = float(np.linalg.norm(of_slave - of_master))
+        sides = start.interface.slave, start.interface.master
+        bent = penalty * max(side.lengths(start.positions).max() for side in sides) / problem.young
+        sine = problem.sharpest / np.hypot(1, problem.sharpest)
+        tolerances[APPROACH] = float(((1 + bent) * floor + problem.contraction) / sine)
     idle = not by_contact.any()
     undecided = "Newton's method: the matrix at the exact state is singular" if singular and not idle else ""
     return Measurement(check_all(values, tolerances), undecided, details=end_details(trace), idle=idle)
-
-
-def _knows_its_pressure(contact: FrozenState, traits: Traits) -> bool:
-    """Return whether contact points report the pressure; nobody says how two passes share it."""
-    unique = traits.rules.enforcement != "multiplier" or traits.promises.independent_multipliers is True
-    distributed = traits.rules.penalty == "distributed"
-    return unique and distributed and contact.has_points and not contact.points.on_master.any()
 
 
 def _solve(
@@ -382,7 +369,7 @@ def _solve(
 
 
 def _add_three_normals(
-    measurement: Measurement, fails: bool, problem: KinkedPatch, upper_slave: bool, subject: Subject
+    measurement: Measurement, problem: KinkedPatch, upper_slave: bool, subject: Subject
 ) -> Measurement:
     """Return the measurement with what the cut ridge adds; a failure of the uniform state decides without it."""
     stiff = replace(problem.cut(), pressure=STRAINS[1] * problem.young)
@@ -393,9 +380,10 @@ def _add_three_normals(
         solution = solve_for_accuracy(scene, subject)
         if solution.trace is None or not solution.balanced:
             break
-        errors.append(kink_stress_error(stiff, scene, solution.trace.solution))
-        floors.append(kink_floor(stiff, solution.state, stiff.pressure / penalty))
+        errors.append(_kink_stress_error(stiff, scene, solution.trace.solution))
+        floors.append(_kink_floor(stiff, solution.state, stiff.pressure / penalty))
     if len(errors) < 2:
+        fails = any(number.value > number.tolerance for number in measurement.numbers)
         reason = f"Newton's method with three normals: {solution.end}"
         return measurement if fails else Measurement(undecided=reason, details=measurement.details)
     numbers = [*measurement.numbers, CUT.check(errors[1], max(SHARE / STIFF[1], floors[1]))]
@@ -406,30 +394,14 @@ def _add_three_normals(
     return replace(measurement, numbers=numbers, details=details)
 
 
-def kink_floor(problem: KinkedPatch, state: Case, gap: float) -> float:
+def _kink_floor(problem: KinkedPatch, state: Case, gap: float) -> float:
     """Return T = (g/ℓ) tan(φ/2) (4 + tan(φ/2) tan(φ)/2) + u (8X/g + 4N)."""
     half = problem.sharpest  # With t = tan(φ/2), tan(φ) = 2t/(1 − t²).
     moved = gap / state.shortest_segment * half * (4 + half**2 / (1 - half**2))
     return moved + UNIT_ROUNDOFF * (8 * state.largest_coordinate / gap + 4 * state.n_segments)
 
 
-def _approach_error(scene: Scene, q: FloatArray, uniform: FloatArray, gap: float) -> float:
-    """Return the mean motion of the slave's nodes past those of the master, less that of the uniform state, over g."""
-    errors = (scene.positions(q) - scene.positions(uniform)).reshape(-1, 2) / gap
-    slave, master = np.split(errors, [scene.interface.n_slave_nodes])
-    return float(np.linalg.norm(slave.mean(axis=0) - master.mean(axis=0)))
-
-
-def _approach_tolerance(problem: KinkedPatch, state: Case, forces: float) -> float:
-    """Return ((1 + ε̂ h/E) T + p (1 + ν)(1 − 2ν)/E)/sin(φ/2), from the tolerance T of forces."""
-    sides = state.interface.slave, state.interface.master
-    longest = max(side.lengths(state.positions).max() for side in sides)
-    bent = state.penalty * longest / problem.young
-    sine = problem.sharpest / np.hypot(1, problem.sharpest)
-    return float(((1 + bent) * forces + problem.contraction) / sine)
-
-
-def kink_stress_error(problem: KinkedPatch, scene: Scene, q: FloatArray) -> float:
+def _kink_stress_error(problem: KinkedPatch, scene: Scene, q: FloatArray) -> float:
     """Return the largest entry of σ + p I at the Gauss points over p."""
     exact = np.array([-problem.pressure, -problem.pressure, 0.0])
     return max(float(np.abs(stresses - exact).max()) for stresses in scene.stresses(q)) / problem.pressure
@@ -458,7 +430,7 @@ KINK_FORCES = Quantity("error of a nodal force", KINK_TERMS, KINK_REASON)
     needs=frozenset({SOLVE}),
     bodies=True,
     quantities=(KINK_STRESS, KINK_FORCES),
-    cases=Cases.from_list(kinked_cases),
+    cases=Cases.from_list(_kinked_cases),
     promise=lambda traits: traits.promises.patch.kinked,
 )
 def engine_kinked(case: Case, subject: Subject) -> Measurement:
@@ -484,7 +456,7 @@ def engine_kinked(case: Case, subject: Subject) -> Measurement:
     q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
     exact = uniform_forces(scene.interface, problem.pressure)
     errors = np.linalg.norm(solution.forces - exact, axis=1) / np.linalg.norm(exact, axis=1).max()
-    tolerance = kink_floor(problem, case, problem.pressure / case.penalty) + problem.contraction
+    tolerance = _kink_floor(problem, case, problem.pressure / case.penalty) + problem.contraction
     tolerance += engine_tolerance(scene, solution, subject.engine_traits.accuracy, problem.pressure)
-    values = {KINK_STRESS: kink_stress_error(problem, scene, q), KINK_FORCES: float(errors.max())}
+    values = {KINK_STRESS: _kink_stress_error(problem, scene, q), KINK_FORCES: float(errors.max())}
     return Measurement(check_all(values, tolerance))

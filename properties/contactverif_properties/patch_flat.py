@@ -136,60 +136,53 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     return Measurement([TOTAL.check(value, tolerance)], undecided, finding=finding)
 
 
-def measure_class(case: Case, subject: Subject) -> Measurement:
+def _measure_class(case: Case, subject: Subject) -> Measurement:
     """Compare forces, reported gaps and reported pressures of a uniform penetration with the exact ones."""
-    return _unless_end_is_lost(case, partial(_measure_once, subject=subject))
+
+    def measure(case: Case) -> Measurement:
+        transmission = exact_forces.measure_transmission(FORCE, case, subject=subject)
+        numbers, state = [*transmission.numbers], exact_forces.uniform_state(case, subject)
+        if state.has_points and subject.traits.rules.enforcement != "barrier":  # Its gaps and pressures are its own.
+            depth = case.parameter("penetration")
+            errors = exact_forces.point_errors(state, case.penalty, case.penalty * depth)
+            # A nodal formulation knows forces only.
+            reported = (GAP,) if subject.traits.rules.penalty == "nodal" else (GAP, PRESSURE)
+            numbers += check_all(dict(zip(reported, errors, strict=False)), roundoff.gap_tolerance(case, depth))
+        return Measurement(numbers, finding=transmission.finding)
+
+    return _unless_end_is_lost(case, measure)
 
 
 def _unless_end_is_lost(case: Case, measure: Callable[[Case], Measurement], most: float = np.inf) -> Measurement:
     """Return what is measured in a case, undecided if it fails only where roundoff decides whether an end overhangs.
 
-    `measure` returns the numbers of a case. More than `most` times a tolerance is never undecided.
+    More than `most` times a tolerance is never undecided. A failure counts as one of roundoff if it is gone with the
+    end a rounding further inside, and a quarter of what it was or less.
     """
-    measurement = measure(case)
-    if _is_within(measurement, 1.0) or not _is_within(measurement, most):
-        return measurement
-    inside = _move_ends_inwards(case)
-    loses_end = inside is not None and _heals(measurement, measure(inside))
-    return replace(measurement, undecided=LOST_END if loses_end else "")
-
-
-def _measure_once(case: Case, subject: Subject) -> Measurement:
-    """Return the numbers of `measure_class`; nothing is undecided yet."""
-    transmission = exact_forces.measure_transmission(FORCE, case, subject=subject)
-    numbers = [*transmission.numbers]
-    state = exact_forces.uniform_state(case, subject)
-    if state.has_points and subject.traits.rules.enforcement != "barrier":  # Its gaps are open, its pressures its own.
-        tolerance = roundoff.gap_tolerance(case, case.parameter("penetration"))
-        gap, pressure = exact_forces.point_errors(state, case.penalty, case.penalty * case.parameter("penetration"))
-        numbers.append(GAP.check(gap, tolerance))
-        if subject.traits.rules.penalty != "nodal":  # A nodal formulation knows forces only.
-            numbers.append(PRESSURE.check(pressure, tolerance))
-    return Measurement(numbers, finding=transmission.finding)
+    before = measure(case)
+    if _is_within(before, 1.0) or not _is_within(before, most) or (inside := _move_ends_inwards(case)) is None:
+        return before
+    after = measure(inside)
+    failures = [number.quantity.name for number in before.numbers if number.value > number.tolerance]
+    heals = _is_within(after, _MOVED) and all(4 * after.values[name] <= before.values[name] for name in failures)
+    return replace(before, undecided=LOST_END if heals else "")
 
 
 def _is_within(measurement: Measurement, factor: float) -> bool:
     return all(number.value <= factor * number.tolerance for number in measurement.numbers)
 
 
-def _heals(before: Measurement, after: Measurement) -> bool:
-    """Return whether values that failed are at roundoff afterwards, and a quarter of what they were or less."""
-    failures = [number.quantity.name for number in before.numbers if number.value > number.tolerance]
-    return _is_within(after, _MOVED) and all(4 * after.values[name] <= before.values[name] for name in failures)
-
-
 def _move_ends_inwards(case: Case) -> Case | None:
     """Return the case with end nodes of the slave that face a free end of the master exactly moved inwards by roundoff.
 
-    Roundoff decides whether such a node is over the master. None if there is no such node, or in space.
+    None if there is no such node, or in space.
     """
     if case.interface.dim != PLANE:
         return None
-    interface, along = case.interface, case.parameters["along"].copy()
+    slave, master = case.interface.slave, case.interface.master
+    along, positions = case.parameters["along"].copy(), case.positions.copy()
     reach = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
-    slave = interface.slave
-    master_ends = along[interface.master.segments[interface.master.neighbours < 0]]
-    positions = case.positions.copy()
+    master_ends = along[master.segments[master.neighbours < 0]]
     moved = False
     for segment, end in np.argwhere(slave.neighbours < 0):
         node, other = slave.segments[segment, [end, 1 - end]]
@@ -198,9 +191,7 @@ def _move_ends_inwards(case: Case) -> Case | None:
             along[node] += step
             positions[node] += step * case.parameters["direction"]
             moved = True
-    if not moved:
-        return None
-    return replace(case, z=positions.reshape(-1), parameters={**case.parameters, "along": along})
+    return replace(case, z=positions.reshape(-1), parameters={**case.parameters, "along": along}) if moved else None
 
 
 _define_class = partial(
@@ -244,7 +235,7 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 8 and 11, Section 4.
     """
-    return measure_class(case, subject)
+    return _measure_class(case, subject)
 
 
 @_define_class(id="patch.flat.single", rank=200, role="exact", cases=Cases.random(single_cases), promise=promise_single)
@@ -266,7 +257,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Fig. 16, Section 5.1.2.
     """
-    return measure_class(case, subject)
+    return _measure_class(case, subject)
 
 
 @_define(
@@ -300,17 +291,11 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
 
     **Source.** Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
     """
-    state, interface, depth = (
-        FrozenState.at(subject.for_case(case), case),
-        case.interface,
-        case.parameter("penetration"),
-    )
-    spring = subject.penalty(case) * depth
-    unbiased = bool(subject.traits.promises.unbiased)
-    if interface.dim == PLANE:
-        weights = nodal_spring_weights(interface, case.parameters["along"], both_surfaces=unbiased)
-    else:
-        weights = nodal_surface_weights(interface, case.parameters["plane"], both_surfaces=unbiased)
+    state, interface = FrozenState.at(subject.for_case(case), case), case.interface
+    depth, unbiased = case.parameter("penetration"), bool(subject.traits.promises.unbiased)
+    spring, in_plane = subject.penalty(case) * depth, interface.dim == PLANE
+    weights_of, places = (nodal_spring_weights, "along") if in_plane else (nodal_surface_weights, "plane")
+    weights = weights_of(interface, case.parameters[places], both_surfaces=unbiased)
     exact = spring * exact_forces.push_apart(case, weights, 1.0)
     forces = -state.forces
     if unbiased:
@@ -358,22 +343,28 @@ def patch_flat_published(case: Case, subject: Subject) -> Measurement:
     stated = _stated_forces(case, subject.traits)
     if stated is None:
         return Measurement(idle=True)
-    n_slave, forces = case.interface.n_slave_nodes, _forces_of_unit(case, subject)
-    error = float(np.linalg.norm(forces - stated, axis=1).max() / np.abs(stated[:n_slave]).sum())
-    number = STATED.check(error, roundoff.gap_tolerance(case, case.parameter("penetration")))
+    state, depth = exact_forces.uniform_state(case, subject, 1.0), case.parameter("penetration")
+    if state.case.n_multipliers:
+        forces = -exact_forces.unit_forces(state).sum(axis=1).reshape(-1, 2)
+    else:
+        forces = -state.forces / (subject.penalty(case) * depth)
+    size = np.abs(stated[: case.interface.n_slave_nodes]).sum()
+    error = float(np.linalg.norm(forces - stated, axis=1).max() / size)
+    number = STATED.check(error, roundoff.gap_tolerance(case, depth))
     finding = exact_forces.worst_force(case.interface, forces, stated) if number.ratio > 1 else None
     return Measurement([number], finding=finding)
 
 
 def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
     """Return the forces (n_nodes, 2) that must come out; None if that is not known."""
-    if strangers := traits.evidence.published_forces.keys() - set(FLAT_NAMES):
+    published = traits.evidence.published_forces
+    if strangers := published.keys() - set(FLAT_NAMES):
         needed = f"names of flat cases: {', '.join(FLAT_NAMES)}"
         raise ContractError(f"Traits.published_forces: found {', '.join(sorted(strangers))}; needed {needed}")
-    if case.name not in traits.evidence.published_forces:
+    if case.name not in published:
         consistent = traits.promises.patch.flat and traits.rules.penalty == "distributed"
         return exact_forces.consistent_forces(case, 1.0) if consistent else None
-    slave, master = parse_forces(traits.evidence.published_forces[case.name])
+    slave, master = parse_forces(published[case.name])
     slave_x, master_x = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     if (len(slave), len(master)) != (len(slave_x), len(master_x)):
         counts = f"{len(slave)} and {len(master)} forces on {case.name}"
@@ -383,14 +374,6 @@ def _stated_forces(case: Case, traits: Traits) -> FloatArray | None:
     forces = np.zeros((len(from_left), 2))
     forces[from_left, 1] = [*map(float, slave), *(-float(force) for force in master)]
     return forces
-
-
-def _forces_of_unit(case: Case, subject: Subject) -> FloatArray:
-    """Return the forces (n_nodes, 2) over penalty × penetration, or those of unit multipliers."""
-    state = exact_forces.uniform_state(case, subject, 1.0)
-    if state.case.n_multipliers:
-        return np.asarray(-exact_forces.unit_forces(state).sum(axis=1).reshape(-1, 2))
-    return -state.forces / (subject.penalty(case) * case.parameter("penetration"))
 
 
 _END_SPRINGS = "Nodal springs are n + 1 for n segments, and roundoff may lose the two halves at the ends."
@@ -447,9 +430,10 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Never.
     """
-    n, traits, depth = _count_springs(case), subject.traits, case.parameter("penetration")
+    interface, traits, depth = case.interface, subject.traits, case.parameter("penetration")
+    n = len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes
     away = np.zeros_like(case.positions)
-    away[: case.interface.n_slave_nodes] = depth / 2 * exact_forces.normal_of(case)
+    away[: interface.n_slave_nodes] = depth / 2 * exact_forces.normal_of(case)
     parameters = {**case.parameters, "penetration": np.array(depth / 2)}
     half = replace(case, z=(case.positions + away).reshape(-1), parameters=parameters)
     (springs, opposite, largest), (shallow, *_) = _springs(case, subject), _springs(half, subject)
@@ -461,39 +445,26 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
     numbers = [
         MOST.check(max(springs, opposite), passes * (1 + 1 / n) + tolerance),
         LEAST.check(min(springs, opposite), passes * (1 - 1 / n) - tolerance),
-        PUSH.check(largest, LARGEST_PUSH * passes),
+        PUSH.check(largest * n, LARGEST_PUSH * passes),
     ]
-    finding = (
-        None if passes == 1 or traits.promises.unbiased else Finding(_say(springs, "two passes, or twice too stiff"))
-    )
+    remark = "" if passes == 1 or traits.promises.unbiased else "two passes, or twice too stiff"
     if any(number.ratio > 1 for number in numbers):
-        right = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if may_act_twice(traits) else "")
+        remark = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if may_act_twice(traits) else "")
         if abs(opposite - springs) > abs(springs) / n:
-            right = f"the master gets {opposite:#.3g} ε̂ L; {right}"
-        finding = Finding(_say(springs, right))
+            remark = f"the master gets {opposite:#.3g} ε̂ L; {remark}"
+    finding = Finding(f"your springs are {springs:#.3g} ε̂ L: {remark}") if remark else None
     return Measurement(numbers, details=details, finding=finding)
-
-
-def _say(springs: float, remark: str) -> str:
-    return f"your springs are {springs:#.3g} ε̂ L: {remark}"
 
 
 def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
     """Return the forces that push the slave out of the master, and the master out of the slave, over ε̂ |g| L.
 
-    The third number is the largest force on a node over that of a slave segment of mean length, or of the mean area of
-    a slave node.
+    The third number is the largest force on a node.
     """
     pushes = -exact_forces.uniform_state(case, subject).forces @ exact_forces.normal_of(case)
     size = case.penalty * case.parameter("penetration") * case.slave_measure
     slave, master = np.split(pushes / size, [case.interface.n_slave_nodes])
-    largest = float(np.abs(pushes).max()) / size * _count_springs(case)
-    return float(slave.sum()), -float(master.sum()), largest
-
-
-def _count_springs(case: Case) -> int:
-    interface = case.interface
-    return len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes
+    return float(slave.sum()), -float(master.sum()), float(np.abs(pushes).max()) / size
 
 
 OFF_NORMAL = roundoff.stated_gap_quantity("part of the force off the normal")
@@ -503,16 +474,20 @@ TILTED, STEEP = "tilted by 3° to 35°", "tilted by 35° to 89°"
 
 
 @random_source("contactverif_properties.straight_slaves.resultant_cases")
-def resultant_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+def _resultant_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return {kind: strategy} of tilted and of steep slaves; None for a given mesh."""
     tilted, steep = tilted_cases(interface), steep_cases(interface)
     return {TILTED: tilted, STEEP: steep} if tilted is not None and steep is not None else None
 
 
+def _refuse_unknown_direction(traits: Traits) -> str:
+    known = traits.rules.force_along is not None
+    return "" if known else "the trait `force_along` is not stated, so the direction of the force is unknown"
+
+
 def _tolerance(case: Case, traits: Traits) -> float:
-    return roundoff.gap_tolerance(
-        case, abs(float(exact_forces.node_gaps(case).mean())), roundoff.rounding_distance(case, traits)
-    )
+    mean_gap = abs(float(exact_forces.node_gaps(case).mean()))
+    return roundoff.gap_tolerance(case, mean_gap, roundoff.rounding_distance(case, traits))
 
 
 @Property.define(
@@ -520,15 +495,11 @@ def _tolerance(case: Case, traits: Traits) -> float:
     rank=250,
     family="patch",
     quantities=(OFF_NORMAL, TILTED_TOTAL),
-    cases=Cases.by_kind(resultant_cases),
+    cases=Cases.by_kind(_resultant_cases),
     cases_in_space=Cases.random(tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
-    applicable=lambda traits: (
-        ""
-        if traits.rules.force_along is not None
-        else "the trait `force_along` is not stated, so the direction of the force is unknown"
-    ),
+    applicable=_refuse_unknown_direction,
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
@@ -562,8 +533,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     normal = exact_forces.directions(case)[0 if traits.rules.force_along == "master normal" else 1]
     push, across = float(total @ normal), exact_forces.distance_from_line(total, normal)
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
-    values = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}
-    errors = {OFF_NORMAL: across}
+    values, errors = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}, {OFF_NORMAL: across}
     if exact_forces.knows_linear_total(traits):
         exact = float(np.linalg.norm(exact_forces.exact_slave_forces(case, traits).sum(axis=0)))
         errors[TILTED_TOTAL] = abs(push - exact)
@@ -577,7 +547,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerance), undecided, broken)
 
 
-def refuse_unknown_integral(traits: Traits) -> str:
+def _refuse_unknown_integral(traits: Traits) -> str:
     """Return why no exact nodal force follows from the traits, or an empty string if one does."""
     if traits.rules.enforcement == "multiplier":
         return "multipliers have pressures of their own, not those of a gap"
@@ -594,7 +564,7 @@ def refuse_unknown_integral(traits: Traits) -> str:
     cases=Cases.random(tilted_cases),
     cases_in_space=Cases.random(tilted_plane_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
-    applicable=refuse_unknown_integral,
+    applicable=_refuse_unknown_integral,
 )
 def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
     """Each node of a straight, tilted slave gets the exact integral of its linear gap.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, dense
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.measurement import Measurement, Quantity, check_all
@@ -50,7 +50,7 @@ REPORTED_PRESSURES = Quantity(
 )
 
 
-def measure_engine(
+def _measure_engine(
     case: Case, subject: EngineSubject, penalty: float, quantities: tuple[Quantity, Quantity, Quantity, Quantity]
 ) -> Measurement:
     """Return the errors of stress, slave forces, master forces and gap of a scene whose pressure is uniform.
@@ -59,29 +59,31 @@ def measure_engine(
     judged by its own mean pressure, and neither its gap nor what it reports is asked. Forces and pressures that other
     codes report are judged.
     """
-    traits, stress, gap = subject.engine_traits, quantities[0], quantities[3]
+    traits, (stress, slave, master, gap) = subject.engine_traits, quantities
     scene = replace(scene_of(case), penalty=penalty)
     solution, answer = solve_by_engine(scene, subject, linear=True)
-    if answer is None:
-        return Measurement(undecided=solution.no_solution)
-    details = {CODE_ITERATIONS: float(answer.iterations)}
-    if solution.no_solution:
+    details = {} if answer is None else {CODE_ITERATIONS: float(answer.iterations)}
+    if answer is None or solution.no_solution:
         return Measurement(undecided=solution.no_solution, details=details)
     pressure = float(pressure_of(case, penalty if traits.enforcement == "penalty" else np.inf))
-    if traits.enforcement == "own":
-        mean = _mean_pressure(case, solution)
+    if traits.enforcement == "own":  # The mean pressure on the slave where the master covers it.
+        normal, n_slave = exact_forces.normal_of(case), case.interface.n_slave_nodes
+        sides = (solution.forces[:n_slave], exact_forces.consistent_forces(case, 1.0)[:n_slave])
+        force, length = (float((forces @ normal).sum()) for forces in sides)
+        mean = force / length
         details[OWN_PRESSURE] = mean / pressure
         pressure = mean if mean > 0 else pressure
     q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
+    errors = np.linalg.norm(solution.forces - exact_forces.consistent_forces(case, pressure), axis=1)
+    errors[_rigid_nodes(scene)] = 0.0
     values = {stress: stress_error(scene, scene.stresses(q), pressure)}
-    values |= dict(zip(quantities[1:3], _force_errors(case, scene, solution, pressure), strict=True))
+    values |= dict(zip((slave, master), _by_side(case, errors, pressure), strict=True))
     tolerance = engine_tolerance(scene, solution, traits.accuracy, pressure)
     tolerances = dict.fromkeys(values, tolerance)
     if traits.enforcement != "own":
         rounding = POSITION_ROUNDINGS * UNIT_ROUNDOFF * case.largest_coordinate * penalty / pressure
-        reported = _judge_reports(answer, case, scene, pressure)
-        values |= {quantity: error for quantity, (error, _) in reported.items()}
-        tolerances |= {quantity: (tolerance + rounding) / share for quantity, (_, share) in reported.items()}
+        for quantity, (error, share) in _judge_reports(answer, case, scene, pressure).items():
+            values[quantity], tolerances[quantity] = error, (tolerance + rounding) / share
         penetration = pressure / penalty if traits.enforcement == "penalty" else 0.0
         state = replace(case, z=solution.state.z, penalty=penalty)
         values[gap] = exact_forces.gap_error(state, penetration, pressure / penalty)
@@ -112,23 +114,14 @@ def _judge_reports(
     return errors
 
 
-def _mean_pressure(case: Case, solution: Solution) -> float:
-    """Return the mean pressure on the slave where the master covers it."""
-    normal, n_slave = exact_forces.normal_of(case), case.interface.n_slave_nodes
-    force, length = (
-        float((forces[:n_slave] @ normal).sum())
-        for forces in (solution.forces, exact_forces.consistent_forces(case, 1.0))
-    )
-    return force / length
+def _rigid_nodes(scene: Scene) -> BoolArray:
+    """Return which nodes (n_nodes,) of the interface are those of rigid bodies; what these need is not known."""
+    bodies = [scene.bodies[index] for index in scene.bodies_in_reach]
+    return np.concatenate([np.full(len(body.contact_nodes), body.rigid) for body in bodies])
 
 
-def _force_errors(case: Case, scene: Scene, solution: Solution, pressure: float) -> tuple[float, float]:
-    """Return the largest error of a nodal force on the slave and on the master, over p L."""
-    errors = np.linalg.norm(solution.forces - exact_forces.consistent_forces(case, pressure), axis=1)
-    rigid = np.concatenate(
-        [np.full(len(body.contact_nodes), body.rigid) for body in (scene.bodies[i] for i in scene.bodies_in_reach)]
-    )
-    errors[rigid] = 0.0
+def _by_side(case: Case, errors: FloatArray, pressure: float) -> tuple[float, float]:
+    """Return the largest error of a nodal force (n_nodes,) on the slave and on the master, over p L."""
     slave, master = np.split(errors / (pressure * case.slave_length), [case.interface.n_slave_nodes])
     return float(slave.max()), float(master.max())
 
@@ -139,18 +132,13 @@ def engine_tolerance(scene: Scene, solution: Solution, accuracy: float, pressure
     U is at most the size of the interface, or a body that flies away would excuse itself.
     """
     modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
-    nodes = scene.interface.nodes
+    nodes, stiffness = scene.interface.nodes, dense(scene.stiffness)
     shortest = min(float(side.lengths(nodes).min()) for side in (scene.interface.slave, scene.interface.master))
     displacement = min(float(np.abs(solution.displacements).max()), float(np.ptp(nodes, axis=0).max()))
-    return float(accuracy * (1 + modulus * displacement / (shortest * pressure)) + 1e-12 * _condition(scene))
-
-
-def _condition(scene: Scene) -> float:
-    """Return the condition κ of the condensed stiffness, without the motions that it does not resist."""
-    stiffness = scene.stiffness if isinstance(scene.stiffness, np.ndarray) else scene.stiffness.toarray()
     sizes: FloatArray = np.abs(np.linalg.eigvalsh(stiffness)) if len(stiffness) else np.ones(1)
-    resisted = sizes[sizes > len(sizes) * UNIT_ROUNDOFF * sizes.max()]
-    return float(resisted.max() / resisted.min())
+    resisted = sizes[sizes > len(sizes) * UNIT_ROUNDOFF * sizes.max()]  # Motions of a free body are not resisted.
+    condition = float(resisted.max() / resisted.min())
+    return float(accuracy * (1 + modulus * displacement / (shortest * pressure)) + 1e-12 * condition)
 
 
 ITERATIONS = 25  # A method that transmits a uniform pressure needs one iteration. The others need a few more.
@@ -186,7 +174,7 @@ QUANTITIES = (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP, PRESSURE, REPORTED_FORCE
 def measure_once(case: Case, subject: Subject) -> Measurement:
     """Solve the scene of the case at its own penalty, or with multipliers, and return the errors."""
     if subject.traits.rules.enforcement == "multiplier" and not isinstance(subject, EngineSubject):
-        return measure_with_multipliers(case, subject)
+        return _measure_with_multipliers(case, subject)
     return measure_at_penalty(case, subject, case.penalty)
 
 
@@ -194,18 +182,20 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     """Solve the scene of the case with a penalty method at a distributed penalty ε̂, and return its errors.
 
     Stress error: the largest entry of σ − σ_exact at the Gauss points over p. Slave and master force errors: the
-    largest error of a nodal force over p L (`force_errors`). Gap error: the largest error of a node's height, or of a
+    largest error of a nodal force over p L. Gap error: the largest error of a node's height, or of a
     reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p; it is missing where the
     formulation reports none, or is nodal and so knows forces only.
     """
     if isinstance(subject, EngineSubject):
-        return measure_engine(case, subject, penalty, (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP))
+        return _measure_engine(case, subject, penalty, (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP))
     scene, pressure = scene_of(case), pressure_of(case, penalty)
     formulation = subject.for_interface(case.interface, penalty)
     exact = exact_unknowns(scene, pressure, penalty)
-    trace, q = solve_patch(scene, formulation, exact, pressure / penalty)
+    trace, q = _solve_patch(scene, formulation, exact, pressure / penalty)
     state = replace(case, z=scene.positions(q), penalty=penalty)
-    contact = contact_at(state, trace, formulation)
+    # A state that is not Newton's last iterate has a pairing of its own.
+    is_last = np.array_equal(state.z, trace.z)
+    contact = FrozenState(formulation, state, trace.pairing if is_last else formulation.pair(case.interface, state.z))
     values = _errors(contact, scene, q, pressure)
     values[GAP] = exact_forces.gap_error(state, pressure / penalty, pressure / penalty)
     if contact.has_points:
@@ -219,10 +209,16 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
 
 
 def _errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> dict[Quantity, float]:
-    """Return the errors of stresses and forces in the state at the unknowns q (n_free,)."""
-    slave, master = force_errors(state, scene, q, pressure)
-    stress = stress_error(scene, scene.stresses(q), pressure)
-    return {STRESS: stress, SLAVE_FORCES: slave, MASTER_FORCES: master}
+    """Return the errors of stresses and forces in the state at the unknowns q (n_free,).
+
+    Forces are judged twice: those that the bodies need to be in balance, and those that the formulation gives. They
+    differ where the formulation found no balance, and at rollers, which take what the bodies do not need.
+    """
+    by_contact, exact = -state.forces, exact_forces.consistent_forces(state.case, pressure)
+    by_bodies = np.where(_rigid_nodes(scene)[:, None], by_contact, scene.nodal_forces(q))
+    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
+    slave, master = _by_side(state.case, errors, pressure)
+    return {STRESS: stress_error(scene, scene.stresses(q), pressure), SLAVE_FORCES: slave, MASTER_FORCES: master}
 
 
 def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, float]:
@@ -231,7 +227,7 @@ def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, 
     return dict.fromkeys((STRESS, SLAVE_FORCES, MASTER_FORCES), tolerance) | {GAP: tolerance * factor}
 
 
-def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
+def _measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
     """Solve the scene of the case as a saddle point and return its errors against the solution without penetration.
 
     Where the exact solution is a solution of the formulation, to roundoff, it counts in place of one that Newton's
@@ -245,7 +241,7 @@ def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
     multipliers = exact[scene.n_free :]
 
     def measure_errors(u: FloatArray) -> Measurement:
-        """Return the errors of the unknowns u (n_free + n_multipliers,), with their tolerances."""
+
         q = u[: scene.n_free]
         state = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
         nearest, sharpness = _nearest_multipliers(state, scene, formulation, multipliers)
@@ -260,7 +256,7 @@ def measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
             tolerances[MULTIPLIERS] = tolerance / sharpness
         return Measurement(check_all(values, tolerances))
 
-    trace, u = solve_patch(scene, formulation, exact, pressure / penalty)
+    trace, u = _solve_patch(scene, formulation, exact, pressure / penalty)
     measurement = measure_errors(u)
     fails = any(number.value > number.tolerance for number in measurement.numbers)
     if fails and trace.roundings[0] <= NEAR_CONVERGENCE:
@@ -301,7 +297,7 @@ def _nearest_multipliers(
     return nearest, float(sizes[rank - 1] / sizes[0]) if rank else 1.0
 
 
-def solve_patch(
+def _solve_patch(
     scene: Scene, formulation: CheckedFormulation, exact: FloatArray, penetration: float
 ) -> tuple[Trace, FloatArray]:
     """Solve a scene from its exact solution; return Newton's trace and the unknowns (n_free + n_multipliers,) to judge.
@@ -326,41 +322,12 @@ def nearest_to_balance(trace: Trace) -> FloatArray:
     return iterate
 
 
-def contact_at(state: Case, trace: Trace, formulation: CheckedFormulation) -> FrozenState:
-    """Return the formulation in a state, on the pairing of Newton's last iterate if it is that one."""
-    if np.array_equal(state.z, trace.z):
-        return FrozenState(formulation, state, trace.pairing)
-    return FrozenState.at(formulation, state)
-
-
 def forces_to_draw(case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) at the penalty of the case, for pictures."""
     return exact_forces.consistent_forces(case, pressure_of(case, case.penalty))
 
 
-def force_errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> tuple[float, float]:
-    """Return the largest error of a nodal force on the slave and on the master, over p L.
-
-    Forces are judged twice: those that the bodies need to be in balance with the unknowns q (n_free,), and those that
-    the formulation gives. They differ where the formulation found no balance, and at
-    rollers, which take what the bodies do not need.
-    """
-    by_bodies = scene.nodal_forces(q)
-    by_contact, case = -state.forces, state.case
-    first = 0
-    for index in scene.bodies_in_reach:
-        last = first + len(scene.bodies[index].contact_nodes)
-        if scene.bodies[index].rigid:
-            by_bodies[first:last] = by_contact[first:last]
-        first = last
-    exact = exact_forces.consistent_forces(case, pressure)
-    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
-    errors /= pressure * case.slave_length
-    n_slave = case.interface.n_slave_nodes
-    return float(errors[:n_slave].max()), float(errors[n_slave:].max())
-
-
-HIGH = 1e3  # The high penalty over the moderate penalty of a case.
+HIGH, AT_HIGH = 1e3, ", high penalty"  # The high penalty over the moderate one of a case, and its words.
 SLOPE = "slope over penalties (−1 if it locks)"
 
 
@@ -381,17 +348,13 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
     return Measurement(
         [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
         undecided=moderate.undecided or high.undecided,
-        details={**moderate.details, **{high_name(name): value for name, value in high.details.items()}, SLOPE: slope},
+        details={**moderate.details, **{name + AT_HIGH: value for name, value in high.details.items()}, SLOPE: slope},
     )
 
 
-def high_name(name: str) -> str:
-    """Return the name of a quantity at the high penalty."""
-    return f"{name}, high penalty"
-
-
 def _at_high(quantity: Quantity) -> Quantity:
-    return replace(quantity, name=high_name(quantity.name))
+    """Return a quantity at the high penalty."""
+    return replace(quantity, name=f"{quantity.name}{AT_HIGH}")
 
 
 def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -> Cases:

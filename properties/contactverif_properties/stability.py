@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
@@ -84,11 +85,9 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
         values[TANGENT] = roundoff.count_tangent_roundings(
             near.case, here, there, roundoff.measure_tangent_slope(near, here)
         )
-    excusable = near.pairing is None  # A plugin without a pairing decides anew in each residual.
+    # A plugin without a pairing decides anew in each residual. A frozen pairing decides the same in both places.
+    excusable = near.pairing is None or max(values.values()) <= roundoff.MOST_ROUNDINGS
     if near.pairing is not None:
-        excusable = (
-            max(values.values()) <= roundoff.MOST_ROUNDINGS
-        )  # The frozen pairing decides the same in both places.
         searched = FrozenState.at(near.formulation, far.case)
         values[SEARCH] = conditioning.count_roundings(searched.residual - forces)
     undecided = ""
@@ -100,13 +99,12 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
 
 def refuse_unknown_forces(traits: Traits) -> str:
     """Return why no exact force is known, or an empty string if one is."""
-    if knows_forces(traits) or knows_total_of_springs(traits) or traits.abilities.takes_longdouble:
-        return ""
-    return "no exact force is known: the traits promise no patch test, no area and no long double"
+    known = _knows_forces(traits) or _knows_total_of_springs(traits) or traits.abilities.takes_longdouble
+    return "" if known else "no exact force is known: the traits promise no patch test, no area and no long double"
 
 
 @random_source("contactverif_properties.stability_local.local_cases")
-def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+def _local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
     """Return a strategy for each kind of penetration; None where an interface is given."""
     uniform, linear = exact_flat_cases(interface), linear_flat_cases(interface)
     return None if uniform is None or linear is None else dict(zip(KINDS, (uniform, linear), strict=True))
@@ -117,7 +115,7 @@ def local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[
     rank=170,
     family="stability",
     quantities=(FORCES_THERE, TOTAL_THERE),
-    cases=Cases.by_kind(local_cases),
+    cases=Cases.by_kind(_local_cases),
     kinds=KINDS,
     promise=lambda traits: True if traits.promises.translation_stable else None,
     applicable=refuse_unknown_forces,
@@ -157,8 +155,7 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
     near = replace(far, case=case.with_multipliers(far.case.multipliers))
     forces = far.residual
     conditioning = roundoff.measure_conditioning(near, near.residual)
-    find_errors = _errors_of_linear if linear else _errors_of_uniform
-    errors = find_errors(near.case, subject.traits, forces)
+    errors = (_errors_of_linear if linear else _errors_of_uniform)(near.case, subject.traits, forces)
     if FORCES_THERE not in errors and subject.traits.abilities.takes_longdouble:
         errors[FORCES_THERE] = forces - far.residual_at(far.case.z.astype(np.longdouble))
     if not errors:
@@ -175,16 +172,24 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
 
 
 def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
-    """Return the errors {quantity: of each row, or of the total force} that the traits make known."""
-    if knows_forces(traits):
-        return {FORCES_THERE: _error_of_patch(case, forces)}
-    if not knows_total_of_springs(traits):
+    """Return the errors {quantity: of each row, or of the total force} that the traits make known.
+
+    Constraint rows are not judged here, and get 0. With multipliers only the distribution of the forces counts.
+    """
+    knows_forces = _knows_forces(traits)
+    if not knows_forces and not _knows_total_of_springs(traits):
         return {}
-    n_slave, exact = 2 * case.interface.n_slave_nodes, exact_residual(case)
-    totals = [
-        float(sum(map(Fraction, forces[axis:n_slave:2].tolist())) - sum(exact[axis:n_slave:2])) for axis in (0, 1)
-    ]
-    return {TOTAL_THERE: np.array(totals)}
+    exact, pulls, n_slave = exact_residual(case), list(map(Fraction, forces.tolist())), 2 * case.interface.n_slave_nodes
+    total, exact_total = ([sum(part[axis:n_slave:2], Fraction()) for axis in (0, 1)] for part in (pulls, exact))
+    if not knows_forces:
+        return {TOTAL_THERE: np.array([float(x - right) for x, right in zip(total, exact_total, strict=True)])}
+    scale = Fraction(1)
+    if case.n_multipliers:
+        projection = total[0] * exact_total[0] + total[1] * exact_total[1]
+        if projection > 0:
+            scale = (exact_total[0] * exact_total[0] + exact_total[1] * exact_total[1]) / projection
+    errors = [float(pull * scale - right) for pull, right in zip(pulls, exact, strict=False)]
+    return {FORCES_THERE: np.array([*errors, *([0.0] * case.n_multipliers)])}
 
 
 def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
@@ -211,30 +216,14 @@ def exact_residual(case: Case) -> list[Fraction]:
     return forces
 
 
-def _error_of_patch(case: Case, forces: FloatArray) -> FloatArray:
-    """Return the error of the position rows; constraint rows, which are not judged here, get 0."""
-    exact, n = exact_residual(case), case.interface.n_unknowns
-    scale = Fraction(1)
-    if case.n_multipliers:
-        n_slave = 2 * case.interface.n_slave_nodes
-        pulls = list(map(Fraction, forces[:n_slave].tolist()))
-        totals, exact_totals = ([sum(part[axis:n_slave:2], Fraction()) for axis in (0, 1)] for part in (pulls, exact))
-        projection = totals[0] * exact_totals[0] + totals[1] * exact_totals[1]
-        if projection > 0:
-            scale = (exact_totals[0] * exact_totals[0] + exact_totals[1] * exact_totals[1]) / projection
-    errors = [float(Fraction(force) * scale - right) for force, right in zip(forces[:n].tolist(), exact, strict=True)]
-    return np.array([*errors, *([0.0] * case.n_multipliers)])
-
-
-def knows_forces(traits: Traits) -> bool:
+def _knows_forces(traits: Traits) -> bool:
     """Return whether the traits say what the force on each node is: that of springs, or of uniform pressures."""
     if traits.rules.enforcement == "multiplier" and traits.rules.penalty != "distributed":
         return False
     return traits.promises.patch.flat is True
 
 
-def knows_total_of_springs(traits: Traits) -> bool:
-    """Return whether the traits say what the total force of springs is."""
+def _knows_total_of_springs(traits: Traits) -> bool:
     return traits.rules.enforcement == "penalty" and knows_total(traits)
 
 
@@ -286,34 +275,27 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
 class ExactMotion:
     """A rotation by a Pythagorean triple, and a translation behind it."""
 
-    legs: FloatArray  # (2,) The legs (a, b) of the triple: the rotation has cos = a/c and sin = b/c.
+    matrix: FloatArray  # (2, 2) The rotation times the hypotenuse, in integers.
+    hypotenuse: float
     shift: FloatArray  # (2,) The translation, a length each.
 
     @classmethod
     def from_case(cls, case: Case) -> ExactMotion:
-        """Return the motion that the parameters "turn" and "shift" of a case describe."""
-        return cls(case.parameters["turn"], case.parameters["shift"])
-
-    @property
-    def _hypotenuse(self) -> float:
-        return float(np.hypot(*self.legs))
-
-    @property
-    def _matrix(self) -> FloatArray:
-        a, b = self.legs
-        return np.array([[a, -b], [b, a]])
+        """Return the motion that the parameters "turn", the legs of the triple, and "shift" of a case describe."""
+        a, b = case.parameters["turn"]
+        return cls(np.array([[a, -b], [b, a]]), float(np.hypot(a, b)), case.parameters["shift"])
 
     def move(self, positions: FloatArray) -> FloatArray:
         """Return the positions (n, 2) after the motion, exact for multiples of the triple's hypotenuse."""
-        return (positions / self._hypotenuse) @ self._matrix.T + self.shift
+        return (positions / self.hypotenuse) @ self.matrix.T + self.shift
 
     def turn(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (n, 2) after the rotation, each component rounded like a sum of two products."""
-        return (vectors @ self._matrix.T) / self._hypotenuse
+        return (vectors @ self.matrix.T) / self.hypotenuse
 
     def turn_back(self, vectors: FloatArray) -> FloatArray:
         """Return vectors (n, 2) before the rotation."""
-        return (vectors @ self._matrix) / self._hypotenuse
+        return (vectors @ self.matrix) / self.hypotenuse
 
 
 ROUNDINGS = roundoff.forces_quantity("error of a solved force in roundings")
@@ -337,15 +319,12 @@ ROUGHNESS = Quantity(
 _UNSOLVED = "Newton's method finds no solution on the pairing of the uniform state"
 
 
-def refuse_without_solution(traits: Traits) -> str:
+def _refuse_without_solution(traits: Traits) -> str:
     """Return why a formulation is not asked, or an empty string if it has springs that Newton's method can solve."""
     if traits.rules.enforcement != "penalty" or traits.rules.penalty is None:
         return f"the enforcement is by a {traits.rules.enforcement}, not by springs of a stated stiffness"
-    return (
-        ""
-        if traits.promises.tangent == "exact"
-        else "no exact tangent, with which Newton's method settles at any penalty"
-    )
+    exact = traits.promises.tangent == "exact"
+    return "" if exact else "no exact tangent, with which Newton's method settles at any penalty"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -378,7 +357,7 @@ class _TurnedSystem:
     quantities=(ROUNDINGS,),
     cases=Cases.from_list(stability_scenes),
     promise=lambda traits: traits.promises.translation_stable,
-    applicable=refuse_without_solution,
+    applicable=_refuse_without_solution,
     needs=frozenset({"tangent"}),
     bodies=True,
 )
@@ -401,18 +380,18 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A case is undecided if the system has no inverse in floats, or if Newton's method does not settle on
     the frozen pairing.
     """
-    scene, motion = scene_of(case), ExactMotion.from_case(case)
-    u = exact_unknowns(scene, pressure_of(case, case.penalty), case.penalty)
-    pairing = subject.for_case(case).pair(scene.interface, _system(case, subject, case.penalty).state(u))
+    scene, motion, penalty = scene_of(case), ExactMotion.from_case(case), case.penalty
+    u = exact_unknowns(scene, pressure_of(case, penalty), penalty)
+    pairing = subject.for_case(case).pair(scene.interface, System(scene, subject.for_case(case)).state(u))
     try:
         modulus = max(body.young for body in scene.bodies)
-        n_steps = max(0, math.ceil(math.log(case.penalty / modulus, GROWTH)))
-        for penalty in [case.penalty / GROWTH**n for n in range(n_steps, -1, -1)]:
-            system = _system(case, subject, penalty)
+        n_steps = max(0, math.ceil(math.log(penalty / modulus, GROWTH)))
+        for n in range(n_steps, -1, -1):
+            system = System(scene, subject.for_case(replace(case, penalty=penalty / GROWTH**n)))
             u, matrix = _solve(system, pairing, u)
-        rounding = SETTLED_ROUNDINGS * UNIT_ROUNDOFF * case.penalty * case.largest_coordinate
+        rounding = SETTLED_ROUNDINGS * UNIT_ROUNDOFF * penalty * case.largest_coordinate
         mean_segment = float(case.interface.slave.lengths(case.interface.nodes).mean())
-        settled = (SETTLED_SHARE * pressure_of(case, case.penalty) + rounding) * mean_segment
+        settled = (SETTLED_SHARE * pressure_of(case, penalty) + rounding) * mean_segment
         if np.abs(system.residual(u, pairing)).max() > settled:
             return Measurement(undecided="Newton's method does not settle on the frozen pairing")
         turned = _TurnedSystem(system, motion, scene.interface.at(motion.move(scene.interface.nodes)), pairing)
@@ -421,17 +400,27 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
         return Measurement(undecided="the matrix has no inverse in floats")
     state = FrozenState(system.formulation, replace(case, z=system.state(u)), pairing)
     error = turned.forces(u_turned) - motion.turn(state.forces).reshape(-1)
-    return roundoff.make_sweep_measurement(ROUNDINGS, _conditioning(state, scene), error, idle=not state.forces.any())
+    # To the conditioning of the contact forces the bodies add |S| |z − z̄| at their contact nodes.
+    conditioning, positions = roundoff.measure_conditioning(state, state.residual), state.case.positions
+    transformation = abs(dense(scene.transformation))
+    distances = np.abs(positions - positions.mean(axis=0)).reshape(-1)
+    bulk = transformation @ (abs(dense(scene.stiffness)) @ (transformation.T @ distances))
+    reach = np.array(conditioning.reach)
+    reach[: scene.interface.n_nodes] += np.hypot(*bulk.reshape(-1, 2).T)
+    conditioning = replace(conditioning, reach=reach)
+    return roundoff.make_sweep_measurement(ROUNDINGS, conditioning, error, idle=not state.forces.any())
 
 
 def _solve(system: System, pairing: Pairing | None, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the solution (n,) on a frozen pairing, and the last matrix (n, n).
+    """Return the solution (n,) on a frozen pairing, and the last matrix (n, n), by the formulation's tangent.
 
-    Newton's method ends once the residual was not halved twice in succession: it is down to its roundoff then.
+    A difference quotient is no use: at 1e11 E/h its truncation is as stiff as the bodies. Newton's method ends once the
+    residual was not halved twice in succession: it is down to its roundoff then.
     """
-    largest, n_strikes = np.inf, 0
+    largest, n_strikes, transformation = np.inf, 0, dense(system.transformation)
     for _ in range(MOST_STEPS):
-        matrix = _matrix(system, pairing, u)
+        contact = dense(system.formulation.tangent(system.scene.interface, pairing, system.state(u)))
+        matrix = dense(system.stiffness) + transformation.T @ contact @ transformation
         u = u + _step(system, matrix, system.residual(u, pairing))
         before, largest = largest, float(np.abs(system.residual(u, pairing)).max())
         n_strikes = n_strikes + 1 if largest > before / 2 else 0
@@ -462,31 +451,6 @@ def _step(system: System, matrix: FloatArray, residual: FloatArray) -> FloatArra
     if change is None:
         raise _SingularMatrix
     return change
-
-
-def _system(case: Case, subject: Subject, penalty: float) -> System:
-    return System(scene_of(case), subject.for_case(replace(case, penalty=penalty)))
-
-
-def _matrix(system: System, pairing: Pairing | None, u: FloatArray) -> FloatArray:
-    """Return the derivative (n_free, n_free) of the residual by the formulation's tangent.
-
-    A difference quotient is no use: at 1e11 E/h its truncation is as stiff as the bodies.
-    """
-    contact = dense(system.formulation.tangent(system.scene.interface, pairing, system.state(u)))
-    transformation = dense(system.transformation)
-    return dense(system.stiffness) + transformation.T @ contact @ transformation
-
-
-def _conditioning(state: FrozenState, scene: Scene) -> roundoff.Conditioning:
-    """Return the conditioning of the contact forces, to which the bodies add |S| |z − z̄| at their contact nodes."""
-    conditioning, positions = roundoff.measure_conditioning(state, state.residual), state.case.positions
-    transformation = abs(dense(scene.transformation))
-    distances = np.abs(positions - positions.mean(axis=0)).reshape(-1)
-    bulk = transformation @ (abs(dense(scene.stiffness)) @ (transformation.T @ distances))
-    reach = np.array(conditioning.reach)
-    reach[: scene.interface.n_nodes] += np.hypot(*bulk.reshape(-1, 2).T)
-    return replace(conditioning, reach=reach)
 
 
 @Property.define(
@@ -533,11 +497,13 @@ def locking(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where Newton's method finds no solution on that pairing.
     """
-    return measure_locking(case, subject, lambda columns, penalty: answer_to_wave(columns, penalty, subject), _UNSOLVED)
+    return _measure_locking(
+        case, subject, lambda columns, penalty: answer_to_wave(columns, penalty, subject), _UNSOLVED
+    )
 
 
-def measure_locking(
-    case: Case, subject: Subject, answer_at: Callable[[tuple[int, int], float], InterfaceAnswer | None], unsolved: str
+def _measure_locking(
+    case: Case, subject: Subject, answer_at: Callable[[tuple[int, int], float], _InterfaceAnswer | None], unsolved: str
 ) -> Measurement:
     """Return the drift and the roughness of answers to the wave, which have the numbers of segments and ε̂ h/E."""
     n_slave, n_master = case.parameters["columns"].astype(int).tolist()
@@ -545,6 +511,11 @@ def measure_locking(
     answer = answer_at(columns, case.parameter("stiffness"))
     if answer is None:
         return Measurement(undecided=unsolved)
+
+    def matching(distributed: float) -> float:
+        """Return the mean compliance of matching meshes with the segments of the slave, and of the master."""
+        return sum(refined_blocks.matching_answer(n, distributed).compliance for n in (n_slave, n_master)) / 2
+
     smooth = refined_blocks.matching_answer(n_slave, case.penalty).pressure_range
     by_forces, by_points = answer.force_range / smooth, answer.point_range / smooth
     values = {ROUGHNESS: float(np.fmax(by_forces, by_points))}
@@ -557,19 +528,10 @@ def measure_locking(
             return Measurement(undecided=unsolved)
         at_soft = refined_blocks.wave_blocks(*columns, refined_blocks.SOFT, wave=0.0).penalty
         factor = soft.stiffness / at_soft  # Springs may act twice.
-        share = answer.compliance / mean_of_matching(columns, factor * case.penalty)
-        values[DRIFT] = 1 - share * mean_of_matching(columns, factor * at_soft) / soft.compliance
+        share = answer.compliance / matching(factor * case.penalty)
+        values[DRIFT] = 1 - share * matching(factor * at_soft) / soft.compliance
         details["stiffness of the springs over the penalty"] = factor
-    tolerances = {DRIFT: MOST_DRIFT, ROUGHNESS: MOST_ROUGHNESS}
-    return Measurement(check_all(values, tolerances), details=details)
-
-
-def mean_of_matching(columns: tuple[int, int], distributed: float) -> float:
-    """Return the mean compliance of matching meshes with the segments of the slave and with those of the master."""
-    answers: list[refined_blocks.WaveAnswer] = [
-        refined_blocks.matching_answer(number, distributed) for number in columns
-    ]
-    return sum(answer.compliance for answer in answers) / len(answers)
+    return Measurement(check_all(values, {DRIFT: MOST_DRIFT, ROUGHNESS: MOST_ROUGHNESS}), details=details)
 
 
 MOST_WAVE_STEPS = 12
@@ -578,8 +540,7 @@ MOST_WAVE_STEPS = 12
 _LEAST_SHARE = UNIT_ROUNDOFF**0.5
 
 
-@dataclass(frozen=True, slots=True)
-class InterfaceAnswer:
+class _InterfaceAnswer(NamedTuple):
     """The answer of a formulation or a code to the wave."""
 
     compliance: float  # The work of the wave's load on the displacements that it causes.
@@ -591,29 +552,34 @@ class InterfaceAnswer:
     point_range: float = np.nan
 
 
-def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> InterfaceAnswer | None:
+def answer_to_wave(columns: tuple[int, int], penalty: float, subject: Subject) -> _InterfaceAnswer | None:
     """Solve two blocks with the wave and without it."""
     uniform, wavy = (refined_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, refined_blocks.WAVE))
     formulation = subject.for_case(uniform.case())
     systems = System(uniform, formulation), System(wavy, formulation)
     start = _uniform_state(systems[0], subject)
     pairing = systems[0].pair(start)
-    before = solve_frozen(systems[0], start, pairing)
-    after = None if before is None else solve_frozen(systems[1], before, pairing)
+    before = _solve_frozen(systems[0], start, pairing)
+    after = None if before is None else _solve_frozen(systems[1], before, pairing)
     if before is None or after is None:
         return None
-    n_free, case = uniform.n_free, uniform.case()
+    case = uniform.case()
     states = [
         FrozenState(formulation, replace(case, z=system.state(u), n_multipliers=system.n_multipliers), pairing)
         for system, u in zip(systems, (before, after), strict=True)
     ]
-    answer = _interface_answer(uniform, wavy, before[:n_free], after[:n_free], states[1].forces - states[0].forces)
-    nodal = subject.traits.rules.penalty == "nodal" or not states[0].has_points
-    return answer if nodal else replace(answer, point_range=_point_range(*states))
+    q = before[: uniform.n_free], after[: uniform.n_free]
+    answer = _interface_answer(uniform, wavy, *q, states[1].forces - states[0].forces)
+    if subject.traits.rules.penalty == "nodal" or not states[0].has_points:
+        return answer
+    pressures = [state.points.pressure for state in states]
+    if pressures[0].shape != pressures[1].shape:
+        return answer  # A formulation without a pairing may have other points.
+    change = pressures[1] - pressures[0]
+    return answer._replace(point_range=float(np.ptp(change[np.isfinite(change)])) / refined_blocks.WAVE)
 
 
-def answer_of_code(columns: tuple[int, int], penalty: float, subject: EngineSubject) -> InterfaceAnswer | None:
-    """Let a whole code solve two blocks with the wave and without it."""
+def _answer_of_code(columns: tuple[int, int], penalty: float, subject: EngineSubject) -> _InterfaceAnswer | None:
     uniform, wavy = (refined_blocks.wave_blocks(*columns, penalty, wave=wave) for wave in (0.0, refined_blocks.WAVE))
     before, after = (solve_by_engine(scene, subject, linear=True)[0] for scene in (uniform, wavy))
     if before.no_solution or after.no_solution:
@@ -624,15 +590,20 @@ def answer_of_code(columns: tuple[int, int], penalty: float, subject: EngineSubj
 
 def _interface_answer(
     uniform: Scene, wavy: Scene, before: FloatArray, after: FloatArray, forces: FloatArray
-) -> InterfaceAnswer:
+) -> _InterfaceAnswer:
     """Return the answer of two solutions (n_free,), and the forces (n_nodes, 2) that the wave adds at the interface."""
     total = -float((uniform.bodies[0].load * uniform.displacements(before)[0]).sum())
     bodies = float(uniform.facts["compliance"].sum())
     springs = abs(total) / (refined_blocks.MEAN_PRESSURE**2 * refined_blocks.LENGTH) - bodies
-    return InterfaceAnswer(
+    interface, n = uniform.interface, uniform.interface.n_slave_nodes
+    ranges = [
+        float(np.ptp(forces[nodes, 1] / shape_integrals(side, interface.nodes)[nodes]))
+        for side, nodes in ((interface.slave, slice(0, n)), (interface.master, slice(n, None)))
+    ]
+    return _InterfaceAnswer(
         compliance=refined_blocks.wave_work(uniform, wavy, before, after),
         stiffness=1 / max(springs, _LEAST_SHARE * bodies),
-        force_range=_force_range(uniform.interface, forces[:, 1]),
+        force_range=max(ranges) / refined_blocks.WAVE,
     )
 
 
@@ -648,25 +619,7 @@ def _uniform_state(system: System, subject: Subject) -> FloatArray:
     )
 
 
-def _force_range(interface: Interface, across: FloatArray) -> float:
-    """Return the range of the pressures of nodal forces (n_nodes,) across the interface, over the wave's."""
-    sides = (
-        (interface.slave, slice(0, interface.n_slave_nodes)),
-        (interface.master, slice(interface.n_slave_nodes, None)),
-    )
-    lengths = [(shape_integrals(surface, interface.nodes), nodes) for surface, nodes in sides]
-    return max(float(np.ptp(across[nodes] / length[nodes])) for length, nodes in lengths) / refined_blocks.WAVE
-
-
-def _point_range(before: FrozenState, after: FrozenState) -> float:
-    pressures = [state.points.pressure for state in (before, after)]
-    if pressures[0].shape != pressures[1].shape:
-        return np.nan  # A formulation without a pairing may have other points.
-    change = pressures[1] - pressures[0]
-    return float(np.ptp(change[np.isfinite(change)])) / refined_blocks.WAVE
-
-
-def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
+def _solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
     """Solve a scene on one pairing, with the formulation's tangent or, where that does not converge, by differences.
 
     Start and solution are (n_free + n_multipliers,). The solution is None unless the residual gets down to its own
@@ -674,23 +627,16 @@ def solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) -> 
     """
     system.any_matrix = True
     for use_tangent in (True, False):
-        system.use_tangent = use_tangent
-        if (solution := _iterate(system, start, pairing)) is not None:
-            return solution
-    return None
-
-
-def _iterate(system: System, start: FloatArray, pairing: Pairing | None) -> FloatArray | None:
-    u = start
-    for _ in range(MOST_WAVE_STEPS):
-        residual = system.residual(u, pairing)
-        matrix, floor = system.matrix(u, pairing)
-        if (np.abs(residual) <= floor).all():
-            return u
-        change = system.step(matrix, -residual, floor).change
-        if change is None or not np.isfinite(change).all():
-            return None
-        u = u + change
+        system.use_tangent, u = use_tangent, start
+        for _ in range(MOST_WAVE_STEPS):
+            residual = system.residual(u, pairing)
+            matrix, floor = system.matrix(u, pairing)
+            if (np.abs(residual) <= floor).all():
+                return u
+            change = system.step(matrix, -residual, floor).change
+            if change is None or not np.isfinite(change).all():
+                break
+            u = u + change
     return None
 
 
@@ -721,9 +667,7 @@ def engine_locking(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Where the code finds no solution.
     """
     assert isinstance(subject, EngineSubject)
-    return measure_locking(
-        case,
-        subject,
-        lambda columns, penalty: answer_of_code(columns, penalty, subject),
-        "the code finds no solution",
+    unsolved = "the code finds no solution"
+    return _measure_locking(
+        case, subject, lambda columns, penalty: _answer_of_code(columns, penalty, subject), unsolved
     )
