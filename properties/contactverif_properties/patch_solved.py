@@ -50,17 +50,14 @@ REPORTED_PRESSURES = Quantity(
 )
 
 
-def _measure_engine(
-    case: Case, subject: EngineSubject, penalty: float, quantities: tuple[Quantity, Quantity, Quantity, Quantity]
-) -> Measurement:
+def _measure_engine(case: Case, subject: EngineSubject, penalty: float) -> Measurement:
     """Return the errors of stress, slave forces, master forces and gap of a scene whose pressure is uniform.
 
     Forces are those that the bodies need; what a rigid body needs is not known. A code with a stiffness of its own is
     judged by its own mean pressure, and neither its gap nor what it reports is asked. Forces and pressures that other
     codes report are judged.
     """
-    traits, (stress, slave, master, gap) = subject.engine_traits, quantities
-    scene = replace(scene_of(case), penalty=penalty)
+    traits, scene = subject.engine_traits, replace(scene_of(case), penalty=penalty)
     solution, answer = solve_by_engine(scene, subject, linear=True)
     details = {} if answer is None else {CODE_ITERATIONS: float(answer.iterations)}
     if answer is None or solution.no_solution:
@@ -76,8 +73,8 @@ def _measure_engine(
     q = np.asarray(scene.transformation.T @ solution.displacements.reshape(-1))
     errors = np.linalg.norm(solution.forces - exact_forces.consistent_forces(case, pressure), axis=1)
     errors[_rigid_nodes(scene)] = 0.0
-    values = {stress: stress_error(scene, scene.stresses(q), pressure)}
-    values |= dict(zip((slave, master), _by_side(case, errors, pressure), strict=True))
+    slave, master = _by_side(case, errors, pressure)
+    values = {STRESS: stress_error(scene, scene.stresses(q), pressure), SLAVE_FORCES: slave, MASTER_FORCES: master}
     tolerance = engine_tolerance(scene, solution, traits.accuracy, pressure)
     tolerances = dict.fromkeys(values, tolerance)
     if traits.enforcement != "own":
@@ -86,8 +83,8 @@ def _measure_engine(
             values[quantity], tolerances[quantity] = error, (tolerance + rounding) / share
         penetration = pressure / penalty if traits.enforcement == "penalty" else 0.0
         state = replace(case, z=solution.state.z, penalty=penalty)
-        values[gap] = exact_forces.gap_error(state, penetration, pressure / penalty)
-        tolerances[gap] = tolerance * (1 + penalty * float(case.parameters["compliance"].sum()))
+        values[GAP] = exact_forces.gap_error(state, penetration, pressure / penalty)
+        tolerances[GAP] = tolerance * (1 + penalty * float(case.parameters["compliance"].sum()))
     return Measurement(check_all(values, tolerances), details=details)
 
 
@@ -187,7 +184,7 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     formulation reports none, or is nodal and so knows forces only.
     """
     if isinstance(subject, EngineSubject):
-        return _measure_engine(case, subject, penalty, (STRESS, SLAVE_FORCES, MASTER_FORCES, GAP))
+        return _measure_engine(case, subject, penalty)
     scene, pressure = scene_of(case), pressure_of(case, penalty)
     formulation = subject.for_interface(case.interface, penalty)
     exact = exact_unknowns(scene, pressure, penalty)

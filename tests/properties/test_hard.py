@@ -34,7 +34,7 @@ from contactverif.problems.flat_states import (
 from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
 from contactverif.sampling.draw import draw_cases
 from contactverif_properties.applicability import knows_total
-from contactverif_properties.hard import covered_share
+from contactverif_properties.hard_solved import covered_share
 
 TURNS = (UPRIGHT, TURNED, STEEP)
 FLAT_STATES = [*offset_states(), *deep_states(), *node_hit_states(), *search_states(), *tiny_segment_states()]
