@@ -6,8 +6,8 @@ The problems state their bounds, beside what right and wrong formulations measur
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from contactverif_properties.exact_forces import pushing_forces, uniform_state
 from contactverif_properties.states import nearest_sum
 
 
-def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measurement:
+def _measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measurement:
     """Solve a study from the finest mesh on, and return the sizes of its errors there, and the rates that are asked.
 
     The coarser meshes are solved only if a rate is. All errors are kept as series. A number whose errors are not
@@ -44,12 +44,19 @@ def measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measu
         if not bound.rate
     ]
     fails = any(not number.value <= number.tolerance for number in sizes)
-    rates = [bound for bound in bounds if bound.rate and _counts(bound, group, last, instance, fails)]
+
+    def counts(bound: Bound) -> bool:
+        """Return whether a rate is asked: some only of large errors, where no size fails."""
+        if group not in bound.only_above:
+            return True
+        return not fails and bound.size(last) > bound.only_above[group] * bound.best(instance.best)
+
+    rates = [bound for bound in bounds if bound.rate and counts(bound)]
     coarser = study.meshes[:-1] if rates else ()
     solved = [_solve(studies, study.pose(mesh, subject.traits), subject) for mesh in coarser] + [(last, failure)]
     meshes = study.meshes[-len(solved) :]
     solver = "the code" if isinstance(subject, EngineSubject) else "Newton's method"
-    undecided = _name_failures({mesh: end for mesh, (_, end) in zip(meshes, solved, strict=True) if end}, solver)
+    undecided = _name_failures({mesh: end for mesh, (_, end) in zip(meshes, solved, strict=True)}, solver)
     details = {} if ITERATIONS in studies.series.values() else {ITERATIONS: last[ITERATIONS]}
     kinds = [kind for kind in solved[0][0] if all(kind in row for row, _ in solved)]
     errors = {kind: [row[kind] for row, _ in solved] for kind in kinds}
@@ -67,16 +74,10 @@ def _name_failures(ends: dict[int, str], solver: str) -> str:
     """Return on which meshes the solver ended without a solution, and how; empty if on none."""
     groups: dict[str, list[str]] = {}
     for mesh, end in ends.items():
-        groups.setdefault(end, []).append(str(mesh))
+        if end:
+            groups.setdefault(end, []).append(str(mesh))
     words = ", ".join(f"mesh{'es' * (len(meshes) > 1)} {' · '.join(meshes)}: {end}" for end, meshes in groups.items())
     return f"{solver} finds no solution on {words}" if words else ""
-
-
-def _counts(bound: Bound, group: str, last: Errors, finest: ProblemInstance, fails: bool) -> bool:
-    """Return whether a rate is asked, where the errors of the finest mesh are known, and whether one fails."""
-    if group not in bound.only_above:
-        return True
-    return not fails and bound.size(last) > bound.only_above[group] * bound.best(finest.best)
 
 
 def _solve(studies: Studies, instance: ProblemInstance, subject: Subject) -> tuple[Errors, str]:
@@ -87,7 +88,7 @@ def _solve(studies: Studies, instance: ProblemInstance, subject: Subject) -> tup
     return instance.errors(solution) | {ITERATIONS: float(solution.n_iterations)}, end
 
 
-def exact_forces(studies: Studies, case: Case) -> FloatArray:
+def _exact_forces(studies: Studies, case: Case) -> FloatArray:
     """Return the exact forces (n_nodes, 2) that push the nodes of the coarsest mesh, for pictures."""
     study = studies.read(case)
     return study.pose(study.meshes[0], Traits()).exact_forces(case)
@@ -104,7 +105,7 @@ def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
         series=dict.fromkeys(studies.series, "1"),
         bodies=True,
         engines=True,
-        exact=partial(exact_forces, studies),
+        exact=partial(_exact_forces, studies),
     )
 
 
@@ -146,7 +147,7 @@ def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
 
     **Source.** K. L. Johnson, Contact Mechanics (1985), Chapter 13.
     """
-    return measure_convergence(WAVY_STUDIES, case, subject)
+    return _measure_convergence(WAVY_STUDIES, case, subject)
 
 
 def promise_without_locking(traits: Traits) -> bool | None:
@@ -181,7 +182,7 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where Newton's method finds no solution on one of the meshes.
     """
-    return measure_convergence(CURVED_STUDIES, case, subject)
+    return _measure_convergence(CURVED_STUDIES, case, subject)
 
 
 @_define(HERTZ_STUDIES)(
@@ -228,7 +229,7 @@ def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A case in which Newton's method ends out of balance on some mesh, by more than 1e-4 of the largest
     force. It starts at the exact displacements, where nothing but the formulation's own kinks can keep it from ending.
     """
-    return measure_convergence(HERTZ_STUDIES, case, subject)
+    return _measure_convergence(HERTZ_STUDIES, case, subject)
 
 
 REFINEMENTS = (32, 64)  # Two meshes, one twice as fine, so that an error of second order can be taken away.
@@ -255,7 +256,7 @@ PRESSURE = Quantity("error of the reported pressures", _CHORDS, _CHORD_REASON)
 
 
 @cache
-def arc_cases() -> tuple[Case, ...]:
+def _arc_cases() -> tuple[Case, ...]:
     """Return a convex and a concave slave on the coarsest mesh."""
     return tuple(
         Arcs(convex_slave=convex).case(1, name) for name, convex in (("convex slave", True), ("concave slave", False))
@@ -267,7 +268,7 @@ def arc_cases() -> tuple[Case, ...]:
     rank=440,
     family="accuracy",
     quantities=(SLAVE, MASTER, SLAVE_SUM, MASTER_SUM, ALONG, FORCES, SUM, PRESSURE),
-    cases=Cases.from_list(arc_cases),
+    cases=Cases.from_list(_arc_cases),
     promise=lambda traits: None if applicability.refuse_unknown_total(traits) else True,
     applicable=applicability.refuse_unknown_total,
 )
@@ -307,19 +308,13 @@ def accuracy_arc(case: Case, subject: Subject) -> Measurement:
     extrapolated = {quantity: abs(4 * fine.sums[quantity] - coarse.sums[quantity]) / 3 for quantity in fine.sums}
     single = {SLAVE: SLAVE_SUM, MASTER: MASTER_SUM}
     values = fine.others | {single[quantity]: abs(fine.sums[quantity]) for quantity in single if quantity in fine.sums}
-    tolerances = {
-        **dict.fromkeys(extrapolated, EXTRAPOLATED),
-        **dict.fromkeys((SLAVE_SUM, MASTER_SUM, PRESSURE), fine.chords),
-        ALONG: fine.turn / 4,
-        FORCES: fine.turn,
-    }
-    values |= extrapolated
+    tolerances = dict.fromkeys(extrapolated, EXTRAPOLATED) | {ALONG: fine.turn / 4, FORCES: fine.turn}
+    tolerances |= dict.fromkeys((SLAVE_SUM, MASTER_SUM, PRESSURE), fine.chords)
     details = {f"{quantity.name}, m = {REFINEMENTS[0]}": value for quantity, value in coarse.others.items()}
-    return Measurement(check_all(values, {name: tolerances[name] for name in values}), details=details)
+    return Measurement(check_all(values | extrapolated, tolerances), details=details)
 
 
-@dataclass(frozen=True, slots=True)
-class _ArcErrors:
+class _ArcErrors(NamedTuple):
     """The errors on one mesh, and what chords and facets of its lengths may add to them."""
 
     sums: dict[Quantity, float]  # With their signs
@@ -330,7 +325,11 @@ class _ArcErrors:
 
 def _errors(arcs: Arcs, refine: int, subject: Subject) -> _ArcErrors:
     case = arcs.case(refine)
-    state, n_slave = uniform_state(case, subject, arcs.pressure), case.interface.n_slave_nodes
+    state, n_slave, slave = (
+        uniform_state(case, subject, arcs.pressure),
+        case.interface.n_slave_nodes,
+        case.interface.slave,
+    )
     # Areas of the reference are those of the master's arc, on which the slave lies there.
     share = arcs.radius / arcs.slave_radius if subject.traits.rules.area == "reference" else 1.0
     forces, outwards = pushing_forces(state), case.positions / np.linalg.norm(case.positions, axis=1)[:, None]
@@ -342,13 +341,19 @@ def _errors(arcs: Arcs, refine: int, subject: Subject) -> _ArcErrors:
     if subject.traits.promises.conserves_force:
         sums[MASTER] = float(radial[n_slave:].sum()) - 1
         along.append(abs(float(across[n_slave:].sum())))
-    others = {ALONG: max(along), FORCES: _nodal_error(arcs, case, forces, share)}
+    pressure = share * (-arcs.pressure if arcs.convex_slave else arcs.pressure)  # Outwards.
+
+    def traction(places: FloatArray) -> FloatArray:
+        pressures: FloatArray = pressure * places / np.linalg.norm(places, axis=1)[:, None]
+        return pressures
+
+    exact_forces = traction_forces(slave, case.positions, traction)
+    others = {ALONG: max(along), FORCES: force_error(forces, exact_forces, shape_integrals(slave, case.positions))}
     if state.has_points:
         total = nearest_sum(state.points, exact * abs(float(radial[:n_slave].sum())))
         sums[SUM] = total / exact - 1
         others[PRESSURE] = _pressure_error(state.points, arcs.pressure)
-    sides = case.interface.slave, case.interface.master
-    h_s, h_m = (float(side.lengths(case.positions).max()) for side in sides)
+    h_s, h_m = (float(side.lengths(case.positions).max()) for side in (slave, case.interface.master))
     chords = (h_s**2 + h_m**2) / (8 * arcs.radius * arcs.depth)
     return _ArcErrors(sums, others, chords, h_m / (2 * arcs.radius))
 
@@ -360,16 +365,3 @@ def _pressure_error(points: ContactPoints, pressure: float) -> float:
         return np.inf
     errors = np.where(points.active, points.pressure, 0.0)[counted] / pressure - 1
     return float(np.sqrt(np.average(errors**2, weights=points.weight[counted])))
-
-
-def _nodal_error(arcs: Arcs, case: Case, forces: FloatArray, share: float) -> float:
-    """Return the error E_F of the slave's nodal forces."""
-    towards = share * (-arcs.pressure if arcs.convex_slave else arcs.pressure)
-
-    def traction(places: FloatArray) -> FloatArray:
-        pressures: FloatArray = towards * places / np.linalg.norm(places, axis=1)[:, None]
-        return pressures
-
-    surface = case.interface.slave
-    exact = traction_forces(surface, case.positions, traction)
-    return force_error(forces, exact, shape_integrals(surface, case.positions))

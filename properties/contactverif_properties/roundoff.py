@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import reduce
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -188,17 +189,12 @@ class Conditioning:
         return self.worst_row(error).roundings
 
 
-@dataclass(frozen=True, slots=True)
-class WorstRow:
-    """The row of a residual with the largest ω.
-
-    The three numbers belong together: error = roundings × u × condition.
-    """
+class WorstRow(NamedTuple):
+    """The row of a residual with the largest ω; error = roundings × u × condition."""
 
     roundings: float  # The error in roundings, ω.
     error: float  # The error of the row over the largest force, or over the largest constraint row.
-    # The condition number κ of the row: the relative change of the row by a relative change of the whole input. It is
-    # at least 1.
+    # The relative change of the row by a relative change of the whole input, κ. It is at least 1.
     condition: float
 
 
@@ -298,13 +294,9 @@ def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error
     Details are the error and the condition number of the row with that ω, and the largest error of a force over the
     largest force.
     """
-    worst = conditioning.worst_row(error)
-    dim = conditioning.dim
+    worst, dim = conditioning.worst_row(error), conditioning.dim
     n = dim * ((len(error) - len(conditioning.reach)) // (dim - 1))
     largest = float(np.linalg.norm(np.asarray(error[:n], dtype=np.float64).reshape(-1, dim), axis=1).max())
-    details = {
-        ERROR: worst.error,
-        CONDITION: worst.condition,
-        FORCE_ERROR: ratio(largest, float(conditioning.floor[0])),
-    }
+    force_error = ratio(largest, float(conditioning.floor[0]))
+    details = {ERROR: worst.error, CONDITION: worst.condition, FORCE_ERROR: force_error}
     return Measurement([quantity.check(worst.roundings, MOST_ROUNDINGS)], details=details, idle=idle)

@@ -46,23 +46,20 @@ from contactverif.strategies.translations import KINDS
 from contactverif_properties.exact_forces import forces_of_penetration, node_gaps
 from contactverif_properties.roundoff import CONDITION, ERROR, FORCE_ERROR
 from contactverif_properties.stability import (
-    DRIFT,
     FORCES,
     FORCES_THERE,
     LARGEST_DENOMINATOR,
-    ROUGHNESS,
     SWEPT_ROUNDINGS,
     TOTAL_THERE,
     ExactMotion,
-    answer_to_wave,
     exact_residual,
     move_swept,
     refuse_unknown_forces,
     stability_local,
-    stability_stiffness,
     stability_sweep,
     stability_translation,
 )
+from contactverif_properties.stability_solved import DRIFT, ROUGHNESS, answer_to_wave, stability_stiffness
 from contactverif_properties.states import move_state
 
 
