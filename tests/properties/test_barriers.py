@@ -1,5 +1,6 @@
 """Barriers are asked on states whose surfaces are apart: a right one is not accused, and each mistake is found."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -95,11 +96,21 @@ class StraightTangent(LogBarrier):
         return super().tangent(interface, pairing, z)
 
 
-class MasterTakesLess(LogBarrier):
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = super().residual(interface, pairing, z)
-        forces[2 * interface.n_slave_nodes :] *= 0.99
-        return forces
+def times(factor: Callable[[Interface], Any]) -> type[LogBarrier]:
+    """Return a barrier with its forces times a factor."""
+
+    class Changed(LogBarrier):
+        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+            return super().residual(interface, pairing, z) * factor(interface)
+
+    return Changed
+
+
+PULLS = times(lambda _: -1.0)
+FOLLOWS_THE_AXIS = times(lambda interface: np.tile([1.0, 1.001], interface.n_nodes))
+MASTER_TAKES_LESS = times(
+    lambda interface: np.where(np.arange(interface.n_unknowns) < 2 * interface.n_slave_nodes, 1.0, 0.99)
+)
 
 
 class SlaveAlone(LogBarrier):
@@ -131,11 +142,6 @@ class FixedLength(LogBarrier):
         return min(super()._range(interface), 1e-3)
 
 
-class FollowsTheAxis(LogBarrier):
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return super().residual(interface, pairing, z) * np.tile([1.0, 1.001], interface.n_nodes)
-
-
 class Remembers(LogBarrier):
     calls = 0
 
@@ -144,24 +150,19 @@ class Remembers(LogBarrier):
         return super().residual(interface, pairing, z) * (1 + 1e-9 * self.calls)
 
 
-class Pulls(LogBarrier):
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        return -super().residual(interface, pairing, z)
-
-
 @pytest.mark.parametrize(
     ("make", "property_id"),
     [
         (WrongBlock, "tangent.sparsity"),
         (StraightTangent, "tangent.directional"),
-        (MasterTakesLess, "balance.force"),
+        (MASTER_TAKES_LESS, "balance.force"),
         (SlaveAlone, "swap"),
         (Bounded, "unilateral"),
         (TooFar, "unilateral"),
-        (Pulls, "unilateral"),
+        (PULLS, "unilateral"),
         (FixedLength, "units"),
-        (FollowsTheAxis, "objectivity"),
-        (FollowsTheAxis, "symmetric"),
+        (FOLLOWS_THE_AXIS, "objectivity"),
+        (FOLLOWS_THE_AXIS, "symmetric"),
         (Remembers, "purity"),
     ],
 )
@@ -209,4 +210,4 @@ def test_a_barrier_that_states_no_activation_distance_is_not_called_for_the_firs
     called = call_first(Subject("barrier", LogBarrier), {"tangent"})
     assert called.answers is not None
     assert not called.opposite_sign
-    assert call_first(Subject("pulls", Pulls), {"tangent"}).opposite_sign
+    assert call_first(Subject("pulls", PULLS), {"tangent"}).opposite_sign

@@ -180,46 +180,29 @@ def pull(node: int, sign: float) -> Subject:
     return Subject("pulled", lambda *, penalty: change_verbs(vts_ppt(penalty=penalty), residual=residual))
 
 
-def _judge(subject: Subject, interface: Interface) -> Verdict:
-    return judge_case(nodal_push, Case(interface, interface.nodes.reshape(-1)), subject).verdict
+def without_points(subject: Subject) -> Subject:
+    return Subject("silent", lambda *, penalty: Changed(subject.with_penalty(penalty).plugin, contact_points=None))
 
 
-@pytest.mark.parametrize("name", ["sts", "mortar", "nts-ar", "vts-me"])
-def test_a_formulation_whose_feet_are_where_its_points_are_passes_round_a_corner(name: str) -> None:
-    assert _judge(load_subject(name), CORNER) is Verdict.PASS
+# Eq. 6 leaves ξ unclipped: the foot of a part may be past the neighbour of its point's segment by its whole length. In
+# the valley both slave nodes are nearest to the vertex, and so lever the outer nodes of the master up.
+PUSHES: list[tuple[Subject, Interface, Verdict]] = [
+    *((load_subject(name), CORNER, Verdict.PASS) for name in ("sts", "mortar", "nts-ar", "vts-me")),
+    (load_subject("vts-ppt"), CORNER, Verdict.UNDECIDED),
+    (pull(0, -1.0), CORNER, Verdict.FAIL),
+    (load_subject("vts-ppt"), STRAIGHT, Verdict.PASS),
+    (pull(3, 1.0), STRAIGHT, Verdict.FAIL),
+    (without_points(pull(0, -1.0)), STRAIGHT, Verdict.FAIL),
+    *((load_subject(name), VALLEY, Verdict.PASS) for name in ("nts-ar", "nts", "two-pass/nts-ar")),
+    *((without_points(load_subject(name)), VALLEY, Verdict.UNDECIDED) for name in ("nts-ar", "nts", "two-pass/nts-ar")),
+]
 
 
-def test_a_part_of_a_force_round_a_corner_is_no_reason_to_accuse() -> None:
-    """Eq. 6 leaves ξ unclipped: the foot of a part is past the neighbour of its point's segment by its whole length."""
-    assert _judge(load_subject("vts-ppt"), CORNER) is Verdict.UNDECIDED
-
-
-def test_a_node_that_is_pulled_where_there_is_no_corner_is_found() -> None:
-    assert _judge(load_subject("vts-ppt"), STRAIGHT) is Verdict.PASS
-    assert _judge(pull(3, 1.0), STRAIGHT) is Verdict.FAIL
-
-
-def test_a_slave_node_that_is_pulled_beside_a_corner_is_found() -> None:
-    assert _judge(pull(0, -1.0), CORNER) is Verdict.FAIL
-
-
-@pytest.mark.parametrize("name", ["nts-ar", "nts", "two-pass/nts-ar"])
-def test_without_points_a_foot_past_the_end_of_a_segment_is_no_reason_to_accuse(name: str) -> None:
-    """Both slave nodes are nearest to the vertex of the valley, and so lever the outer nodes of the master up."""
-    inner = load_subject(name)
-    assert _judge(inner, VALLEY) is Verdict.PASS
-
-    def make(*, penalty: float) -> Changed:
-        return Changed(inner.with_penalty(penalty).plugin, contact_points=None)
-
-    assert _judge(Subject(name, make), VALLEY) is Verdict.UNDECIDED
-
-
-def test_without_points_a_slave_node_that_is_pulled_is_found() -> None:
-    def make(*, penalty: float) -> Changed:
-        return Changed(pull(0, -1.0).with_penalty(penalty).plugin, contact_points=None)
-
-    assert _judge(Subject("pulled", make), STRAIGHT) is Verdict.FAIL
+@pytest.mark.parametrize(("subject", "interface", "verdict"), PUSHES)
+def test_a_node_that_is_pulled_is_found_and_a_foot_past_an_end_is_not_accused(
+    subject: Subject, interface: Interface, verdict: Verdict
+) -> None:
+    judge_as(verdict, nodal_push, Case(interface, interface.nodes.reshape(-1)), subject)
 
 
 PRESSURES = ("mortar-lm:normals=averaged", "two-pass/vts-me-lm", "two-pass/mortar-dual-lm", "vts-ppt-lm:n=1")

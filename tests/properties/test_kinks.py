@@ -57,31 +57,38 @@ def kink(plugin: Any, state: Case, reach: float = REACH) -> str:
     return find_kink(at(plugin, state), reach, np.ones(state.z.size))
 
 
-def test_a_point_over_a_master_node_is_at_a_kink() -> None:
-    assert kink(Pointed, over_a_node(0.0)).startswith("a kink: a decision hangs on 0")
-
-
-def test_a_point_away_from_all_decisions_is_not() -> None:
-    assert kink(Pointed, over_a_node(1 / 7)) == ""
-
-
-@pytest.mark.parametrize(("offset", "near"), [(1e-7, True), (1e-4, False), (-1e-7, True), (-1e-4, False)])
-def test_a_point_is_near_a_kink_where_the_nodes_need_not_move_far(offset: float, near: bool) -> None:
-    assert bool(kink(Pointed, over_a_node(offset))) is near
-
-
-def test_touch_is_a_kink() -> None:
-    assert kink(Pointed, over_a_node(6 / 7, gap=0.0))
-    assert kink(Pointed, over_a_node(6 / 7, gap=-1e-7))
-    assert not kink(Pointed, over_a_node(6 / 7, gap=-1e-4))
-
-
-def test_the_end_of_an_area_over_a_master_node_is_a_kink() -> None:
-    """The area of competence is a quarter to either side."""
-    at_end = over_a_node(0.25)
-    assert not kink(Pointed, at_end)
-    assert kink(Wide, at_end)
-    assert not kink(Wide, over_a_node(0.3))
+@pytest.mark.parametrize(
+    ("plugin", "state", "reason"),
+    [
+        (Pointed, over_a_node(0.0), "a kink: a decision hangs on 0"),
+        (Pointed, over_a_node(1e-7), "a kink"),
+        (Pointed, over_a_node(-1e-7), "a kink"),
+        (Pointed, over_a_node(1e-4), ""),
+        (Pointed, over_a_node(-1e-4), ""),
+        (Pointed, over_a_node(1 / 7), ""),
+        # Touch.
+        (Pointed, over_a_node(6 / 7, gap=0.0), "a kink"),
+        (Pointed, over_a_node(6 / 7, gap=-1e-7), "a kink"),
+        (Pointed, over_a_node(6 / 7, gap=-1e-4), ""),
+        # The area of competence is a quarter to either side, and its end lies over a master node.
+        (Pointed, over_a_node(0.25), ""),
+        (Wide, over_a_node(0.25), "a kink"),
+        (Wide, over_a_node(0.3), ""),
+        # Without contact points one-sided differences tell.
+        (Springs, over_a_node(0.0), "a kink: one-sided differences over 1e-06 disagree by "),
+        (Springs, over_a_node(1e-7), "a kink"),
+        (Springs, over_a_node(1 / 7), ""),
+        (Springs, case(), ""),
+        # Nothing is in contact.
+        (Handmade, over_a_node(0.0), ""),
+    ],
+)
+def test_a_kink_is_where_a_decision_hangs_on_less_than_the_nodes_may_move(
+    plugin: Any, state: Case, reason: str
+) -> None:
+    words = kink(plugin, state)
+    assert words.startswith(reason)
+    assert bool(words) is bool(reason)
 
 
 def test_a_lie_about_the_contact_point_moves_the_kink_with_it() -> None:
@@ -92,17 +99,6 @@ def test_a_lie_about_the_contact_point_moves_the_kink_with_it() -> None:
             return self.points(c=-2 * 6 / 7)  # over the node of the master
 
     assert kink(OverANode, case())
-
-
-def test_without_contact_points_one_sided_differences_tell() -> None:
-    assert kink(Springs, over_a_node(0.0)).startswith("a kink: one-sided differences over 1e-06 disagree by ")
-    assert kink(Springs, over_a_node(1e-7))
-    assert kink(Springs, over_a_node(1 / 7)) == ""
-    assert kink(Springs, case()) == ""
-
-
-def test_nothing_in_contact_is_no_kink() -> None:
-    assert kink(Handmade, over_a_node(0.0)) == ""
 
 
 def test_a_jump_is_seen_from_both_sides() -> None:

@@ -197,18 +197,18 @@ def test_the_single_class_tells_vts_me_from_the_others(name: str) -> None:
         assert judge_case(question, case, load_subject("vts-me")).verdict is Verdict.PASS
 
 
-def test_who_promises_a_larger_class_promises_the_smaller_ones() -> None:
-    promises = [load_property(property_id).promise for property_id in (NORMAL, SINGLE)]
-    assert [promise(Traits(promises=Promises(patch=PatchPromises(flat=True)))) for promise in promises] == [True, True]
-    assert [promise(Traits(promises=Promises(patch=PatchPromises(single=True)))) for promise in promises] == [
-        True,
-        True,
-    ]
-    assert [promise(Traits(promises=Promises(patch=PatchPromises(normal=True)))) for promise in promises] == [
-        True,
-        None,
-    ]
-    assert [promise(Traits(promises=Promises(patch=PatchPromises(flat=False)))) for promise in promises] == [None, None]
+@pytest.mark.parametrize(
+    ("patch", "promises"),
+    [
+        (PatchPromises(flat=True), [True, True]),
+        (PatchPromises(single=True), [True, True]),
+        (PatchPromises(normal=True), [True, None]),
+        (PatchPromises(flat=False), [None, None]),
+    ],
+)
+def test_who_promises_a_larger_class_promises_the_smaller_ones(patch: PatchPromises, promises: list[Any]) -> None:
+    traits = Traits(promises=Promises(patch=patch))
+    assert [load_property(property_id).promise(traits) for property_id in (NORMAL, SINGLE)] == promises
 
 
 def test_scenes_of_another_class_are_not_asked_about() -> None:
@@ -542,38 +542,31 @@ def test_our_own_formulations_keep_every_bit_beside_a_bend(name: str) -> None:
         assert not measurement.idle
 
 
-def test_a_factor_at_a_free_end_is_named() -> None:
-    case = named_case("c")
-    exact = forces_of_penetration(case)
-    wrong = exact.copy()
-    wrong[0] *= 2
-    finding = worst_force(case.interface, wrong, exact)
+EXACT = forces_of_penetration(named_case("c"))
+
+
+@pytest.mark.parametrize(
+    ("factor", "remark"),
+    [
+        (2.0, "ratio 2"),
+        (-1.0, "ratio -1"),
+        (1 + 2.0**-40, "ratio 1 + 9.1e-13"),
+        (1 - 2.0**-40, "ratio 1 − 9.1e-13"),
+    ],
+)
+def test_a_factor_at_a_free_end_is_named(factor: float, remark: str) -> None:
+    wrong = EXACT.copy()
+    wrong[0] *= factor
+    finding = worst_force(named_case("c").interface, wrong, EXACT)
     assert finding.place == "slave node 0 (free end)"
-    assert finding.found == pytest.approx(2 * np.array(finding.right))
-    assert finding.remark == "ratio 2"
+    assert finding.found == pytest.approx(factor * np.array(finding.right))
+    assert finding.remark == remark
     assert str(finding).startswith("slave node 0 (free end): force ")
 
 
-def test_a_force_the_other_way_has_a_negative_ratio() -> None:
-    case = named_case("c")
-    exact = forces_of_penetration(case)
-    assert worst_force(case.interface, -exact, exact).remark == "ratio -1"
-
-
-@pytest.mark.parametrize("share", [2.0**-40, -(2.0**-40)])
-def test_a_ratio_that_four_digits_call_1_says_by_how_much_it_is_not(share: float) -> None:
-    case = named_case("c")
-    exact = forces_of_penetration(case)
-    remark = worst_force(case.interface, exact * (1 + share), exact).remark
-    assert remark == f"ratio 1 {'+' if share > 0 else '−'} 9.1e-13"
-
-
 def test_a_force_aside_has_both_components() -> None:
-    case = named_case("c")
-    exact = forces_of_penetration(case)
-    wrong = exact + np.where(np.arange(len(exact)) == case.interface.n_slave_nodes, 1.0, 0.0)[:, None] * exact.max()
-    wrong[:, 0] += np.abs(exact).max() * (np.arange(len(exact)) == 1)
-    finding = worst_force(case.interface, wrong, exact)
+    wrong = EXACT + np.where(np.arange(len(EXACT)) == 5, 1.0, 0.0)[:, None] * EXACT.max()
+    finding = worst_force(named_case("c").interface, wrong, EXACT)
     assert len(finding.found) == 2
     assert "x and y" in finding.place
 
