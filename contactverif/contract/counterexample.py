@@ -9,7 +9,7 @@ import difflib
 import hashlib
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -125,7 +125,7 @@ def counterexample_of(row: Row) -> Outcome | None:
 def named_failures(run: Run) -> dict[str, Counterexample]:
     """Return the named cases that a formulation fails {id: counterexample}, of those that the run holds whole.
 
-    A property with a finite list of cases names each of them. The id is `FORMULATION.PROPERTY.CASE`.
+    A property with a finite list of cases names each of them. The id is `vts-ppt.stability.sweep.offset-1e6-a`.
     """
     failures = {}
     for row in run.rows:
@@ -133,7 +133,7 @@ def named_failures(run: Run) -> dict[str, Counterexample]:
             failed = outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
             case = outcome.case_or_summary
             if failed and isinstance(case, Case) and case.name:
-                id_ = named_case_id(row.formulation, row.property_id, case.name)
+                id_ = typeable(f"{row.formulation}.{row.property_id}.{case.name}")
                 failures[id_] = Counterexample(id_, row, outcome)
     return failures
 
@@ -141,19 +141,20 @@ def named_failures(run: Run) -> dict[str, Counterexample]:
 def find_counterexample(run: Run, id_: str) -> Counterexample:
     """Return the counterexample of that id."""
     examples = {**named_failures(run), **counterexamples(run)}
-    if id_ not in examples:
-        raise MisuseError("--case", repr(id_), _suggestion(id_, list(examples)))
-    return examples[id_]
+    if id_ in examples:
+        return examples[id_]
+    needed, ids = "a report with counterexamples; this one has none", list(examples)
+    if ids:
+        near = difflib.get_close_matches(id_, ids, n=3, cutoff=0.4)
+        listed = near or ids[:5]
+        more = f" (and {len(ids) - len(listed)} more)" if len(ids) > len(listed) else ""
+        needed = f"{'an id like' if near else 'one of'} {', '.join(listed)}{more}"
+    raise MisuseError("--case", repr(id_), needed)
 
 
 def case_id(formulation: str, property_id: str, *, witness: bool = False) -> str:
     """Return `vts-me_n_4.patch.flat.transmission`, with `.witness` behind it for a witness."""
     return typeable(f"{formulation}.{property_id}") + (".witness" if witness else "")
-
-
-def named_case_id(formulation: str, property_id: str, name: str) -> str:
-    """Return `vts-ppt.stability.sweep.offset-1e6-a`, the id of a case with a name."""
-    return typeable(f"{formulation}.{property_id}.{name}")
 
 
 def typeable(name: str) -> str:
@@ -178,12 +179,3 @@ def distinct(names: Iterable[str]) -> list[str]:
             free = f"{name}-{number}"
         result.append(free)
     return result
-
-
-def _suggestion(id_: str, ids: Sequence[str]) -> str:
-    if not ids:
-        return "a report with counterexamples; this one has none"
-    near = difflib.get_close_matches(id_, ids, n=3, cutoff=0.4)
-    examples = near or ids[:5]
-    more = f" (and {len(ids) - len(examples)} more)" if len(ids) > len(examples) else ""
-    return f"{'an id like' if near else 'one of'} {', '.join(examples)}{more}"

@@ -81,9 +81,9 @@ def flat_state(
     for piece, (first, last) in enumerate(pairwise(ends)):
         for x in (first + last) / 2 + _GAUSS * (last - first) / 2:
             force = PENALTY * max(np.interp(x, slave, depths), 0.0) * (last - first) / 2
-            for one, other in (side[piece] for side in nodes):
-                share = (x - along[one]) / (along[other] - along[one])
-                pieces[piece, [one, other]] += force * np.array([1 - share, share])
+            for pair in (side[piece] for side in nodes):
+                share = (x - along[pair[0]]) / (along[pair[1]] - along[pair[0]])
+                pieces[piece, pair] += force * np.array([1 - share, share])
     return FlatState(case, pieces, ends[:-1], np.diff(ends), segments, nodes, n_slave)
 
 

@@ -54,7 +54,7 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
     rules, patch = subject.traits.rules, subject.traits.promises.patch
     if rules.enforcement != "penalty":
         return ""
-    if text := _lost_places(subject):
+    if text := _find_lost_places(subject):
         return text
     if rules.penalty == "nodal" or patch.flat is False:
         return ""  # Other forces than the consistent ones are right there.
@@ -62,8 +62,8 @@ def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
 
 
 def _patterns(subject: Subject, *, in_full: bool) -> Iterator[str]:
-    yield _digits(subject)
-    yield _law(subject)
+    yield _diagnose_digits(subject)
+    yield _diagnose_law(subject)
     state = flat_state()
     forces = pushes_of(subject, state)
     yield _uniform_pattern(state, forces, in_full=in_full)
@@ -77,14 +77,14 @@ def _patterns(subject: Subject, *, in_full: bool) -> Iterator[str]:
         state = flat_state(places=places)
         if text := _uniform_pattern(state, pushes_of(subject, state), in_full=in_full):
             yield f"on a slave that is {words} than its master: {text}"
-    yield _turned(subject)
+    yield _diagnose_turned(subject)
     for number, depths in _OPEN.items():
         pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
         if free := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
             nodes = f"slave node{'s' * (len(free) > 1)} {', '.join(map(str, free))}"
             yield f"where slave segment {number} is open, nothing pushes {nodes}, which penetrate"
     if subject.traits.promises.conserves_force:
-        yield _imbalance(subject)
+        yield _diagnose_balance(subject)
 
 
 def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> str:
@@ -273,7 +273,7 @@ def _sum_at_points(state: FlatState, places: FloatArray, weights: FloatArray) ->
     return forces
 
 
-def _lost_places(subject: Subject) -> str:
+def _find_lost_places(subject: Subject) -> str:
     """Return the places along the master at which a slave node has no force; empty if there are none.
 
     Each node must have the exact force or a whole spring elsewhere: else the places mean nothing.
@@ -307,7 +307,7 @@ def _lost_places(subject: Subject) -> str:
     return f"slave nodes that face {', or '.join(words)} have no force; all others are right"
 
 
-def _turned(subject: Subject) -> str:
+def _diagnose_turned(subject: Subject) -> str:
     """Return by how many quarters the flat state must be turned until its forces do not turn with it."""
     state = flat_state()
     interface, positions = state.case.interface, state.case.positions
@@ -324,7 +324,7 @@ def _turned(subject: Subject) -> str:
     return ""
 
 
-def _digits(subject: Subject) -> str:
+def _diagnose_digits(subject: Subject) -> str:
     """Return whether the forces do not see a change of places that has its digit in double precision alone."""
     state = flat_state()
     formulation, interface = subject.for_case(state.case), state.case.interface
@@ -340,32 +340,34 @@ def _digits(subject: Subject) -> str:
     return ""
 
 
-def _imbalance(subject: Subject) -> str:
+def _diagnose_balance(subject: Subject) -> str:
     """Return how the forces on a tilted slave do not balance: by their directions, or by their moments."""
     state = flat_state(slope=_TILT, depth=1.0)
     n, pushes = state.n_slave_nodes, pushes_of(subject, state)
     on_slave, on_master = pushes[:n].sum(axis=0), pushes[n:].sum(axis=0)
     if not same(on_slave, on_master):
-        words = f"along {_direction(on_slave)} normal on the slave, along {_direction(on_master)} normal on the master"
+        sides = [_name_direction(force) for force in (on_slave, on_master)]
+        words = f"along {sides[0]} normal on the slave, along {sides[1]} normal on the master"
         return f"the forces on the sides of a tilted slave do not balance: they are {words}"
     x, y = state.case.positions.T
     moments = x * pushes[:, 1] - y * pushes[:, 0]
     if not subject.traits.promises.conserves_moment or same(moments[:n].sum(), moments[n:].sum()):
         return ""
+    along = f"along the force, which is along {_name_direction(on_slave)} normal"
     return (
         "the forces on the sides of a tilted slave balance, and their moments do not: the points that push each other "
-        f"do not face each other along the force, which is along {_direction(on_slave)} normal: look at the projection"
+        f"do not face each other {along}: look at the projection"
     )
 
 
-def _direction(force: FloatArray) -> str:
+def _name_direction(force: FloatArray) -> str:
     normals = {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
     size = np.linalg.norm(force)
     names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
     return next(names, "another")
 
 
-def _law(subject: Subject) -> str:
+def _diagnose_law(subject: Subject) -> str:
     """Return how the force depends on a uniform penetration, where it is not proportional to it."""
     depths = np.array([2.0**-power for power in _POWERS])
     states = [flat_state(depth=depth) for depth in depths]

@@ -127,31 +127,30 @@ def property_text(question: Property) -> str:
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
     ]
-    text = [
-        f"# {question.id}\n",
-        sentence(plain(question.summary)) + "\n",
-        *_answers(question),
-        "\n".join(f"- **{title}:** {words}" for title, words in facts) + "\n",
-        "## Measured numbers\n",
-        _tolerances(question.quantities),
-        _reasons(question.quantities),
-        _symbols(question.quantities),
-    ]
-    if question.series:
-        names = ", ".join(f"{plain(name)} ({unit})" for name, unit in question.series.items())
-        text.append(f"The report also keeps, for each iterate: {names}.\n")
-    return "\n".join(filter(None, [*text, known_failures(question)]))
-
-
-def _answers(question: Property) -> list[str]:
-    """Return the paragraphs about question, reason, judgement, undecided cases and source."""
     answers = []
     for paragraph in question.question.split("\n\n"):
         title, body = re.fullmatch(r"(?:\*\*([^*]+)\.\*\* )?(.*)", paragraph, re.DOTALL).groups()  # type: ignore[union-attr]
         answers.append((f"**{title}.** " if title else "") + plain(body) + "\n")
     if not any(answer.startswith("**Source.**") for answer in answers):
         answers.append("**Source.** No publication is named; the requirement follows from mechanics.\n")
-    return answers
+    text = [
+        f"# {question.id}\n",
+        sentence(plain(question.summary)) + "\n",
+        *answers,
+        "\n".join(f"- **{title}:** {words}" for title, words in facts) + "\n",
+        "## Measured numbers\n",
+        _tolerances(question.quantities),
+        _reasons(question.quantities),
+    ]
+    symbols = dict.fromkeys(symbol for quantity in question.quantities for symbol in symbols_of(quantity.tolerance))
+    if symbols:
+        text.append(
+            "\n".join(["The symbols:\n", *(f"- {each}: {plain(symbol_meanings()[each])}" for each in symbols)]) + "\n"
+        )
+    if question.series:
+        names = ", ".join(f"{plain(name)} ({unit})" for name, unit in question.series.items())
+        text.append(f"The report also keeps, for each iterate: {names}.\n")
+    return "\n".join(filter(None, [*text, known_failures(question)]))
 
 
 def _tolerances(quantities: Sequence[Quantity]) -> str:
@@ -182,10 +181,3 @@ def _reasons(quantities: Sequence[Quantity]) -> str:
         if clause not in everywhere
     ]
     return "\n".join(["Why these tolerances:\n", *lines]) + "\n"
-
-
-def _symbols(quantities: Sequence[Quantity]) -> str:
-    """Return the list of the symbols in tolerances with their meanings; empty if there is none."""
-    symbols = dict.fromkeys(symbol for quantity in quantities for symbol in symbols_of(quantity.tolerance))
-    lines = [f"- {symbol}: {plain(symbol_meanings()[symbol])}" for symbol in symbols]
-    return "\n".join(["The symbols:\n", *lines]) + "\n" if lines else ""

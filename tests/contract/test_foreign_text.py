@@ -5,7 +5,7 @@ import pytest
 from foreign_texts import TEXTS, hidden_characters
 
 from contactverif import Case, Finding, Interface, Measurement, MisuseError, Quantity, Subject
-from contactverif.contract.counterexample import case_id, named_case_id, typeable
+from contactverif.contract.counterexample import case_id, typeable
 from contactverif.contract.errors import (
     LONGEST_LINE,
     LONGEST_NAME,
@@ -130,7 +130,7 @@ def test_the_name_of_a_formulation_is_clean(text: str) -> None:
 
 @texts
 def test_ids_and_file_names_made_of_foreign_names_are_safe(text: str) -> None:
-    for id_ in (case_id(text, "patch.flat"), case_id("nts", text, witness=True), named_case_id("a", "b", text)):
+    for id_ in (case_id(text, "patch.flat"), case_id("nts", text, witness=True), typeable(f"a.b.{text}")):
         assert id_.isascii()
         assert len(f".{id_}.png.4194304.part") < 255
         assert not set(id_) & set("/\\ $'\"\n\0")
