@@ -30,6 +30,10 @@ def cells_by(tree: Tree, interface: Interface, x: FloatArray) -> Cells:
     return find_face_cells(x, interface.slave.faces, interface.master.faces, edges_of(interface, x), tree)
 
 
+def cells_of(interface: Interface, x: FloatArray) -> Cells:
+    return find_cells(x, interface.slave.faces, interface.master.faces, *edges_of(interface, x))
+
+
 def everywhere(count: int) -> Tree:
     """Return a tree whose boxes hold everything, so that each pair of faces is looked at."""
     return grow_tree(np.tile([[[-1e200] * 3, [1e200] * 3]], (count, 1, 1)))
@@ -43,14 +47,18 @@ def assert_same_cells(interface: Interface, x: FloatArray) -> None:
         assert np.array_equal(mine, others)
 
 
+def triangulate(n: int) -> IntArray:
+    """Return the triangles (2 n², 3) of n × n squares, nodes numbered row by row."""
+    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = (part.reshape(-1) for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
 def make_sphere(n: int, radius: float, inward: bool) -> tuple[FloatArray, IntArray]:
     """Return nodes and triangles of a closed sphere: a cube's surface of n × n squares a side, blown up."""
     place = np.linspace(-1, 1, n + 1)
     u, v = np.meshgrid(place, place, indexing="ij")
-    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    a, b, c, d = (part.reshape(-1) for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    square = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    points, faces = [], []
+    square, points, faces = triangulate(n), [], []
     for axis in range(3):
         for side in (1.0, -1.0):
             across = np.stack([np.full(u.size, side), u.reshape(-1), v.reshape(-1)], axis=1)
@@ -74,10 +82,7 @@ def wavy_squares(n: int) -> Interface:
     for count, size, height in ((n, 1.0, -0.05 / n), (n + 1, 1.05, 0.0)):
         place = np.linspace(-size / 2, size / 2, count + 1)
         u, v = (axis.reshape(-1) for axis in np.meshgrid(place, place, indexing="ij"))
-        number = np.arange((count + 1) ** 2).reshape(count + 1, count + 1)
-        a, b, c, d = (part.reshape(-1) for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-        faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-        sides += [np.column_stack([u, v, height + 0.01 * np.sin(9 * u) * np.cos(7 * v)]), faces]
+        sides += [np.column_stack([u, v, height + 0.01 * np.sin(9 * u) * np.cos(7 * v)]), triangulate(count)]
     return Interface.from_faces(sides[0], sides[1][:, ::-1], sides[2], sides[3])
 
 
@@ -98,9 +103,7 @@ def test_closed_surfaces_and_needles_have_the_cells_of_an_exhaustive_search(stre
 def test_a_translation_changes_no_cell() -> None:
     spheres = concentric_spheres(4)
     near = np.round(spheres.nodes * 2.0**24) / 2.0**24
-    cells, moved = (
-        find_cells(x, spheres.slave.faces, spheres.master.faces, *edges_of(spheres, x)) for x in (near, near + 2.0**20)
-    )
+    cells, moved = (cells_of(spheres, x) for x in (near, near + 2.0**20))
     assert np.array_equal(cells[0], moved[0])
     assert np.array_equal(cells[1], moved[1])
 
@@ -110,7 +113,7 @@ def test_no_corner_of_a_cell_lies_outside_its_faces() -> None:
     for case in draw_cases(flat_surface_cases(), seed="surface search", examples=100).cases:  # type: ignore[arg-type]
         interface, x = case.interface, case.positions
         slave, master = interface.slave.faces, interface.master.faces
-        faces, codes = find_cells(x, slave, master, *edges_of(interface, x))
+        faces, codes = cells_of(interface, x)
         view = SlaveView.of_corners(x[slave[faces[:, 0]]], x[master[faces[:, 1]]])
         corners = view.cell_corners(codes)
         rounding = 1e-12 * (1 + case.largest_coordinate / case.diameter) * case.diameter
@@ -122,7 +125,7 @@ def test_no_corner_of_a_cell_lies_outside_its_faces() -> None:
 def test_a_master_out_of_reach_or_behind_another_makes_no_cell() -> None:
     near = wavy_squares(3)
     x, n_slave = near.nodes, near.n_slave_nodes
-    before = find_cells(x, near.slave.faces, near.master.faces, *edges_of(near, x))
+    before = cells_of(near, x)
     edge = sum(float(edges.max()) for edges in edges_of(near, x))
     for distance in (0.5, 1.9, 2.1, 64.0):
         for side in (1.0, -1.0):  # The slave's body is above.
@@ -131,12 +134,11 @@ def test_a_master_out_of_reach_or_behind_another_makes_no_cell() -> None:
                 x[:n_slave], near.slave.faces, np.vstack([x[n_slave:], layer]),
                 np.vstack([near.master.faces, near.master.faces + len(layer)]) - n_slave,
             )  # fmt: skip
-            cells = find_cells(both.nodes, both.slave.faces, both.master.faces, *edges_of(both, both.nodes))
+            cells = cells_of(both, both.nodes)
             assert np.array_equal(cells[0], before[0])
             assert np.array_equal(cells[1], before[1])
             alone = Interface.from_faces(x[:n_slave], near.slave.faces, layer, near.master.faces - n_slave)
-            faces, _ = find_cells(alone.nodes, alone.slave.faces, alone.master.faces, *edges_of(alone, alone.nodes))
-            assert bool(len(faces)) == (distance < 2)
+            assert bool(len(cells_of(alone, alone.nodes)[0])) == (distance < 2)
 
 
 @pytest.mark.parametrize("near", [-1.5, -0.9, -0.5, 0.0, 0.5, 0.9, 1.5])
