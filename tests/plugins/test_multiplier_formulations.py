@@ -89,7 +89,7 @@ def test_they_are_counted() -> None:
     assert {name: load(name).n_multipliers(interface) for name in counts} == counts
 
 
-# `tests/paper/test_paper_table.py` asks which formulations pass on the paper's scenes, and for their multipliers.
+# `tests/paper/test_paper.py` asks which formulations pass on the paper's scenes, and for their multipliers.
 
 PRESSURE = 100.0
 ROUNDOFF = 1e-11  # The largest error of a stress or a multiplier over the pressure, on even meshes.
