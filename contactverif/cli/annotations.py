@@ -12,7 +12,6 @@ from __future__ import annotations
 import ast
 import importlib.util
 import os
-from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -80,13 +79,25 @@ def _follow(module: str, name: str) -> tuple[Path, int] | None:
             tree = ast.parse(file.read_text(encoding="utf-8"))
         except (OSError, ValueError, SyntaxError):
             return file, 1
-        line = next((node.lineno for node in tree.body if name in _names(node)), None)
-        if line is not None:
-            return file, line
-        origin = next(_origins(tree, module, name, is_package=file.name == "__init__.py"), None)
-        if origin is None:
+        for node in tree.body:
+            match node:
+                case ast.FunctionDef(name=defined) | ast.ClassDef(name=defined) if defined == name:
+                    return file, node.lineno
+                case ast.Assign(targets=targets) if name in (getattr(target, "id", "") for target in targets):
+                    return file, node.lineno
+        imports = [
+            (node, alias.name)
+            for node in tree.body
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+            if (alias.asname or alias.name) == name
+        ]
+        if not imports:
             return file, 1
-        module, name = origin
+        node, name = imports[0]
+        parts = module.split(".")
+        base = parts[: len(parts) - node.level + (file.name == "__init__.py")] if node.level else []
+        module = ".".join(filter(None, (*base, node.module)))
     return None
 
 
@@ -103,23 +114,3 @@ def _file_of(module: str) -> Path | None:
         path = path.parent.joinpath(*rest)
         path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     return path.resolve()
-
-
-def _names(node: ast.stmt) -> list[str]:
-    match node:
-        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
-            return [name]
-        case ast.Assign(targets=targets):
-            return [target.id for target in targets if isinstance(target, ast.Name)]
-    return []
-
-
-def _origins(tree: ast.Module, module: str, name: str, *, is_package: bool) -> Iterator[tuple[str, str]]:
-    for node in tree.body:
-        if not isinstance(node, ast.ImportFrom):
-            continue
-        for alias in node.names:
-            if (alias.asname or alias.name) == name:
-                parts = module.split(".")
-                base = ".".join(parts[: len(parts) - node.level + is_package]) if node.level else ""
-                yield ".".join(filter(None, (base, node.module))), alias.name

@@ -17,7 +17,6 @@ Isolated = Annotated[RunOptions, Takes([ISOLATION])]
 ReportPath = Annotated[Path, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")]
 CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the report.", metavar="ID")]
 Share = Annotated[float, typer.Option(help="Share of the cases of each row that is judged again.", metavar="SHARE")]
-_FORMULATIONS = "Formulations, with options: vts-ppt, vts-me:n=4, nts-ar:area=reference."
 _EVERY = "Take every installed formulation that wraps no other."
 
 

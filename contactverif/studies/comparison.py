@@ -22,7 +22,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded, Run
-from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.subject import Subject
 from contactverif.isolation.remote import RemoteFormulation
 from contactverif.run.run import run
 from contactverif.sampling.draw import Sampling, with_case
@@ -83,13 +83,23 @@ def measure_costs(
     """Time each formulation on each state, in turns, and return the fastest times."""
     costs: list[Cost] = []
     for case in cases if cases is not None else [make_state(n) for n in SEGMENTS]:
-        timers = [_Timer(subject, case) for subject in subjects]
+        fastest, failed = [dict.fromkeys(PARTS, nan) for _ in subjects], [""] * len(subjects)
         start, turn = perf_counter(), 0
         while turn <= turns or (turn <= MOST_TURNS and perf_counter() - start < ENOUGH_SECONDS):
-            for place in range(len(timers)):
-                timers[(place + turn) % len(timers)].take_turn(count=turn > 0)
+            for place in range(len(subjects)):
+                number = (place + turn) % len(subjects)
+                if failed[number]:
+                    continue
+                try:
+                    times = _take_turn(subjects[number], case, checked=turn == 0)
+                except Exception as error:  # A plugin without the harness' guard may raise anything.
+                    failed[number], fastest[number] = f"{error}", dict.fromkeys(PARTS, nan)
+                    continue
+                for part in times if turn else ():
+                    fastest[number][part] = float(np.fmin(fastest[number][part], times[part]))
             turn += 1
-        costs += [timer.cost() for timer in timers]
+        for subject, seconds, reason in zip(subjects, fastest, failed, strict=True):
+            costs.append(Cost(subject.name, len(case.interface.slave), seconds, reason))
     return tuple(costs)
 
 
@@ -108,43 +118,22 @@ def make_state(n_segments: int, ratio: float = 0.75, before: float = 0.5) -> Cas
     return Case(interface, np.vstack([upper, lower]).reshape(-1), penalty=16.0)
 
 
-class _Timer:
-    def __init__(self, subject: Subject, case: Case) -> None:
-        self._subject, self._case = subject, case
-        self._fastest = dict.fromkeys(PARTS, nan)
-        self._failed = ""
-
-    def take_turn(self, *, count: bool) -> None:
-        """Evaluate once; an error ends it for good."""
-        if self._failed:
-            return
-        try:
-            formulation = self._subject.for_case(self._case)
-            times = self._times(formulation.plugin if count else formulation, formulation)
-        except Exception as error:  # A plugin without the harness' guard may raise anything.
-            self._failed, self._fastest = f"{error}", dict.fromkeys(PARTS, nan)
-            return
-        if count:
-            for part, seconds in times.items():
-                self._fastest[part] = float(np.fmin(self._fastest[part], seconds))
-
-    def cost(self) -> Cost:
-        """Return the fastest times after all turns."""
-        return Cost(self._subject.name, len(self._case.interface.slave), self._fastest, self._failed)
-
-    def _times(self, plugin: Any, formulation: CheckedFormulation) -> dict[str, float]:
-        interface, provides = self._case.interface, self._subject.provides
-        z = freeze(np.concatenate([self._case.z, np.zeros(formulation.n_multipliers(interface))]), np.float64)
-        pairing = formulation.own_pairing(interface, z)
-        if isinstance(plugin, RemoteFormulation):
-            plugin.timed = True
-        times = {}
-        if "pair" in provides:
-            times["pair"] = _seconds(plugin, lambda: plugin.pair(interface, z))
-        times["residual"] = _seconds(plugin, lambda: plugin.residual(interface, pairing, z))
-        if "tangent" in provides:
-            times["tangent"] = _seconds(plugin, lambda: plugin.tangent(interface, pairing, z))
-        return times
+def _take_turn(subject: Subject, case: Case, *, checked: bool) -> dict[str, float]:
+    """Return the seconds of each part of one evaluation, by the plugin or with the checks of the harness."""
+    formulation = subject.for_case(case)
+    plugin: Any = formulation if checked else formulation.plugin
+    interface = case.interface
+    z = freeze(np.concatenate([case.z, np.zeros(formulation.n_multipliers(interface))]), np.float64)
+    pairing = formulation.own_pairing(interface, z)
+    if isinstance(plugin, RemoteFormulation):
+        plugin.timed = True
+    times = {}
+    if "pair" in subject.provides:
+        times["pair"] = _seconds(plugin, lambda: plugin.pair(interface, z))
+    times["residual"] = _seconds(plugin, lambda: plugin.residual(interface, pairing, z))
+    if "tangent" in subject.provides:
+        times["tangent"] = _seconds(plugin, lambda: plugin.tangent(interface, pairing, z))
+    return times
 
 
 def _seconds(plugin: Any, call: Callable[[], Any]) -> float:
