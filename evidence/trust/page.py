@@ -7,8 +7,8 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from right import EXAMPLES_STRANGERS, SEED, SEEDS, SLOW, UNSTATED, is_pair
-from strangers import STRANGERS as ALL_STRANGERS
 from tables import FOLDER, SURVIVES, UNKNOWN, commits_of, markdown, read
+from zoo.right import STRANGERS as ALL_STRANGERS
 
 PAGE, FIGURE = "README.md", "kills.svg"
 _TABLES = (

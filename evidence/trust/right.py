@@ -17,9 +17,9 @@ from itertools import combinations, product
 
 from every_formulation import FORMULATIONS
 from expected_verdicts import FAILS
-from strangers import STRANGERS
 from tables import fill_all
 from zoo.killing import properties
+from zoo.right import STRANGERS
 
 from contactverif import Case, Property, Row, Subject, Verdict, judge_case, load_formulation
 from contactverif.contract.errors import MisuseError

@@ -7,9 +7,9 @@ from pathlib import Path
 import bugs_campaign
 import numpy as np
 import pytest
-from strangers import STRANGERS
 from subjects import load_subject, plane_names
 from zoo.killing import MUTANTS
+from zoo.right import STRANGERS
 from zoo.springs import EVERY, FORCES, FRESH, KNOWN, NOT_NAMED, TANGENTS, Springs
 
 from contactverif import Run, Subject, load_properties

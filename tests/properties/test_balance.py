@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from strangers import SlaveNormalAtGaussPoints
 from subjects import judge_as, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
+from zoo.at_points import SlaveNormalAtGaussPoints
 
 from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from strangers.log_barrier import LogBarrier
 from subjects import judge_as, load_property
+from zoo.at_points import LogBarrier
 
 from contactverif import Case, Interface, Rules, Subject, Traits, Verdict, judge_case, named_case
 from contactverif.contract.case import ACTIVATION, LEAST_GAP

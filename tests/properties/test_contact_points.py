@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from strangers import PointsFirst, TurnedFrame
 from subjects import load_property, load_subject, measure_case, reporting
+from zoo.at_points import PointsFirst, TurnedFrame
 
 import contactverif_mortar
 from contactverif import Case, ContactPoints, Interface, Outcome, Subject, Surface, Verdict, judge_case

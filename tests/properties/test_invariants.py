@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Handmade, Springs, case, over_a_node, subject
-from strangers import NearbyOnly, TurnedFrame
 from subjects import judge_as, load_property, load_subject, with_promises
 from test_patch_flat import RIGHT_TILTED
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
+from zoo.at_points import NearbyOnly, TurnedFrame
 
 import contactverif_nts
 from contactverif import Case, Interface, Rules, Subject, Surface, Traits, Verdict, judge_case

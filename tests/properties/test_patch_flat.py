@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
 from hard_strangers import PointSprings, Softened, simpson, trapezoid
-from strangers import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
-from strangers.segment_penalty import SegmentPenalty
 from subjects import change_verbs, judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings
+from zoo.at_points import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
+from zoo.on_strips import SegmentPenalty
 
 import contactverif_nts
 from contactverif import Case, Interface, PatchPromises, Promises, Rules, Subject, Traits, Verdict, judge_case

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from strangers import STRANGERS
-from strangers.one_point import OnePoint
-from strangers.segment_penalty import SegmentPenalty, SimpsonPoints
 from subjects import judge_as, load_property
+from zoo.on_strips import OnePoint, SegmentPenalty, SimpsonPoints
+from zoo.right import STRANGERS
 
 from contactverif import Case, Interface, Subject, Verdict, judge_case
 from contactverif.contract.property import Property

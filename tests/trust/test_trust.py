@@ -3,9 +3,9 @@
 import pytest
 from page import PAGE, campaign_counts, catchers, caught_alone, kill_rows, page, size_of
 from right import SEEDS, all_variants
-from strangers import STRANGERS
 from subjects import load_property, load_subject
 from tables import FOLDER, read
+from zoo.right import STRANGERS
 
 from contactverif import Verdict, judge_case
 from contactverif.contract.property import NONE_UNDECIDED
