@@ -7,7 +7,6 @@ does harm is kept in the folder damaged/. An ending is good if the file is read,
 import os
 import random
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from io import StringIO
@@ -15,7 +14,7 @@ from pathlib import Path
 
 import meshio
 import numpy as np
-from damage import BYTES, GOOD, Ending, Table, run_command
+from damage import BYTES, Campaign, Ending, main, run_command
 
 from contactverif import MisuseError, read_interface
 
@@ -137,47 +136,32 @@ def strange_files(folder: Path) -> Iterator[tuple[str, Path]]:
     yield "a device", Path("/dev/zero")
 
 
-def attack(files: dict[str, bytes], folder: Path, number: int, seed: int) -> tuple[str, str, Path]:
-    """Write one damaged file; return the kind of damage, the format, and its path."""
-    chance = random.Random(f"{seed}/{number}")
-    kind = list(KINDS)[number % len(KINDS)]
-    name = chance.choice(list(files))
-    path = folder / f"damaged-{name}"
-    path.write_bytes(KINDS[kind](files[name], chance))
-    return kind, name, path
+class Damage(Campaign):
+    """Damaged mesh files of all formats."""
 
+    kinds = tuple(KINDS)
 
-def main(count: int, seed: int) -> int:
-    """Run the campaign; return 1 if a file did harm."""
-    table, harm = Table(), 0
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        files = write_meshes(folder)
-        undamaged = {name: run_command([], main=lambda name=name: read(folder / name)) for name in files}
-        for name, ending in undamaged.items():
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.files = write_meshes(folder)
+        self.undamaged = {name: run_command([], main=lambda name=name: read(folder / name)) for name in self.files}
+        for name, ending in self.undamaged.items():
             print(f"{name}: {ending.output.strip() or ending.errors.strip()}", file=sys.stderr)
 
-        def judge(kind: str, path: Path, expected: Ending, name: str) -> int:
-            ending = run_command([], main=lambda: read(path))
-            word = ending.word(expected)
-            table.add(kind, word)
-            if word in GOOD:
-                return 0
-            print(f"{word}: {kind} {name}\n{ending.errors[-3000:]}", flush=True)
-            if name:
-                copy = Path("damaged") / name
-                copy.parent.mkdir(exist_ok=True)
-                copy.write_bytes(path.read_bytes())
-            return 1
+    def begin(self) -> None:
+        """Read what is no mesh at all."""
+        for word, path in strange_files(self.folder):
+            ending = run_command([], main=lambda path=path: read(path))
+            self.judge_file(f"no mesh: {word}", ending, Ending(), "", "", b"")
 
-        for word, path in strange_files(folder):
-            harm += judge(f"no mesh: {word}", path, Ending(0, "", "", 0.0, 0), "")
-        for number in range(count):
-            kind, name, path = attack(files, folder, number, seed)
-            harm += judge(kind, path, undamaged[name], f"{number}-{seed}-{name}")
-    print(table.text())
-    return int(bool(harm))
+    def attack(self, kind: str, chance: random.Random, name: str = "") -> str:
+        """Read one damaged file."""
+        file = chance.choice(list(self.files))
+        path = self.folder / f"damaged-{file}"
+        path.write_bytes(KINDS[kind](self.files[file], chance))
+        ending, title = run_command([], main=lambda: read(path)), f"{name}-{file}"
+        return self.judge_file(kind, ending, self.undamaged[file], title, title, path.read_bytes())
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(int(word) for word in [*sys.argv[1:], "1000", "1"][:2])))
+    main(Damage)

@@ -8,8 +8,6 @@ does harm is kept in the folder damaged/. An ending is good if the file is read,
 import importlib
 import os
 import random
-import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,7 +15,7 @@ from typing import Any
 
 import netCDF4
 import numpy as np
-from damage import BYTES, GOOD, Ending, Table, run_command
+from damage import BYTES, Campaign, Ending, main, run_command
 
 Entry = tuple[tuple[str, ...], np.ndarray, dict[str, Any]]  # Dimensions, values and attributes of a variable.
 Tree = dict[str, tuple[dict[str, Entry], dict[str, Any]]]  # {group: (variables, attributes)}
@@ -189,7 +187,6 @@ def change_shape(tree: Tree, chance: random.Random) -> None:
 
 
 def exchange_variables(tree: Tree, chance: random.Random) -> None:
-    """Exchange two variables."""
     (first, name), (second, other) = _any_variable(tree, chance), _any_variable(tree, chance)
     first[name], second[other] = second[other], first[name]
 
@@ -269,13 +266,16 @@ def commands(good: Path, file: Path, case: str, chance: random.Random) -> list[l
     return [["report", report], chance.choice(more)]
 
 
-class Campaign:
-    """A campaign against the commands that read reports; `write_good` writes one and returns a counterexample's id."""
+class Damage(Campaign):
+    """Damaged reports, and the commands that read them."""
 
-    def __init__(self, folder: Path, write_good: Callable[[Path], str]) -> None:
-        self.folder, self.table, self.harm = folder, Table(), 0
+    kinds = (*BYTES, *TREES, "a size that lies")
+
+    def __init__(self, folder: Path, properties: Sequence[str] = PROPERTIES) -> None:
+        super().__init__(folder)
+        import_everything()
         self.good = folder / "good.nc"
-        self.case = write_good(self.good)
+        self.case = write_report(self.good, properties)
         self.whole, self.tree = self.good.read_bytes(), read_tree(self.good)
         self._undamaged: dict[tuple[str, ...], Ending] = {}
 
@@ -295,70 +295,42 @@ class Campaign:
             lie_about_sizes(path, chance)
         return path
 
-    def attack(self, number: int, seed: int) -> None:
+    def attack(self, kind: str, chance: random.Random, name: str = "") -> str:
         """Make one damaged file, and try commands on it."""
-        kinds = [*BYTES, *TREES, "a size that lies"]
-        kind, chance = kinds[number % len(kinds)], random.Random(f"{seed}/{number}")
         path = self.damaged_file(kind, chance)
-        content = path.read_bytes()
+        content, word = path.read_bytes(), ""
         for arguments in commands(self.good, path, self.case, chance):
-            self.judge(kind, arguments, f"{number}-{seed}", content)
+            title = f"{name}: {' '.join(map(repr, arguments))}"
+            undamaged = self._end_undamaged(tuple(arguments))
+            word = self.judge_file(kind, run_command(arguments), undamaged, title, f"{name}.nc", content)
+        return word
 
-    def judge(self, kind: str, arguments: list[str], name: str = "", content: bytes = b"") -> None:
-        """Run a command, and count how it ends."""
-        ending = run_command(arguments)
-        word = ending.word(self._end_undamaged(arguments) if name else Ending(0, "", "", 0.0, 0))
-        self.table.add(kind, word)
-        if word not in GOOD:
-            print(f"{word}: {kind} {name}: {' '.join(map(repr, arguments))}\n{ending.errors[-3000:]}", flush=True)
-            self.harm += 1
-            if content:
-                copy = Path("damaged") / f"{name}.nc"
-                copy.parent.mkdir(exist_ok=True)
-                copy.write_bytes(content)
-
-    def _end_undamaged(self, arguments: list[str]) -> Ending:
+    def _end_undamaged(self, arguments: tuple[str, ...]) -> Ending:
         """Return how the command ends on the file before it was damaged."""
-        key = tuple(arguments)
-        if key not in self._undamaged:
+        if arguments not in self._undamaged:
             path = self.folder / "report.nc"
             content = path.read_bytes()
             path.write_bytes(self.whole)
-            self._undamaged[key] = run_command(arguments)
+            self._undamaged[arguments] = run_command(arguments)
             path.write_bytes(content)
-        return self._undamaged[key]
+        return self._undamaged[arguments]
 
-    def attack_with_strange_files(self) -> None:
+    def begin(self) -> None:
         """Try all commands on what is no report at all."""
         for kind, path in strange_files(self.folder):
             for command in (["report"], ["replay"], ["compare", str(self.good)], ["bench"]):
-                self.judge(f"no report: {kind}", [*command, str(path)])
+                arguments = [*command, str(path)]
+                title = f": {' '.join(map(repr, arguments))}"
+                self.judge_file(f"no report: {kind}", run_command(arguments), Ending(), title, "", b"")
 
 
 def import_everything() -> None:
     """Import what the commands import, once and not in each fork."""
-    for name in (
-        "contactverif.cli.compare",
-        "contactverif.cli.scenes",
-        "contactverif_reports.html.report_page",
-        "contactverif_reports.netcdf.bench_file",
-    ):
-        importlib.import_module(name)
-
-
-def main(count: int, seed: int) -> int:
-    """Run the campaign; return 1 if a file did harm."""
-    import_everything()
-    with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder), write_report)
-        try:
-            campaign.attack_with_strange_files()
-            for number in range(count):
-                campaign.attack(number, seed)
-        finally:  # Where Ctrl-C ends it, too.
-            print(campaign.table.text(), flush=True)
-    return int(bool(campaign.harm))
+    for name in ("cli.compare", "cli.scenes"):
+        importlib.import_module(f"contactverif.{name}")
+    for name in ("html.report_page", "netcdf.bench_file"):
+        importlib.import_module(f"contactverif_reports.{name}")
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(int(word) for word in [*sys.argv[1:], "1000", "1"][:2])))
+    main(Damage)

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import random
 import shutil
-import sys
-import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
-from damage import BYTES, Table
+from damage import BYTES, Campaign, main
 from forged_records import EXAMPLES, SEED, Record, frame, judge, plan_of, read, say_pass, scale_numbers
 
 from contactverif.contract.errors import MisuseError
@@ -75,13 +73,10 @@ def _bytes(change: Callable[[bytes, random.Random], bytes]) -> Callable[[Path, r
 
 def _another(field: str, *values: int) -> _Change:
     def change(record: Record, chance: random.Random) -> Record:
-        return msgspec.structs.replace(record, **{field: chance.choice(values)}) if _is_outcome(record) else record
+        is_outcome = isinstance(record, OutcomeRecord)
+        return msgspec.structs.replace(record, **{field: chance.choice(values)}) if is_outcome else record
 
     return change
-
-
-def _is_outcome(record: Record) -> bool:
-    return isinstance(record, OutcomeRecord)
 
 
 KINDS: dict[str, Callable[[Path, random.Random, Path], None]] = {
@@ -95,59 +90,38 @@ KINDS: dict[str, Callable[[Path, random.Random, Path], None]] = {
 }
 
 
-class Campaign:
+class Forgery(Campaign):
     """A journal, and how runs ended that went on with a forgery of it."""
 
+    head, endings, harmful = "forgery", ENDINGS, HARM
+    kinds = tuple(KINDS)
+
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.table = Table("forgery", ENDINGS)
+        super().__init__(folder)
         recheck.choose_share = lambda numbers, share=1.0: list(numbers)
-        for name, seed in (("whole", SEED), ("seed", SEED + 1)):
+        for name, seed in (("seed", SEED + 1), ("whole", SEED)):
             with new_journal(folder / name, plan_of(seed)):
                 result = judge(Store(plan_of(seed), folder / name), seed)
-            if name == "whole":
-                self.right = facts(result)
+        self.right = facts(result)
 
-    def attack(self, kind: str, chance: random.Random) -> str:
+    def attack(self, kind: str, chance: random.Random, name: str = "") -> str:
         """Go on with a forged copy, and return how that ended."""
         copy = self.folder / "copy"
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(self.folder / "whole", copy)
         KINDS[kind](copy, chance, self.folder)
-        ending = self._go_on(copy)
-        self.table.add(kind, ending)
-        return ending
-
-    def _go_on(self, copy: Path) -> str:
         try:
             store = Store(plan_of(), None, [copy])
             result = judge(store)
         except MisuseError:
-            return "refused"
+            return self.add(kind, "refused")
         except Exception:
             traceback.print_exc()
-            return "traceback"
+            return self.add(kind, "traceback")
         if facts(result) != self.right:
-            return "believed"
-        return "named" if store.remarks else "judged again"
-
-    @property
-    def harm(self) -> int:
-        """The number of forgeries that were believed, or ended in a traceback."""
-        return sum(counts[word] for counts in self.table.counts.values() for word in HARM)
-
-
-def main(count: int, seed: int) -> int:
-    """Run the campaign; return 1 if a forgery did harm."""
-    with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder))
-        for number in range(count):
-            kind = list(KINDS)[number % len(KINDS)]
-            campaign.attack(kind, random.Random(f"{seed}/{number}"))
-        print(campaign.table.text(), flush=True)
-    return int(campaign.harm > 0)
+            return self.add(kind, "believed")
+        return self.add(kind, "named" if store.remarks else "judged again")
 
 
 if __name__ == "__main__":
-    sys.path.append(str(Path(__file__).parents[2] / "tests"))
-    sys.exit(main(*(int(word) for word in [*sys.argv[1:], "1000", "1"][:2])))
+    main(Forgery)

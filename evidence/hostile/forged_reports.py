@@ -10,7 +10,6 @@ from __future__ import annotations
 import random
 import re
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import sqrt
@@ -19,7 +18,7 @@ from typing import Any
 
 import netCDF4
 import numpy as np
-from damage import Ending, Table, run_command
+from damage import Campaign, Ending, main, run_command
 from damaged_reports import import_everything, write_report
 
 from contactverif.contract.case import Case
@@ -149,12 +148,15 @@ KINDS = (*FILES, *RUNS)
 NUMBERS = {"one number": 1, f"{N_NUMBERS} numbers": N_NUMBERS}
 
 
-class Campaign:
+class Forgery(Campaign):
     """A report, and what audits saw of forgeries of it."""
 
+    head, endings, harmful = "forgery", ENDINGS, HARM
+    kinds = KINDS
+
     def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
         self.report, self.forged = folder / "report.nc", folder / "forged.nc"
-        self.table = Table("forgery", ENDINGS)
         self.chances: list[float] = []  # Of each report with forged numbers, that the audit sees one.
         # Forks find everything imported, and the kernels loaded.
         import_everything()
@@ -166,7 +168,7 @@ class Campaign:
         assert ending.status == 0, ending.output + ending.errors
         self.chance = {count: float(share) / 100 for count, share in re.findall(r"(\d+): (\d+)%", ending.output)}
 
-    def attack(self, kind: str, chance: random.Random) -> str:
+    def attack(self, kind: str, chance: random.Random, name: str = "") -> str:
         """Audit a forged report, and return what came of it."""
         from contactverif_reports.netcdf.read import read_run
         from contactverif_reports.netcdf.write import write
@@ -177,53 +179,32 @@ class Campaign:
                 FILES[kind](file, chance)
         else:
             write(RUNS[kind](read_run(self.report), chance), self.forged)
-        ending = self._word(self._audit(self.forged))
-        self.table.add(kind, ending)
         if kind in NUMBERS:
             self.chances.append(self.chance[str(NUMBERS[kind])])
-        return ending
+        ending = self._audit(self.forged)
+        if ending.status not in (0, 1, 2) or "Traceback" in ending.errors:
+            print(ending.errors, file=sys.stderr)
+            return self.add(kind, "traceback")
+        return self.add(kind, ("missed", "seen", "refused")[ending.status])
 
     def _audit(self, path: Path) -> Ending:
         return run_command(["audit", str(path), *INLINE], seconds=600)
 
-    def _word(self, ending: Ending) -> str:
-        if ending.status not in (0, 1, 2) or "Traceback" in ending.errors:
-            print(ending.errors, file=sys.stderr)
-            return "traceback"
-        return ("missed", "seen", "refused")[ending.status]
-
-    @property
     def n_seen(self) -> int:
-        """The number of reports with forged numbers in which one was seen."""
-        return sum(self.table.counts[kind]["seen"] for kind in NUMBERS)
+        """Return the number of reports with forged numbers in which one was seen."""
+        return sum(self.counts[kind]["seen"] for kind in NUMBERS)
 
-    @property
-    def as_often_as_said(self) -> bool:
-        """The comparison of how often forged numbers were seen with what the audits say, up to chance."""
-        spread = sqrt(sum(share * (1 - share) for share in self.chances))
-        return abs(self.n_seen - sum(self.chances)) <= _SIGMAS * spread + 0.5
-
-    @property
     def harm(self) -> int:
-        """The number of tracebacks, and of forgeries that no audit may miss."""
-        missed = sum(counts["missed"] for kind, counts in self.table.counts.items() if kind not in NUMBERS)
-        return missed + sum(counts["traceback"] for counts in self.table.counts.values())
+        """Count tracebacks, forgeries that no audit may miss, and forged numbers seen not as often as audits say."""
+        spread = sqrt(sum(share * (1 - share) for share in self.chances))
+        as_often = abs(self.n_seen() - sum(self.chances)) <= _SIGMAS * spread + 0.5  # Up to chance.
+        return super().harm() - sum(self.counts[kind]["missed"] for kind in NUMBERS) + (not as_often)
 
     def text(self) -> str:
         """Return the table in Markdown, and how often forged numbers were seen."""
-        often = f"seen in {self.n_seen} of {len(self.chances)} reports, {sum(self.chances):.1f} expected"
-        return f"{self.table.text()}\n\nforged numbers: {often}"
-
-
-def main(count: int, seed: int) -> int:
-    """Run the campaign; return 1 if an audit missed what it must see, or saw numbers not as often as it says."""
-    with tempfile.TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder))
-        for number in range(count):
-            campaign.attack(KINDS[number % len(KINDS)], random.Random(f"{seed}/{number}"))
-        print(campaign.text(), flush=True)
-    return int(campaign.harm > 0 or not campaign.as_often_as_said)
+        often = f"seen in {self.n_seen()} of {len(self.chances)} reports, {sum(self.chances):.1f} expected"
+        return f"{super().text()}\n\nforged numbers: {often}"
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(int(word) for word in [*sys.argv[1:], "200", "1"][:2])))
+    main(Forgery, count=200)

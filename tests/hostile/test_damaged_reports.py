@@ -9,7 +9,7 @@ import netCDF4
 import numpy as np
 import pytest
 from damage import BYTES
-from damaged_reports import TREES, Campaign, import_everything, lie_about_sizes, write_report, write_tree
+from damaged_reports import TREES, Damage, lie_about_sizes, write_tree
 
 from contactverif import MisuseError, load_scene
 from contactverif.contract.counterexample import counterexamples
@@ -26,15 +26,12 @@ HARMLESS = ("one bit", "one byte", "another attribute", "an attribute is missing
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    import_everything()
-    return Campaign(
-        tmp_path_factory.mktemp("damaged"), lambda path: write_report(path, ["patch.flat.transmission", "unilateral"])
-    )
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Damage:
+    return Damage(tmp_path_factory.mktemp("damaged"), ["patch.flat.transmission", "unilateral"])
 
 
 @pytest.mark.parametrize("kind", [*BYTES, *TREES])
-def test_a_damaged_report_is_read_or_refused_in_one_line(campaign: Campaign, kind: str) -> None:
+def test_a_damaged_report_is_read_or_refused_in_one_line(campaign: Damage, kind: str) -> None:
     refused = 0
     for number in range(N_CHANGED if kind in BYTES else N_WRITTEN):
         path = campaign.damaged_file(kind, random.Random(f"{kind}/{number}"))
@@ -57,20 +54,20 @@ def read_everything(path: Path) -> str:
     return ""
 
 
-def test_a_size_that_lies_takes_no_memory(campaign: Campaign) -> None:
+def test_a_size_that_lies_takes_no_memory(campaign: Damage) -> None:
     for number in range(N_WRITTEN):
         lie_about_sizes(campaign.folder / "lie.nc", random.Random(number))
         with pytest.raises(MisuseError, match=r"which is damaged \(with .* of shape .* it holds more than"):
             read_run(campaign.folder / "lie.nc")
 
 
-def test_the_limits_of_the_child_hold_for_reports(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_limits_of_the_child_hold_for_reports(campaign: Damage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(file_groups, "limits_for", lambda size: Limits(1e-6, 500))
     with pytest.raises(MisuseError, match="takes longer than"):
         read_run(campaign.good)
 
 
-def test_counts_that_contradict_each_other_are_damage(campaign: Campaign) -> None:
+def test_counts_that_contradict_each_other_are_damage(campaign: Damage) -> None:
     path = campaign.folder / "contradiction.nc"
     for change, words in {
         "count": "are not those that the summary counts",
@@ -86,7 +83,7 @@ def test_counts_that_contradict_each_other_are_damage(campaign: Campaign) -> Non
             read_run(path)
 
 
-def test_a_report_without_its_numbers_of_segments_is_damage(campaign: Campaign) -> None:
+def test_a_report_without_its_numbers_of_segments_is_damage(campaign: Damage) -> None:
     tree = dict(campaign.tree)
     place = next(place for place, (variables, _) in tree.items() if "n_slave_segments" in variables)
     variables, attributes = tree[place]

@@ -3,20 +3,20 @@
 import random
 
 import pytest
-from forged_reports import HARM, KINDS, NUMBERS, Campaign
+from forged_reports import HARM, KINDS, NUMBERS, Forgery
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    return Campaign(tmp_path_factory.mktemp("forged"))
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Forgery:
+    return Forgery(tmp_path_factory.mktemp("forged"))
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in NUMBERS])
-def test_an_audit_sees_what_disagrees_with_the_numbers(campaign: Campaign, kind: str) -> None:
+def test_an_audit_sees_what_disagrees_with_the_numbers(campaign: Forgery, kind: str) -> None:
     assert campaign.attack(kind, random.Random(kind)) not in HARM
 
 
-def test_an_audit_sees_most_numbers_of_many(campaign: Campaign) -> None:
+def test_an_audit_sees_most_numbers_of_many(campaign: Forgery) -> None:
     kind = next(kind for kind, count in NUMBERS.items() if count > 1)
     assert campaign.attack(kind, random.Random(1)) != "traceback"
     assert 0.3 < campaign.chance[str(NUMBERS[kind])] < 1

@@ -1,8 +1,8 @@
 """Race the kernels against ipctk: search, residual and tangent as CSR, per slave segment, beside the memory bound.
 
-    python tests/benchmarks/beside_ipctk.py                      # 1e3 to 1e6 segments and faces, in some minutes
-    python tests/benchmarks/beside_ipctk.py --sizes 1e4 1e6 --only vts-ppt --out /tmp/race
-    python tests/benchmarks/beside_ipctk.py --only vts-cell-3d   # on faces alone
+    python evidence/bench/beside_ipctk.py                      # 1e3 to 1e6 segments and faces, in some minutes
+    python evidence/bench/beside_ipctk.py --sizes 1e4 1e6 --only vts-ppt --out /tmp/race
+    python evidence/bench/beside_ipctk.py --only vts-cell-3d   # on faces alone
 
 `tox -e beside-ipctk` does the same with ipctk installed. ipctk is no requirement of the project.
 
@@ -241,16 +241,13 @@ def _peak_so_far() -> int:
 
 def exponents(rows: list[dict[str, Any]]) -> dict[str, float]:
     """Return the exponent of time against segments between 1e4, or the least mesh above it, and the largest mesh."""
-    table: dict[str, list[tuple[float, float]]] = {}
-    for row in rows:
-        table.setdefault(row["formulation"], []).append((row["segments"], row["segments"] * row["median / µs"]))
     slopes = {}
-    for name, points in table.items():
-        if len(points) > 1:
-            large = sorted(point for point in points if point[0] >= 10_000) or sorted(points)
-            (n, t), (m, s) = large[0], large[-1]
-            if n == m:
-                continue
+    for name in dict.fromkeys(row["formulation"] for row in rows):
+        mine = sorted(
+            (row["segments"], row["segments"] * row["median / µs"]) for row in rows if row["formulation"] == name
+        )
+        (n, t), (m, s) = next((each for each in mine if each[0] >= 10_000), mine[0]), mine[-1]
+        if n != m:
             slopes[name] = float(np.log(s / t) / np.log(m / n))
     return slopes
 

@@ -1,6 +1,6 @@
 """Count what the judge does for each kind of scene, beside the least that would do.
 
-Run with `python tests/benchmarks/scene_work.py FILE.csv`. Each property is asked on one case, and no body is remembered
+Run with `python evidence/bench/scene_work.py FILE.csv`. Each property is asked on one case, and no body is remembered
 from before. Counts do not depend on the machine.
 
 What is least: each elastic body that differs in mesh, material or supports is assembled and factorised once; the
