@@ -47,6 +47,7 @@ class Counts:
 
     assembled: int = 0
     factorised: int = 0
+    parts: set[Any] = field(default_factory=set)  # Elastic bodies that differ, as far as matrices are concerned.
     scenes: dict[int, Scene] = field(default_factory=dict)
     traces: list[Trace] = field(default_factory=list)
 
@@ -55,7 +56,7 @@ class Counts:
 def count_all() -> Iterator[Counts]:
     """Count assemblies, factorisations, scenes and solutions while the context lasts."""
     counts = Counts()
-    assemble, factorise = bulk.assemble_stiffness, bulk._interior_solver
+    assemble, factorise, prepare = bulk.assemble_stiffness, bulk._interior_solver, bulk._factorise
     bodies, finish = Scene.__dict__["condensed_bodies"], Record.trace
     condense = bodies.func
 
@@ -66,6 +67,10 @@ def count_all() -> Iterator[Counts]:
     def count_factorisation(*arguments: Any) -> Any:
         counts.factorised += 1
         return factorise(*arguments)
+
+    def count_part(part: Any) -> Any:
+        counts.parts.add(part)
+        return prepare(part)
 
     def count_scene(scene: Scene) -> Any:
         counts.scenes[id(scene)] = scene
@@ -79,6 +84,7 @@ def count_all() -> Iterator[Counts]:
     with ExitStack() as stack:
         stack.enter_context(patch.object(bulk, "assemble_stiffness", count_assembly))
         stack.enter_context(patch.object(bulk, "_interior_solver", count_factorisation))
+        stack.enter_context(patch.object(bulk, "_factorise", count_part))
         stack.enter_context(patch.object(bodies, "func", count_scene))
         stack.enter_context(patch.object(Record, "trace", count_solution))
         yield counts
@@ -104,18 +110,12 @@ def measure_work(question: Property, subject: Subject) -> Work:
     forget_everything()
     with count_all() as counts:
         judge_case(question, case, subject)
-    elastic = [
-        scene.bodies[index]
-        for scene in counts.scenes.values()
-        for index in scene.bodies_in_reach
-        if not scene.bodies[index].rigid
-    ]
     work = {
         "property_id": question.id,
         "scenes": len(counts.scenes),
         "assembled": counts.assembled,
         "factorised": counts.factorised,
-        "least_bodies": len({bulk._ElasticPart.of_body(body) for body in elastic}),
+        "least_bodies": len(counts.parts),
     }
     if counts.traces:
         work |= sizes_of(max(counts.traces, key=lambda trace: trace.scene.n_free))
