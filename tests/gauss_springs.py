@@ -32,11 +32,11 @@ class Segments:
     share_2: Any
 
 
-def dot(p: Any, q: Any) -> Any:
+def dot(p, q):
     return p[..., 0] * q[..., 0] + p[..., 1] * q[..., 1]
 
 
-def frame(s: Segments) -> tuple[Any, Any, Any]:
+def frame(s):
     """Return length, tangent and normal of the master segments."""
     along = s.master_2 - s.master_1
     length = np.sqrt(dot(along, along))
@@ -44,21 +44,21 @@ def frame(s: Segments) -> tuple[Any, Any, Any]:
     return length, t, np.stack([t[..., 1], -t[..., 0]], axis=-1)
 
 
-def arm(s: Segments) -> Any:
+def arm(s):
     """Return the vector from the master's first node to the point, differences first."""
     return s.share_1[..., None] * (s.slave_1 - s.master_1) + s.share_2[..., None] * (s.slave_2 - s.master_1)
 
 
-def point(s: Segments) -> Any:
+def point(s):
     return s.share_1[..., None] * s.slave_1 + s.share_2[..., None] * s.slave_2
 
 
-def by_differences(s: Segments) -> tuple[Any, Any, Any]:
+def by_differences(s):
     length, t, n = frame(s)
     return dot(arm(s), n), dot(arm(s), t) / length, n
 
 
-def by_einsum(s: Segments) -> tuple[Any, Any, Any]:
+def by_einsum(s):
     length, t, n = frame(s)
     shares = np.stack([s.share_1, s.share_2])
     vectors = np.stack([s.slave_1 - s.master_1, s.slave_2 - s.master_1])
@@ -66,45 +66,43 @@ def by_einsum(s: Segments) -> tuple[Any, Any, Any]:
     return gap, np.einsum("kp,k...pi,...pi->...p", shares, vectors, t) / length, n
 
 
-def by_cross_product(s: Segments) -> tuple[Any, Any, Any]:
+def by_cross_product(s):
     """Return the gap as a cross product, seen from the master's second node."""
     along = s.master_2 - s.master_1
-    d = point(
-        replace(s, slave_1=s.slave_1 - s.master_2, slave_2=s.slave_2 - s.master_2)
-    )  # From the master's second node
+    d = point(replace(s, slave_1=s.slave_1 - s.master_2, slave_2=s.slave_2 - s.master_2))
     squared = dot(along, along)
     length = np.sqrt(squared)
     gap = (along[..., 1] * d[..., 0] - along[..., 0] * d[..., 1]) / length
     return gap, 1 + dot(d, along) / squared, np.stack([along[..., 1], -along[..., 0]], axis=-1) / length[..., None]
 
 
-def by_angle(s: Segments) -> tuple[Any, Any, Any]:
+def by_angle(s):
     along = s.master_2 - s.master_1
     angle = np.arctan2(along[..., 1], along[..., 0])
     n, t = np.stack([np.sin(angle), -np.cos(angle)], axis=-1), np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return dot(arm(s), n), dot(arm(s), t) / np.hypot(along[..., 0], along[..., 1]), n
 
 
-def by_points_first(s: Segments) -> tuple[Any, Any, Any]:
+def by_points_first(s):
     length, t, n = frame(s)
     d = point(s) - s.master_1
     return dot(d, n), dot(d, t) / length, n
 
 
-def by_two_heights(s: Segments) -> tuple[Any, Any, Any]:
+def by_two_heights(s):
     """Return the gap as n·x_s − n·x_m."""
     _, xi, n = by_differences(s)
     return dot(n, point(s)) - dot(n, s.master_1), xi, n
 
 
-def by_absolute_shapes(s: Segments) -> tuple[Any, Any, Any]:
+def by_absolute_shapes(s):
     """Return the gap from Σ N_i x_i of both sides."""
     _, xi, n = by_differences(s)
     foot = (1 - xi)[..., None] * s.master_1 + xi[..., None] * s.master_2
     return dot(point(s) - foot, n), xi, n
 
 
-def by_implicit_line(s: Segments) -> tuple[Any, Any, Any]:
+def by_implicit_line(s):
     """Return the gap as a x + b y + c."""
     length, t, n = frame(s)
     constant = (s.master_1[..., 1] * s.master_2[..., 0] - s.master_1[..., 0] * s.master_2[..., 1]) / length
@@ -115,50 +113,44 @@ def by_implicit_line(s: Segments) -> tuple[Any, Any, Any]:
 Way = Callable[[Segments], tuple[Any, Any, Any]]
 
 
-def keep(z: Any) -> Any:
+def keep(z):
     return z
 
 
-def centre(z: Any) -> Any:
+def centre(z):
     x = z.reshape(*z.shape[:-1], -1, 2)
     return (x - x.mean(axis=-2, keepdims=True)).reshape(z.shape)
 
 
-def move_to_first_node(z: Any) -> Any:
+def move_to_first_node(z):
     return z - np.tile(z[..., :2], z.shape[-1] // 2)
 
 
-def in_single_precision(z: Any) -> Any:
+def in_single_precision(z):
     return z.astype(np.complex64 if np.iscomplexobj(z) else np.float32).astype(z.dtype)
 
 
-def single_precision_at_first_node(z: Any) -> Any:
+def single_precision_at_first_node(z):
     return in_single_precision(move_to_first_node(z))
 
 
 class GaussSprings:
     """The formulation; `way` computes gap, ξ and normal, after `before` has changed the coordinates."""
 
-    def __init__(self, penalty: float, way: Way, before: Callable[[Any], Any] = keep, **traits: Any) -> None:
+    def __init__(self, penalty, way, before=keep, **traits):
         self.penalty, self.way, self.before = penalty, way, before
         self.tangent_way, self.search_before = way, keep
         self.traits = TRAITS.revise(**traits)
 
-    def segments(self, interface: Any, master: Any, z: Any) -> Segments:
+    def segments(self, interface, master, z):
         x = z.reshape(*z.shape[:-1], -1, 2)
         slave = np.repeat(interface.slave.segments, 2, axis=0)
         c = np.tile(C, len(interface.slave))
         first, second = interface.master.segments[master].T
-        return Segments(
-            x[..., slave[:, 0], :],
-            x[..., slave[:, 1], :],
-            x[..., first, :],
-            x[..., second, :],
-            (1 - c) / 2,
-            (1 + c) / 2,
-        )
+        ends = (x[..., nodes, :] for nodes in (slave[:, 0], slave[:, 1], first, second))
+        return Segments(*ends, (1 - c) / 2, (1 + c) / 2)
 
-    def pair(self, interface: Any, z: Any) -> dict[str, Any]:
+    def pair(self, interface, z):
         z = self.search_before(z)
         n_points, n_master = 2 * len(interface.slave), len(interface.master)
         gaps, distances, places = np.empty((3, n_master, n_points))
@@ -171,10 +163,10 @@ class GaussSprings:
         inside = (places[master, points] >= 0) & (places[master, points] <= 1)
         return {"master": master, "active": (gaps[master, points] < 0) & inside}
 
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+    def residual(self, interface, pairing, z):
         return self._residual(interface, pairing, z, self.way)
 
-    def _residual(self, interface: Any, pairing: Any, z: Any, way: Way) -> Any:
+    def _residual(self, interface, pairing, z, way):
         z = self.before(z)
         s = self.segments(interface, pairing["master"], z)
         gap, xi, n = way(s)
@@ -189,7 +181,7 @@ class GaussSprings:
                 forces[..., node, :] += part[..., number, :]
         return forces.reshape(z.shape)
 
-    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+    def tangent(self, interface, pairing, z):
         """Return the derivative by a complex step."""
         way = by_differences if self.tangent_way is by_angle else self.tangent_way
         rows = self._residual(interface, pairing, z + 1e-30j * np.eye(z.size), way)
@@ -214,6 +206,6 @@ WRONG: dict[str, tuple[Way, Callable[[Any], Any]]] = {
 }
 
 
-def springs_of(way: Way, before: Callable[[Any], Any] = keep, **traits: Any) -> Subject:
+def springs_of(way, before=keep, **traits):
     """Return the formulation written in one way, with these promises."""
     return Subject("gauss springs", lambda *, penalty: GaussSprings(penalty, way, before, **traits))

@@ -24,6 +24,9 @@ WITH_CONTENTS = ("CONTRIBUTING.md", "DECISIONS.md", "plugins/README.md", "proper
 ENOUGH = 4  # A file with this many headings of the second level needs a table of contents.
 
 
+NOT_RUN = {"ipykernel", "nbclient", "tox"}  # No test of the environment `floors` uses them.
+
+
 def read_yaml(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
@@ -103,6 +106,35 @@ def test_the_citation_is_that_of_this_version_and_of_the_paper() -> None:
     (paper,) = citation["references"]
     assert (paper["type"], paper["doi"], paper["year"]) == ("article", "10.1002/nme.2559", 2009)
     assert [author["family-names"] for author in paper["authors"]] == ["Zavarise", "De Lorenzis"]
+
+
+def _parts(version: str) -> tuple[int, ...]:
+    """Return the numbers of a version without zeros at its end."""
+    numbers = [int(number) for number in version.split(".")]
+    while numbers and numbers[-1] == 0:
+        numbers.pop()
+    return tuple(numbers)
+
+
+def _read_promised() -> dict[str, tuple[int, ...]]:
+    project = PROJECT["project"]
+    lines = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    matches = [re.fullmatch(r"([A-Za-z0-9-]+)>=([0-9.]+)", line) for line in lines]
+    assert all(matches), lines
+    return {match[1]: _parts(match[2]) for match in matches if match and match[1] not in NOT_RUN}
+
+
+def _read_tested() -> dict[str, tuple[int, ...]]:
+    lines = (ROOT / "tests" / "floors.txt").read_text(encoding="utf-8").splitlines()
+    entries = [line.split("==") for line in lines if not line.startswith("#")]
+    return {name: _parts(version) for name, version in entries}
+
+
+def test_each_lowest_version_is_installed_where_floors_are_read_tested() -> None:
+    """They are the lowest versions that are promised."""
+    assert _read_tested() == _read_promised()
+    text = (ROOT / "tox.ini").read_text(encoding="utf-8")
+    assert "-r tests/floors.txt" in text.partition("[testenv:floors]")[2].partition("[testenv:")[0]
 
 
 def headings(text: str, level: int = 2) -> list[str]:

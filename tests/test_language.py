@@ -98,34 +98,34 @@ def is_property(node: ast.FunctionDef) -> bool:
     return any("property" in ast.unparse(decorator) for decorator in node.decorator_list)
 
 
-def targets_of(target: ast.expr) -> Iterator[tuple[str, str]]:
-    """Return (kind, name) of what an assignment binds, tuples taken apart."""
+def names_of(target: ast.expr, line: int, boolean: bool) -> Iterator[Name]:
+    """Return the names that an assignment binds, tuples taken apart."""
     match target:
         case ast.Name(id=name):
-            yield "variable", name
+            yield Name(line, name, "variable", boolean)
         case ast.Attribute(value=ast.Name(id="self" | "cls"), attr=name):
-            yield "attribute", name
+            yield Name(line, name, "attribute", boolean)
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
             for element in elements:
-                yield from targets_of(element)
+                yield from names_of(element, line, boolean)
         case ast.Starred(value=value):
-            yield from targets_of(value)
+            yield from names_of(value, line, boolean)
 
 
 def is_true_or_false(value: ast.expr | None) -> bool:
     """Return whether an assigned expression is clearly a boolean: a comparison, `not`, True or False."""
     match value:
-        case ast.Compare() | ast.UnaryOp(op=ast.Not()) | ast.Constant(value=True | False):
-            return True
         case ast.BoolOp(values=values):
             return all(map(is_true_or_false, values))
         case ast.BinOp(left=left, op=ast.BitAnd() | ast.BitOr(), right=right):
             return is_true_or_false(left) or is_true_or_false(right)
-        case ast.UnaryOp(op=ast.Invert()):
-            return True
-        case ast.Call(func=ast.Name(id="all" | "any" | "bool" | "isinstance")):
-            return True
-        case ast.Call(func=ast.Attribute(attr="all" | "any" | "isfinite" | "isnan")):
+        case (
+            ast.Compare()
+            | ast.UnaryOp(op=ast.Not() | ast.Invert())
+            | ast.Constant(value=True | False)
+            | ast.Call(func=ast.Name(id="all" | "any" | "bool" | "isinstance"))
+            | ast.Call(func=ast.Attribute(attr="all" | "any" | "isfinite" | "isnan"))
+        ):
             return True
     return False
 
@@ -154,21 +154,17 @@ def names_in(tree: ast.Module, module: str) -> Iterator[Name]:
                 yield from parameters_of(node)
             case ast.Assign(targets=targets, value=value):
                 for target in targets:
-                    for kind, name in targets_of(target):
-                        yield Name(node.lineno, name, kind, is_true_or_false(value))
+                    yield from names_of(target, node.lineno, is_true_or_false(value))
             case ast.AnnAssign(target=target, annotation=annotation):
-                for kind, name in targets_of(target):
-                    yield Name(node.lineno, name, kind, is_boolean(annotation))
+                yield from names_of(target, node.lineno, is_boolean(annotation))
             case ast.NamedExpr(target=target, value=value):
-                for kind, name in targets_of(target):
-                    yield Name(node.lineno, name, kind, is_true_or_false(value))
+                yield from names_of(target, node.lineno, is_true_or_false(value))
             case (
                 ast.For(target=target)
                 | ast.comprehension(target=target)
                 | ast.withitem(optional_vars=ast.expr() as target)
             ):
-                for kind, name in targets_of(target):
-                    yield Name(getattr(target, "lineno", 1), name, kind, False)
+                yield from names_of(target, getattr(target, "lineno", 1), False)
 
 
 def words_of(name: str) -> list[str]:

@@ -9,9 +9,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+sys.path += [str(Path(__file__).parent / "plugins"), str(Path(__file__).parents[1] / "trust")]
+
+import tables
+
 FOLDER = Path(__file__).parent / "plugins"
-if str(FOLDER) not in sys.path:
-    sys.path.append(str(FOLDER))
 
 KINDS = {
     "dies": "hostile_deaths",
@@ -74,11 +76,6 @@ PLUGINS = _plugins()
 
 def install(folder: Path, others: dict[str, str] | None = None) -> str:
     """Make all hostile plugins, or others, entry points of a project; return the PYTHONPATH that finds them."""
-    about = folder / "hostile-1.0.dist-info"
-    about.mkdir(parents=True, exist_ok=True)
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: hostile\nVersion: 1.0\n")
     targets = {plugin.name: plugin.target for plugin in PLUGINS.values()} if others is None else others
-    lines = [f"{name} = {target}" for name, target in targets.items()]
-    (about / "entry_points.txt").write_text("\n".join(["[contactverif.formulations]", *lines, ""]))
-    path = [str(folder), str(FOLDER), os.environ.get("PYTHONPATH", "")]
+    path = [tables.install(folder, targets), str(FOLDER), os.environ.get("PYTHONPATH", "")]
     return os.pathsep.join(filter(None, path))

@@ -12,6 +12,7 @@ import shutil
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 import msgspec
 from damage import BYTES, Campaign, main
@@ -98,7 +99,6 @@ class Forgery(Campaign):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        recheck.choose_share = lambda numbers, share=1.0: list(numbers)
         for name, seed in (("seed", SEED + 1), ("whole", SEED)):
             with new_journal(folder / name, plan_of(seed)):
                 result = judge(Store(plan_of(seed), folder / name), seed)
@@ -112,7 +112,8 @@ class Forgery(Campaign):
         KINDS[kind](copy, chance, self.folder)
         try:
             store = Store(plan_of(), None, [copy])
-            result = judge(store)
+            with patch.object(recheck, "choose_share", lambda numbers, share=1.0: list(numbers)):
+                result = judge(store)
         except MisuseError:
             return self.add(kind, "refused")
         except Exception:

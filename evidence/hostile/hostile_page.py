@@ -8,7 +8,7 @@ sys.path.append(str(Path(__file__).parents[1] / "trust"))
 
 from catalogue import PLUGINS
 from containment import CHECKS
-from tables import COMMITS, FOLDER, read
+from tables import FOLDER, commits_of, markdown, read
 
 PAGE, TABLE, KILLS = "hostile.md", "hostile.csv", "sigkills.csv"
 CAMPAIGNS = {
@@ -91,13 +91,7 @@ def is_whole(row: Row) -> bool:
 
 def table(heads: list[str], lines: list[list[str]]) -> str:
     """Return a table in Markdown."""
-    text = [f"| {' | '.join(heads)} |", f"|---|{':-:|' * (len(heads) - 1)}"]
-    return "\n".join([*text, *(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)]) + "\n"
-
-
-def places() -> list[str]:
-    """Return the ways apart from the harness in which plugins were run, the strongest first."""
-    return [mode for mode in PLACES if rows(mode)]
+    return markdown(heads, [[cell.replace("|", "/") for cell in line] for line in lines], ":-:")
 
 
 def by_kind(mode: str) -> str:
@@ -180,34 +174,25 @@ def kills() -> str:
 
 def campaigns() -> str:
     """Return what the other campaigns printed."""
-    texts = {title: FOLDER / name for name, title in CAMPAIGNS.items()}
-    return "".join(
-        RUN.format(title=title, text=_as_markdown(file.read_text(encoding="utf-8").rstrip()))
-        for title, file in texts.items()
-        if file.exists()
-    )
-
-
-def _as_markdown(printed: str) -> str:
-    """Return what a campaign printed; what is no table stands as it was printed."""
-    return printed if printed.startswith("|") else f"```text\n{printed}\n```"
+    parts = []
+    for name, title in CAMPAIGNS.items():
+        if (FOLDER / name).exists():
+            text = (FOLDER / name).read_text(encoding="utf-8").rstrip()  # What is no table stands as it was printed.
+            parts.append(RUN.format(title=title, text=text if text.startswith("|") else f"```text\n{text}\n```"))
+    return "".join(parts)
 
 
 def page() -> str:
     """Return the whole page."""
-    commits = ", ".join(
-        f"`{row['table']}` at commit {row['commit']}"
-        for row in read(COMMITS)
-        if row["table"] in (TABLE, KILLS, *CAMPAIGNS)
-    )
-    parts = [INTRODUCTION.format(commits=commits).rstrip() + "\n"]
-    for mode in places():
+    parts = [INTRODUCTION.format(commits=commits_of((TABLE, KILLS, *CAMPAIGNS))).rstrip() + "\n"]
+    places = [mode for mode in PLACES if rows(mode)]
+    for mode in places:
         parts += [summary(mode), by_kind(mode), exceptions(mode)]
     parts += [
         inline(),
         kills(),
         campaigns().rstrip() + "\n" if campaigns() else "",
-        f"## All plugins {PLACES[places()[0]]}\n\n" + all_plugins(places()[0]),
+        f"## All plugins {PLACES[places[0]]}\n\n" + all_plugins(places[0]),
     ]
     return "\n".join(part for part in parts if part)
 

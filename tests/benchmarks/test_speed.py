@@ -1,4 +1,4 @@
-"""How long things take beside a reference. Without `--benchmark-enable` each call is made once, without a clock.
+"""Benchmarks: each call is timed beside a reference, or made once without a clock if `--benchmark-enable` is missing.
 
 A race is named by its group and its name, as `reports/bench/benchmarks.json` keeps it.
 """

@@ -1,4 +1,4 @@
-"""The command `new`: the files that it makes, and the names that it refuses; `docs/test_new_project.py` runs some."""
+"""The command `new`: the files that it makes, and the names that it refuses; `docs/test_page_projects.py` runs some."""
 
 import errno
 import importlib

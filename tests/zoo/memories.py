@@ -76,7 +76,7 @@ def _remembers(memory, user, argument):
     return make
 
 
-for _name, *_how in (
+for _name, *_arguments in (
     ("tangent at the state of the last residual", "residual", "tangent", 2),
     ("residual at the state of the last tangent", "tangent", "residual", 2),
     ("tangent on the pairing of the last residual", "residual", "tangent", 1),
@@ -87,7 +87,7 @@ for _name, *_how in (
     ("contact points of the last pairing", "pair", "contact_points", 1),
     ("residual on the pairing of the last contact points", "contact_points", "residual", 1),
 ):
-    add(_name, PURITY, _remembers(*_how))
+    add(_name, PURITY, _remembers(*_arguments))
 
 
 @mutant("residual of the first interface", PURITY, "residual", memory=dict)

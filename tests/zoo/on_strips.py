@@ -19,7 +19,7 @@ ON_STRIPS = Traits(
     rules=Rules(penalty="distributed", area="current"),
     abilities=Abilities(batched=True, takes_complex=True),
 )
-SHARES = np.array([5.0, 8.0, 5.0]) / 18  # Of three Gauss points.
+SHARES = np.array([5.0, 8.0, 5.0]) / 18  # Weights of three Gauss points.
 TWO_PLACES = np.array([0.5 - 12**-0.5, 0.5 + 12**-0.5])
 THREE_PLACES = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
 GAUSS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2

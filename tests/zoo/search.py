@@ -1,4 +1,4 @@
-"""What right formulations share: strips of the slave, closest segments, and numbers that carry their gradient.
+"""Strips of the slave, closest segments, and numbers that carry their gradient, for right formulations.
 
 A strip is a part of a slave segment between projections of master nodes along the slave's normal. Where master segments
 lie behind one another, a strip sees the nearest, and none farther away than four of the longest segments: that may be

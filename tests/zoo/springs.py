@@ -154,59 +154,31 @@ def _without_column(column):
 
 
 KNOWN = {  # {name on the command line: (factory, words)}. The authors of the rules of the diagnosis knew these.
-    "half-ends": mistake(
-        "Half the length counts for the first and the last slave segment.",
-        r"slave segment 0 0\.5 times, slave segment \d 0\.5 times",
-        weights=_half_at_free_ends,
-    ),
-    "sign-of-xi": mistake(
-        "The derivative of the place on the master segment has the opposite sign in the tangent.",
-        r"the part of δξ, .* on the master's rows",
-        on_master=lambda self, t, *_: np.conj(t),
-    ),
-    "shapes": mistake(
-        "The two shape functions of the slave segment are exchanged.",
-        r"two shape functions of each slave segment are exchanged",
-        slave_shapes=lambda self, s: (s, 1 - s),
-    ),
+    "half-ends": mistake("Half the length counts for the first and the last slave segment.",
+        r"slave segment 0 0\.5 times, slave segment \d 0\.5 times", weights=_half_at_free_ends),
+    "sign-of-xi": mistake("The derivative of the place on the master segment has the opposite sign in the tangent.",
+        r"the part of δξ, .* on the master's rows", on_master=lambda self, t, *_: np.conj(t)),
+    "shapes": mistake("The two shape functions of the slave segment are exchanged.",
+        r"two shape functions of each slave segment are exchanged", slave_shapes=lambda self, s: (s, 1 - s)),
     "old-normal": mistake("The normals are those of the call before.", r"kept between calls", normals=_previous_normal),
-    "sign-of-gap": mistake(
-        "The gap has the opposite sign: springs pull where surfaces are apart.",
-        r"no force at all|opposite sign",
-        pressure=lambda self, gap: Springs.pressure(self, -gap),
-    ),
-    "factor-2": mistake(
-        "Each point has the weight of two.",
-        r"every node has 2 times",
-        pressure=lambda self, gap: 2 * Springs.pressure(self, gap),
-    ),
-    "last-master": mistake(
-        "The loop over master segments ends one too early.",
-        r"master segment \d is left out",
-        facing=lambda self, share: np.nonzero(share[:, :-1] > 0),
-    ),
-    "absolute": mistake(
-        "A gap counts as closed from 1e-8 on, whatever the unit of length.",
+    "sign-of-gap": mistake("The gap has the opposite sign: springs pull where surfaces are apart.",
+        r"no force at all|opposite sign", pressure=lambda self, gap: Springs.pressure(self, -gap)),
+    "factor-2": mistake("Each point has the weight of two.", r"every node has 2 times",
+        pressure=lambda self, gap: 2 * Springs.pressure(self, gap)),
+    "last-master": mistake("The loop over master segments ends one too early.", r"master segment \d is left out",
+        facing=lambda self, share: np.nonzero(share[:, :-1] > 0)),
+    "absolute": mistake("A gap counts as closed from 1e-8 on, whatever the unit of length.",
         r"look for an absolute length|do not scale",
-        pressure=lambda self, gap: np.where(gap.real < -1e-8, Springs.pressure(self, gap), 0),
-    ),
-    "column": mistake(
-        "The tangent's last column is missing.", r"column \d+ \(.*\) is missing", tangent=_without_column(-1)
-    ),
-    "length-part": mistake(
-        "The tangent lacks the change of the slave segment's length.",
-        r"the part of the length of the slave's segments",
-        weights=lambda self, length, *_: length.real / 2,
-    ),
-    "master-half": mistake(
-        "Each node of a master segment takes half of the force, wherever it acts.",
-        r"master",
-        master_shapes=lambda self, t: (np.full(t.shape, 0.5), np.full(t.shape, 0.5)),
-    ),
-    "no-length": mistake(
-        "The springs are not multiplied by the length of the segment.", r"length", weights=lambda *_: 0.5
-    ),
-}
+        pressure=lambda self, gap: np.where(gap.real < -1e-8, Springs.pressure(self, gap), 0)),
+    "column": mistake("The tangent's last column is missing.", r"column \d+ \(.*\) is missing",
+        tangent=_without_column(-1)),
+    "length-part": mistake("The tangent lacks the change of the slave segment's length.",
+        r"the part of the length of the slave's segments", weights=lambda self, length, *_: length.real / 2),
+    "master-half": mistake("Each node of a master segment takes half of the force, wherever it acts.", r"master",
+        master_shapes=lambda self, t: (np.full(t.shape, 0.5), np.full(t.shape, 0.5))),
+    "no-length": mistake("The springs are not multiplied by the length of the segment.", r"length",
+        weights=lambda *_: 0.5),
+}  # fmt: skip
 
 
 def _along_own_normal(self, normal, c, d):
@@ -268,93 +240,64 @@ def _added_to_all_before(self, interface, pairing, z):
 UNSEEN = {
     "own-normal": mistake(
         "The force on a master segment acts along the master's own normal, so it is not opposite to that on the slave.",
-        r"along the master's normal on the master",
-        master_direction=_along_own_normal,
-    ),
+        r"along the master's normal on the master", master_direction=_along_own_normal),
     "whole-segment": mistake(
         "The Gauss points are those of the whole slave segment, which is not cut at the nodes of the master.",
         r"whole slave segments, not cut",
-        points=lambda self, start, end: [
-            (np.full_like(start, place), (start.real <= place) & (place < end.real)) for place in PLACES
-        ],
-    ),
+        points=lambda self, start, end: [(np.full_like(start, p), (start.real <= p) & (p < end.real)) for p in PLACES]),
     "last-pair": mistake(
         "The residual is assembled with `+=`, so a node that several pairs share gets the force of the last one only.",
-        r"overwritten, and not added",
-        residual=_last_pair_only,
-    ),
+        r"overwritten, and not added", residual=_last_pair_only),
     "fixed-points": mistake(
         "The tangent lacks the change of the places of the Gauss points on the slave: only the lengths of parts vary.",
         r"the part of the places of points",
-        points=lambda self, start, end: [(s.real, share) for s, share in Springs.points(self, start, end)],
-    ),
-    "transposed": mistake(
-        "The tangent is transposed: rows are unknowns, and columns are forces.",
-        r"the transposed derivative",
-        tangent=in_tangent(lambda matrix, _: matrix.T),
-    ),
+        points=lambda self, start, end: [(s.real, share) for s, share in Springs.points(self, start, end)]),
+    "transposed": mistake("The tangent is transposed: rows are unknowns, and columns are forces.",
+        r"the transposed derivative", tangent=in_tangent(lambda matrix, _: matrix.T)),
     "node-on-slave": mistake(
         "A master segment is found by its nodes: one that has none on the slave segment, but covers it, is missed.",
-        r"finer than its master: slave segments .* left out",
-        pairs=_pairs_with_a_node_on_the_slave,
-    ),
+        r"finer than its master: slave segments .* left out", pairs=_pairs_with_a_node_on_the_slave),
     "pairs-kept": mistake(
         "The search runs at the first call for a mesh, and later calls take its pairs wherever the nodes have gone.",
-        r"kept between calls: .* face other segments",
-        pairs=_pairs_of_the_first_call,
-    ),
+        r"kept between calls: .* face other segments", pairs=_pairs_of_the_first_call),
     "never-zero": mistake(
         "The normal is divided by the length plus 1e-8, against division by zero, whatever the unit of length.",
-        r"look for an absolute length",
-        unit=lambda self, vector, length: vector / (length[:, None] + 1e-8),
-    ),
-}
+        r"look for an absolute length", unit=lambda self, vector, length: vector / (length[:, None] + 1e-8)),
+}  # fmt: skip
 LATER = {
     "wrong-interval": mistake(
         "The Gauss points ±1/√3 of the interval [-1, 1] are taken as they are for places in [0, 1].",
         r"the points of integration",
         points=lambda self, start, end: [
-            (start + place * (end - start), end - start) for place in (-np.sqrt(1 / 3), np.sqrt(1 / 3))
-        ],
-    ),
+            (start + place * (end - start), end - start) for place in (-np.sqrt(1 / 3), np.sqrt(1 / 3))]),
     "master-jacobian": mistake(
         "The share of the slave segment is multiplied by the length of the master segment, not by that of the slave's.",
-        r"the length of the master segment stands where",
-        master_direction=_master_lengths,
-        weights=lambda self, *_: self.memory["length"] / 2,
-    ),
-    "normal-fixed": mistake(
-        "The tangent lacks the change of the slave's normals: they do not turn with the segment.",
-        r"the part of δn, .* of the slave, is missing",
-        normals=lambda self, normal: normal.real,
-    ),
+        r"the length of the master segment stands where", master_direction=_master_lengths,
+        weights=lambda self, *_: self.memory["length"] / 2),
+    "normal-fixed": mistake("The tangent lacks the change of the slave's normals: they do not turn with the segment.",
+        r"the part of δn, .* of the slave, is missing", normals=lambda self, normal: normal.real),
     "open-stiff": mistake(
         "The tangent does not ask whether a point is closed: open points have stiffness, though they have no force.",
-        r"only where a part of the slave is apart",
-        pressure=_open_points_too,
-    ),
+        r"only where a part of the slave is apart", pressure=_open_points_too),
     "upper-only": mistake(
         "The upper triangle of the tangent is computed and mirrored, but the tangent is not symmetric.",
-        r"the upper triangle of the derivative, mirrored",
-        tangent=in_tangent(_mirrored_upper_triangle),
-    ),
+        r"the upper triangle of the derivative, mirrored", tangent=in_tangent(_mirrored_upper_triangle)),
     "one-master": mistake(
         "A slave segment is paired with one master segment only, that with the largest share; others are left out.",
-        r"parts are left out: slave segment 0 on master segment 2",
-        facing=_one_master_each,
-    ),
+        r"parts are left out: slave segment 0 on master segment 2", facing=_one_master_each),
     "not-cut": mistake(
         "A part is not cut at the slave segment's first node: it reaches beyond it, as far as the master segment does.",
         r"the points of integration, their weights and their range",
-        part=lambda self, s_c, s_d: (s_d, np.where(s_c.real < 1, s_c, 1)),
-    ),
+        part=lambda self, s_c, s_d: (s_d, np.where(s_c.real < 1, s_c, 1))),
     "not-zeroed": mistake(
         "The array of forces is allocated once and never set to zero, "
         "so a call adds its forces to those of all before.",
-        r"`residual` answers otherwise when it is asked the same again",
-        residual=_added_to_all_before,
-    ),
-}
+        r"`residual` answers otherwise when it is asked the same again", residual=_added_to_all_before),
+}  # fmt: skip
+
+
+def _single_precision(self, interface, pairing, z):
+    return Springs.residual(self, interface, pairing, z.astype(np.float32).astype(float))
 
 
 def _coarse_differences(self, interface, pairing, z):
@@ -408,81 +351,51 @@ def _master_rigid(matrix, interface):
 
 
 FURTHER = {
-    "single-precision": mistake(
-        "Positions are rounded to single precision before the forces are computed of them.",
+    "single-precision": mistake("Positions are rounded to single precision before the forces are computed of them.",
         r"numbers have single precision",
-        residual=lambda self, interface, pairing, z: Springs.residual(
-            self, interface, pairing, z.astype(np.float32).astype(float)
-        ),
-    ),
+        residual=_single_precision),
     "quadrature-at-starts": mistake(
         "Each part is cut into four cells, and each cell's point lies at the cell's start instead of its middle.",
         r"0.125 of its length nearer to the part's start",
-        points=lambda self, start, end: [(start + cell / 4 * (end - start), (end - start) / 2) for cell in range(4)],
-    ),
+        points=lambda self, start, end: [(start + cell / 4 * (end - start), (end - start) / 2) for cell in range(4)]),
     "coarse-differences": mistake(
         "The tangent is of forward differences with a step far too large, a thousandth of the model's size.",
-        r"one-sided differences with a step of about 0.00",
-        tangent=_coarse_differences,
-    ),
+        r"one-sided differences with a step of about 0.00", tangent=_coarse_differences),
     "break-at-first-open": mistake(
         "The loop over the pairs breaks at the first open pair instead of going on to the next.",
-        r"where slave segment 0 is open, nothing pushes slave nodes 2, 3",
-        forces=_break_at_first_open,
-    ),
+        r"where slave segment 0 is open, nothing pushes slave nodes 2, 3", forces=_break_at_first_open),
     "arctan-of-slope": mistake(
         "The normal comes of the arctan of the slope instead of arctan2, so it flips where the slave runs leftwards.",
-        r"turned by 180° the forces",
-        normals=_arctan_of_slope,
-    ),
-    "tangent-symmetrised": mistake(
-        "The tangent is symmetrised, half the sum of itself and its transpose.",
-        r"the symmetric part of the derivative",
-        tangent=in_tangent(lambda matrix, _: (matrix + matrix.T) / 2),
-    ),
+        r"turned by 180° the forces", normals=_arctan_of_slope),
+    "tangent-symmetrised": mistake("The tangent is symmetrised, half the sum of itself and its transpose.",
+        r"the symmetric part of the derivative", tangent=in_tangent(lambda matrix, _: (matrix + matrix.T) / 2)),
     "mixed-projections": mistake(
         "Points are projected at right angles to the master, but the gap and the force are along the slave's normal.",
-        r"their moments do not: .* look at the projection",
-        on_master=_foot_on_master,
-    ),
+        r"their moments do not: .* look at the projection", on_master=_foot_on_master),
     "master-own-normal": mistake(
         "The master is pushed along its own normal, the slave along the slave's, so the two forces are not opposite.",
         r"the slave's normal on the slave, along the master's normal on the master",
-        master_direction=_along_own_normal,
-    ),
+        master_direction=_along_own_normal),
     "tangent-limits-fixed": mistake(
         "The tangent does not vary the limits of the parts, though they move with the nodes of the master.",
         r"the derivative of the limits",
-        part=lambda self, s_c, s_d: tuple(end.real for end in Springs.part(self, s_c, s_d)),
-    ),
-    "tangent-normal-sign": mistake(
-        "The normal's variation enters the tangent with the wrong sign.",
-        r"part of δn, .* has the opposite sign",
-        normals=lambda self, normal: normal.conj(),
-    ),
-    "mean-length": mistake(
-        "Every slave segment counts with the mean length, as if the slave's mesh were uniform.",
-        r"the same length, 1.042, the mean",
-        weights=_mean_length,
-        tangent=_tangent_of_all_unknowns,
-    ),
+        part=lambda self, s_c, s_d: tuple(end.real for end in Springs.part(self, s_c, s_d))),
+    "tangent-normal-sign": mistake("The normal's variation enters the tangent with the wrong sign.",
+        r"part of δn, .* has the opposite sign", normals=lambda self, normal: normal.conj()),
+    "mean-length": mistake("Every slave segment counts with the mean length, as if the slave's mesh were uniform.",
+        r"the same length, 1.042, the mean", weights=_mean_length, tangent=_tangent_of_all_unknowns),
     "tangent-of-first-state": mistake(
         "The tangent is computed in the first state only and returned again in all later ones.",
-        r"`tangent` answers otherwise after `tangent`",
-        tangent=once("tangent", lambda interface, pairing, z: z.size),
-    ),
+        r"`tangent` answers otherwise after `tangent`", tangent=once("tangent", lambda interface, pairing, z: z.size)),
     "search-done-once": mistake(
         "The search runs in the first call only, and its pairs are kept however far the bodies slide later.",
         r"at which nodes face other segments",
         pairs=once("pairs", lambda interface, x: (len(x), len(interface.slave), len(interface.master))),
-        part=_part_or_nothing,
-    ),
+        part=_part_or_nothing),
     "tangent-master-rigid": mistake(
         "The tangent takes the master for rigid: no derivatives in the master's nodes, though these move as well.",
-        r"takes the master for rigid",
-        tangent=in_tangent(_master_rigid),
-    ),
-}
+        r"takes the master for rigid", tangent=in_tangent(_master_rigid)),
+}  # fmt: skip
 
 
 def _nearer_node(self, t):
@@ -528,7 +441,7 @@ def _steps_that_pile_up(self, interface, pairing, z):
     return tangent
 
 
-def _lumped(matrix, interface):
+def _lump(matrix, interface):
     blocks = matrix.reshape(len(matrix) // 2, 2, len(matrix) // 2, 2)
     for side in (interface.slave, interface.master):
         nodes = np.unique(side.segments)
@@ -541,45 +454,28 @@ def _lumped(matrix, interface):
 FRESH = {
     "force-to-nearest-master-node": mistake(
         "The whole force of a Gauss point goes to the nearer node of the master segment.",
-        r"goes to the nearer node of the master",
-        master_shapes=_nearer_node,
-    ),
+        r"goes to the nearer node of the master", master_shapes=_nearer_node),
     "averaged-gaps-as-nodal": mistake(
         "Averages of the gap weighted by shape functions are interpolated as if they were the gap at the slave nodes.",
-        NOT_NAMED,
-        gaps=_averages_as_nodal_gaps,
-    ),
+        NOT_NAMED, gaps=_averages_as_nodal_gaps),
     "deep-overlap-dropped": mistake(
         "Pairs that overlap by more than a thousandth of the slave segment are taken for hits from behind and dropped.",
-        r"look for a limit of depths",
-        pairs=_without_deep_pairs,
-    ),
+        r"look for a limit of depths", pairs=_without_deep_pairs),
     "end-slave-segments-skipped": mistake(
         "Slave segments with a node at a free end are skipped, as they lack a neighbour.",
-        r"slave segments 0, 2 are left out",
-        pairs=_without_end_segments,
-    ),
-    "quadratic-pressure": mistake(
-        "The pressure is the penalty times the square of the penetration.",
-        r"to the power 2",
-        pressure=lambda self, gap: np.where(gap.real < 0, self.penalty * gap**2, 0),
-    ),
+        r"slave segments 0, 2 are left out", pairs=_without_end_segments),
+    "quadratic-pressure": mistake("The pressure is the penalty times the square of the penetration.", r"to the power 2",
+        pressure=lambda self, gap: np.where(gap.real < 0, self.penalty * gap**2, 0)),
     "tangent-by-components": mistake(
         "The tangent numbers all x before all y, but the residual has x and y of each node side by side.",
-        r"all x before all y",
-        tangent=in_tangent(_by_components),
-    ),
+        r"all x before all y", tangent=in_tangent(_by_components)),
     "steps-pile-up": mistake(
-        "The step in one unknown is not taken back before the step in the next unknown of the pair.",
-        NOT_NAMED,
-        tangent=_steps_that_pile_up,
-    ),
+        "The step in one unknown is not taken back before the step in the next unknown of the pair.", NOT_NAMED,
+        tangent=_steps_that_pile_up),
     "lumped-tangent": mistake(
         "The tangent's blocks of slave with slave and of master with master are lumped to each node by sums of rows.",
-        r"as if it were lumped",
-        tangent=in_tangent(_lumped),
-    ),
-}
+        r"as if it were lumped", tangent=in_tangent(_lump)),
+}  # fmt: skip
 EVERY = KNOWN | UNSEEN | LATER | FURTHER | FRESH
 
 
@@ -611,26 +507,23 @@ def _with(words, name="", **methods):
 
 # What the diagnosis of one property says in full.
 FORCES = {
-    "opposite sign": _with(
-        "every node has -1 times the exact force: the sign", forces=lambda self, *pairs: -Springs.forces(self, *pairs)
-    ),
+    "opposite sign": _with("every node has -1 times the exact force: the sign",
+        forces=lambda self, *pairs: -Springs.forces(self, *pairs)),
     "twice": _with("every node has 2 times the exact force: two passes", "factor-2"),
     "half at end segments": _with("slave segment 0 0.5 times, slave segment 2 0.5 times the exact one", "half-ends"),
-    "half at end nodes": _with(
-        "only free ends are wrong: 0.5 times at slave node 0 and 0.5 times at slave", residual=_half_at_end_nodes
-    ),
+    "half at end nodes": _with("only free ends are wrong: 0.5 times at slave node 0 and 0.5 times at slave",
+        residual=_half_at_end_nodes),
     "slave shapes exchanged": _with("the two shape functions of each slave segment are exchanged", "shapes"),
-    "master shapes exchanged": _with(
-        "the two shape functions of each master segment are exchanged", master_shapes=lambda self, t: (t, 1 - t)
-    ),
+    "master shapes exchanged": _with("the two shape functions of each master segment are exchanged",
+        master_shapes=lambda self, t: (t, 1 - t)),
     "no force": _with("there is no force at all", forces=lambda self, *pairs: 0 * Springs.forces(self, *pairs)),
     "last master missed": _with("master segment 3 is left out", "last-master"),
     "absolute gap": _with("forces do not scale with a mesh 2^20 times smaller", "absolute"),
     "whole springs": _with("each slave node has a whole spring", residual=_whole_springs_at_nodes),
-}
+}  # fmt: skip
 TANGENTS = {
     "turned": _with("the tangent has the opposite sign", tangent=in_tangent(lambda matrix, _: -matrix)),
     "twice": _with("the tangent has a factor 2", tangent=in_tangent(lambda matrix, _: 2 * matrix)),
     "deep": _with("entries in n–n are wrong", tangent=_deep_tangent_wrong),
     "column": _with("column 1 (y of slave node 0) is missing, all others are right", tangent=_without_column(1)),
-}
+}  # fmt: skip

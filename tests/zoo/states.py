@@ -294,15 +294,15 @@ def _(right, interface, pairing, z):
     return forces.reshape(z.shape)
 
 
-def _scaled(factor, base):
+def _scale(factor, base):
     return answers("residual tangent", lambda right, *state: factor * right(*state), base)
 
 
-add("all signs turned round", UNILATERAL, _scaled(-1, nts_ar))
-add("all signs of a mortar method turned round", UNILATERAL, _scaled(-1, contactverif_mortar.mortar))
-add("all signs of multipliers turned round", UNILATERAL, _scaled(-1, nts_lm))
+add("all signs turned round", UNILATERAL, _scale(-1, nts_ar))
+add("all signs of a mortar method turned round", UNILATERAL, _scale(-1, contactverif_mortar.mortar))
+add("all signs of multipliers turned round", UNILATERAL, _scale(-1, nts_lm))
 add("two passes of NTS-AR a tenth too soft", "patch.flat.published",
-    _scaled(0.9, partial(contactverif_nts.two_pass, inner=nts_ar)))  # fmt: skip
+    _scale(0.9, partial(contactverif_nts.two_pass, inner=nts_ar)))  # fmt: skip
 
 
 def _stiffens(factor):
