@@ -5,6 +5,7 @@ Rule: this file imports nothing that takes long, because every `--help` imports 
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -89,9 +90,25 @@ def verify(
         from contactverif.run.worker_pool import start_server
 
         start_server()
+    elif options.names and not (options.out or options.mesh or options.scene_file):
+        _start_first(options)
     from contactverif.cli.verify import verify
 
     return verify(options, screen, resume)
+
+
+def _start_first(options: RunOptions) -> None:
+    """Start the process of the first formulation of a run without workers, before this one imports what judges it."""
+    from contactverif.contract.errors import ContactverifError
+    from contactverif.plugins.registry import start_loading
+    from contactverif.run.worker_pool import default_jobs
+
+    with suppress(ContactverifError):  # What is wrong is told in its turn.
+        settled = options.with_settings().settle()
+        jobs = settled.jobs or default_jobs(len(settled.names) * len(settled.properties) * settled.size.examples)
+        limits = settled.limits() if jobs == 1 else None
+        if limits is not None:
+            start_loading(settled.names[0], limits)
 
 
 @done_in("explain")

@@ -102,7 +102,10 @@ def _load(reader: str) -> Callable[[str], bytes]:
 
 def _answer(reader: str, path: str, limits: Limits, channel: Channel) -> None:
     faulthandler.disable()  # A crash is told by its status, and not by a traceback.
-    _discard_outputs()
+    sink = os.open(os.devnull, os.O_RDWR)  # What a library prints vanishes, wherever it prints it.
+    for descriptor in (0, 1, 2):
+        os.dup2(sink, descriptor)
+    sys.stdout = sys.stderr = io.StringIO()
     function = _load(reader)
     die_with_parent()
     with contextlib.suppress(AttributeError, ValueError):  # Nobody may wait any more, but not every system has alarms.
@@ -117,13 +120,6 @@ def _answer(reader: str, path: str, limits: Limits, channel: Channel) -> None:
         reason = " ".join(str(error).split())[:_LONGEST_REASON] or type(error).__name__
         answer = _FAILED + reason.encode(errors="replace")
     channel.send(answer)
-
-
-def _discard_outputs() -> None:
-    sink = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2):
-        os.dup2(sink, descriptor)
-    sys.stdout = sys.stderr = io.StringIO()
 
 
 if __name__ == "__main__":

@@ -53,6 +53,7 @@ _MOST_HANGS = {
     _AT_FIRST: "no answer came to the first call of a method",
     2: "no answer came twice",
 }
+_MOST_BOXES = 3  # Attempts to make the box of a process.
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.
 _LARGE = 1 << 16  # Bytes. A pairing of the judge with more is sent anew for each question, and not kept here.
@@ -104,12 +105,21 @@ class Host:
 
     def load(self) -> Reply:
         """Let the process load the formulation, after a new start unless it does so already; return what that gave."""
-        if self._loading is None:
-            self.begin_load()
-        question, self._loading = self._loading, None
-        assert question is not None
-        self._flush_queue()
+        n_ended = self.n_ended
+        for _ in range(_MOST_BOXES):
+            if self._loading is None:
+                self.begin_load()
+            question, self._loading = self._loading, None
+            assert question is not None
+            if self._flush_queue() or not self._last_words.startswith(b"bwrap: "):
+                break
+            self.n_ended = n_ended  # A socket that the box hides went, so it was not made: nobody is to blame.
         return raise_failure(question, loading=True)
+
+    @property
+    def is_loading(self) -> bool:
+        """Return whether the process loads the formulation, and `load` has not waited for that."""
+        return self._loading is not None
 
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""

@@ -105,7 +105,10 @@ class RequestHandler:
         """Return the reply to a request; None if it has none."""
         if isinstance(request, Load | Ask):
             try:
-                return self._load(request) if isinstance(request, Load) else self._ask(request)
+                if isinstance(request, Ask):
+                    return self._ask(request)
+                describe = partial(self._describe, request)
+                return _survey_in_copy(describe, request.question) if request.survey and FORKS else describe()
             except BaseException as error:  # A plugin may raise what it likes, and may have changed what we call.
                 return _failure(request.question, error)
         if isinstance(request, Forget):
@@ -137,11 +140,6 @@ class RequestHandler:
         if isinstance(item, BaseException):
             raise item
         return item
-
-    def _load(self, request: Load) -> Reply:
-        if request.survey and FORKS:
-            return _survey_in_copy(partial(self._describe, request), request.question)
-        return self._describe(request)
 
     def _describe(self, request: Load) -> Reply:
         item = self._loaders[request.survey](request.name)
@@ -313,7 +311,10 @@ def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
     finally:
         copy.end()
         _end_what_is_left()
-        if _has_changed(before):
+        changed = True
+        with suppress(OSError):  # It may not open another file.
+            changed = _state() != before
+        if changed:
             os._exit(_CHANGED)
 
 
@@ -349,14 +350,6 @@ def _empty(folder: str) -> None:
                 os.unlink(os.path.join(place, name))
     for entry in os.scandir(folder):
         shutil.rmtree(entry.path, ignore_errors=True)
-
-
-def _has_changed(before: tuple[object, ...]) -> bool:
-    """Return whether this process, or its box, is not as it was."""
-    try:
-        return _state() != before
-    except OSError:  # It may not open another file.
-        return True
 
 
 def _state() -> tuple[object, ...]:

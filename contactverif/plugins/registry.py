@@ -226,11 +226,13 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
 def start_loading(text: str, limits: Limits) -> None:
     """Let the process of a formulation load it, while this one does other things; what fails, fails when it is loaded.
 
-    Engines are not begun.
+    Engines are not begun, and what has begun is not begun again.
     """
     if not text.startswith(ENGINE):
+        host = host_of(_worker(), text, _with_store(limits, text))
         with suppress(ContractError):
-            host_of(_worker(), text, _with_store(limits, text)).begin_load()
+            if not host.is_loading:
+                host.begin_load()
 
 
 def _with_store(limits: Limits, text: str) -> Limits:
@@ -321,17 +323,14 @@ def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotL
     if name not in installed:
         raise unknown_name_error("engine", name, installed)
     python = options.pop("python", None)
-    if limits is not None and python is not None:  # Its modules need not import here, so its options are not checked.
-        (entry, *_) = entry_points(group=ENGINES, name=name)
-        return load_remote_engine(engine_program(entry.value, options, str(python)), text, limits)
-    make = load_entry(name, installed[name])
-    if isinstance(make, NotLoaded):
-        return NotLoaded(text, make.reason)
-    if not callable(make):
-        return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(**options)")
-    _check_options(text, make, _parameters_of(make), options)
-    if limits is not None:
-        return load_remote_engine(engine_program(installed[name][0].value, options), text, limits)
+    if limits is None or python is None:
+        make = _callable_of(text, installed[name], "**options")
+        if isinstance(make, NotLoaded):
+            return make
+        _check_options(text, make, _parameters_of(make), options)
+    if limits is not None:  # The modules of another interpreter need not import here, so its options are not checked.
+        program = engine_program(installed[name][0].value, options, None if python is None else str(python))
+        return load_remote_engine(program, text, limits)
     try:
         return EngineSubject(text, make(**options))
     except ContractError as error:
@@ -383,11 +382,15 @@ def _find_factory(text: str) -> Callable[..., Any] | NotLoaded:
         raise MisuseError("formulation", repr(text), _FORM)
     if name not in installed:
         raise unknown_name_error("formulation", name, installed)
-    make = load_entry(name, installed[name])
+    return _callable_of(text, installed[name], "*, penalty, …")
+
+
+def _callable_of(text: str, entries: Sequence[EntryPoint], arguments: str) -> Callable[..., Any] | NotLoaded:
+    make = load_entry(entries[0].name, entries)
     if isinstance(make, NotLoaded):
         return NotLoaded(text, make.reason)
     if not callable(make):
-        return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make(*, penalty, …)")
+        return NotLoaded(text, f"the entry point gives a {type(make).__name__}; needed a factory make({arguments})")
     return cast(Callable[..., Any], make)
 
 

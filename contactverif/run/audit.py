@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from time import perf_counter
 
 from contactverif.contract.case import Case
@@ -109,22 +110,14 @@ def _open_rows(
 ) -> list[OpenRow | Row]:
     subject_of = {subject.name: subject for subject in subjects}
     question_of = {question.id: question for question in questions}
-    triples = [
-        (row, subject_of[row.formulation], question_of[row.property_id].for_traits(subject_of[row.formulation].traits))
-        for row in run.rows
-    ]
-    source_of = {question: sampling.source(question) for question in dict.fromkeys(triple[2] for triple in triples)}
-    return [
-        open_row(
-            subject,
-            question,
-            source_of[question],
-            row.known,
-            sampling,
-            row.reason.removeprefix(OMITTED) if row.omitted else "",
-        )
-        for row, subject, question in triples
-    ]
+    source_of = cache(sampling.source)
+    opened = []
+    for row in run.rows:
+        subject = subject_of[row.formulation]
+        question = question_of[row.property_id].for_traits(subject.traits)
+        stopped = row.reason.removeprefix(OMITTED) if row.omitted else ""
+        opened.append(open_row(subject, question, source_of(question), row.known, sampling, stopped))
+    return opened
 
 
 def _derive(row: Row, opened: OpenRow | Row, sampling: Sampling) -> Row:

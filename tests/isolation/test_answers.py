@@ -1,7 +1,5 @@
 """Several questions at once: one message, the answers of questions one by one, and the first error."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from isolation import hostile_few
@@ -9,28 +7,12 @@ from isolation import hostile_few
 from contactverif import ContractError, MisuseError, load_formulation, named_case
 from contactverif.contract.arrays import dense
 from contactverif.contract.subject import Call, CheckedFormulation, Subject
-from contactverif.isolation import process
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote import load_remote
 
 CASE = named_case("c")
+Messages = list[list[tuple[str, float]]]
 METHODS = ("residual", "tangent", "residual_and_tangent", "residual")
-
-
-@pytest.fixture
-def messages(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
-    """Return the methods that each message to a process asks."""
-    verbs_of_messages: list[tuple[str, ...]] = []
-    ask = process.PluginProcess.ask
-
-    def note(
-        self: process.PluginProcess, frame: bytes, questions: Sequence[process.Question], seconds: float | None = None
-    ) -> None:
-        verbs_of_messages.append(tuple(question.verb for question in questions))
-        ask(self, frame, questions, seconds)
-
-    monkeypatch.setattr(process.PluginProcess, "ask", note)
-    return verbs_of_messages
 
 
 def calls_of(formulation: CheckedFormulation, z: np.ndarray, *methods: str) -> list[Call]:
@@ -39,13 +21,13 @@ def calls_of(formulation: CheckedFormulation, z: np.ndarray, *methods: str) -> l
 
 
 @pytest.mark.parametrize("name", ["vts-ppt", "mortar", "mortar-lm"])
-def test_answers_are_those_of_the_questions_one_by_one(name: str, messages: list[tuple[str, ...]]) -> None:
+def test_answers_are_those_of_the_questions_one_by_one(name: str, messages: Messages) -> None:
     formulation = load_formulation(name, Limits()).for_case(CASE)
     z = np.append(CASE.z, np.ones(formulation.n_multipliers(CASE.interface)))
     methods = [method for method in METHODS if method == "residual" or method in formulation.provides]
     calls = calls_of(formulation, z, *methods)
     formulation.answers(calls)
-    assert all(len(verbs) <= 1 for verbs in messages)  # Each first call has its time.
+    assert all(len(message) <= 1 for message in messages)  # Each first call has its time.
     formulation.residual(*calls[0][1:])
     messages.clear()
     together = formulation.answers(calls)
@@ -56,7 +38,7 @@ def test_answers_are_those_of_the_questions_one_by_one(name: str, messages: list
         assert all(np.array_equal(dense(a), dense(b)) for a, b in zip(parts, others, strict=True))
 
 
-def test_the_first_error_is_raised_and_the_rest_is_forgotten(messages: list[tuple[str, ...]]) -> None:
+def test_the_first_error_is_raised_and_the_rest_is_forgotten(messages: Messages) -> None:
     subject = load_remote(hostile_few.PROGRAM, "NoNumberTangent", Limits())
     assert isinstance(subject, Subject)
     formulation = subject.for_case(CASE)
@@ -65,10 +47,10 @@ def test_the_first_error_is_raised_and_the_rest_is_forgotten(messages: list[tupl
         formulation.answers(calls)
     messages.clear()
     assert np.array_equal(formulation.residual(*calls[0][1:]), formulation.answers(calls[:1])[0])
-    assert messages == [("residual",), ("residual",)]
+    assert [[verb for verb, _ in message] for message in messages] == [["residual"], ["residual"]]
 
 
-def test_a_method_that_it_does_not_have_is_made_of_two(messages: list[tuple[str, ...]]) -> None:
+def test_a_method_that_it_does_not_have_is_made_of_two(messages: Messages) -> None:
     formulation = load_formulation("mortar-lm", Limits()).for_case(CASE)
     assert "residual_and_tangent" not in formulation.provides
     z = np.append(CASE.z, np.ones(formulation.n_multipliers(CASE.interface)))
@@ -76,7 +58,7 @@ def test_a_method_that_it_does_not_have_is_made_of_two(messages: list[tuple[str,
     (residual, tangent), other = formulation.answers(calls)
     assert residual.shape == other.shape == z.shape
     assert tangent.shape == (z.size, z.size)
-    assert {verb for verbs in messages for verb in verbs} >= {"residual", "tangent"}
+    assert {verb for message in messages for verb, _ in message} >= {"residual", "tangent"}
 
 
 def test_a_state_of_another_length_is_a_mistake_of_whoever_asks() -> None:

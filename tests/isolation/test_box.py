@@ -24,7 +24,7 @@ from contactverif.isolation.box import MOST_PROCESSES, Box, ControlGroup, may_gr
 from contactverif.isolation.confine import NETWORK, landlock_version
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote import load_remote, python_program
+from contactverif.isolation.remote import count_ends, load_remote, python_program
 
 LIMITS = Limits(seconds=20.0, memory=2000, box=Box())
 needs_box = pytest.mark.skipif(bool(why_no_box()), reason=why_no_box() or "there are boxes")
@@ -223,6 +223,21 @@ def test_a_box_that_forgets_to_end_with_its_parent_is_ended(monkeypatch: pytest.
     box = [other for other in psutil.process_iter() if code in _words(other)]
     psutil.wait_procs(box, timeout=5.0)
     assert not [other for other in box if other.is_running()]
+
+
+@needs_box
+def test_a_box_that_could_not_be_made_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Found by a golden run: a socket went between the look for sockets to hide and the start of the box."""
+    real, attempts = boxes.enclose, iter([True])
+
+    def enclose(*arguments: Any) -> tuple[str, ...]:
+        flawed = ("/bin/sh", "-c", "echo 'bwrap: Can not bind mount' >&2; exit 1")
+        return flawed if next(attempts, False) else real(*arguments)
+
+    monkeypatch.setattr(boxes, "enclose", enclose)
+    subject = load_formulation("nts", LIMITS)
+    assert isinstance(subject, Subject)
+    assert count_ends(subject) == 0
 
 
 @needs_box

@@ -23,8 +23,8 @@ from contactverif.contract.result import NotLoaded
 from contactverif.contract.traits import Traits
 from contactverif.isolation import host
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote import code_files, note_code_files, places
-from contactverif.plugins.registry import load_subject
+from contactverif.isolation.remote import RemoteSubject, code_files, note_code_files, places
+from contactverif.plugins.registry import load_subject, start_loading
 from contactverif.run import scheduler
 from contactverif.run.run import run
 from contactverif.run.scheduler import CaseChunk, WorkerError, begin_loading, decode, encode
@@ -177,6 +177,15 @@ def test_what_a_plugin_prints_in_a_worker_comes_to_the_parent(pool: Executor, mo
 # Workers load formulations as this process does: what loads, what does not, and what a user has mistyped.
 
 LIMITS = Limits()
+
+
+def test_what_has_begun_to_load_is_not_begun_again() -> None:
+    for _ in range(2):
+        start_loading("nts", LIMITS)
+    subject = load_subject("nts", LIMITS)
+    assert isinstance(subject, RemoteSubject)
+    assert subject.host.n_started == 1
+    host.end_all()
 
 
 def test_a_worker_loads_what_this_process_loads(pool: Executor) -> None:
