@@ -110,10 +110,10 @@ class Host:
             if self._loading is None:
                 self.begin_load()
             question, self._loading = self._loading, None
-            assert question is not None
             if self._flush_queue() or not self._last_words.startswith(b"bwrap: "):
                 break
             self.n_ended = n_ended  # A socket that the box hides went, so it was not made: nobody is to blame.
+        assert question is not None
         return raise_failure(question, loading=True)
 
     @property

@@ -129,7 +129,10 @@ class PluginProcess:
             self._core = PINNING.core
         try:
             if frame != self._sent_ahead:
-                self._send(frame)
+                try:
+                    self._child.channel.send(frame, self._limits.start_seconds)
+                except TooLateError:
+                    raise TooLateError("its process does not listen") from None
             self._sent_ahead = b""
             if not questions:
                 return
@@ -144,12 +147,6 @@ class PluginProcess:
             raise
         for question, reply in zip(questions, replies, strict=True):
             question.answer = reply
-
-    def _send(self, frame: bytes) -> None:
-        try:
-            self._child.channel.send(frame, self._limits.start_seconds)
-        except TooLateError:
-            raise TooLateError("its process does not listen") from None
 
     def _receive(self, seconds: float, largest: int) -> bytes:
         """Return the next frame, for which the process may use some seconds, however little of it comes at a time."""

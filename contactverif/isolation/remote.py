@@ -221,9 +221,6 @@ class RemoteFormulation(Prefetching):
             self._last = None  # It would keep the answer.
         return answer_of(question)
 
-    def _arrays(self, verb: str, interface: Interface, pairing: Pairing | None, z: Array) -> dict[str, Array]:
-        return _unpack(verb, self._answer(verb, interface, pairing, z))
-
     @contextmanager
     def prefetch(self, calls: Sequence[Call]) -> Iterator[None]:
         """Open a block in which these methods are called, in this order: they go to the process in one message."""
@@ -275,21 +272,21 @@ class RemoteFormulation(Prefetching):
 
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns)."""
-        return _pick(self._arrays("residual", interface, pairing, z), "residual", "residual")
+        return _pick(_unpack("residual", self._answer("residual", interface, pairing, z)), "residual", "residual")
 
     def tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the tangent (n_unknowns, n_unknowns), an array or a matrix of scipy.sparse."""
-        return _tangent(self._arrays("tangent", interface, pairing, z), "tangent", z.size)
+        return _tangent(_unpack("tangent", self._answer("tangent", interface, pairing, z)), "tangent", z.size)
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> tuple[Any, Any]:
         """Return residual (n_unknowns,) and tangent."""
         verb = "residual_and_tangent"
-        arrays = self._arrays(verb, interface, pairing, z)
+        arrays = _unpack(verb, self._answer(verb, interface, pairing, z))
         return _pick(arrays, verb, "residual"), _tangent(arrays, verb, z.size)
 
     def contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray) -> ContactPoints:
         """Return the contact points."""
-        arrays = self._arrays("contact_points", interface, pairing, z)
+        arrays = _unpack("contact_points", self._answer("contact_points", interface, pairing, z))
         try:
             return ContactPoints(**arrays)
         except (MisuseError, TypeError) as error:

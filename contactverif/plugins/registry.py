@@ -323,6 +323,7 @@ def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotL
     if name not in installed:
         raise unknown_name_error("engine", name, installed)
     python = options.pop("python", None)
+    make: Any = None
     if limits is None or python is None:
         make = _callable_of(text, installed[name], "**options")
         if isinstance(make, NotLoaded):

@@ -61,11 +61,10 @@ class RecordFile:
         self._end += len(data)
         return place
 
-    def close(self, *, sync: bool = False) -> None:
-        """Close the file, once the operating system has written it to the disk if that is wanted."""
+    def close(self) -> None:
+        """Close the file, once the operating system has written it to the disk."""
+        self.sync()
         if self._file is not None:
-            if sync:
-                self.sync()
             self._file.close()
             self._file = None
 

@@ -94,26 +94,11 @@ _DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(FormRecord | Ou
 
 
 class _OutcomeFile(RecordFile):
-    """The file in which this process notes outcomes."""
+    """The file in which this process notes outcomes, and the places of their forms in it."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self._forms: dict[records.Form, int] = {}
-
-    def add(self, row: int, number: int, outcome: Outcome) -> None:
-        form, numbers = records.encode(outcome)
-        if form not in self._forms:
-            if len(self._forms) >= _MOST_FORMS:
-                self._forms.clear()
-            try:
-                message = _ENCODER.encode(("form", form))
-            except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
-                message = _ENCODER.encode(("form", _spell_out(form)))
-            place = self.append(message)
-            if place is None:
-                return
-            self._forms[form] = place
-        self.append(_ENCODER.encode(OutcomeRecord(row, number, self._forms[form], array("d", numbers).tobytes())))
+        self.forms: dict[records.Form, int] = {}
 
 
 def _spell_out(item: Any) -> Any:
@@ -146,7 +131,20 @@ class Writer:
 
     def add(self, place: int, outcome: Outcome) -> None:
         """Append the outcome of the case at a place behind the first."""
-        self.file.add(self.row, self.first + place, outcome)
+        file, (form, numbers) = self.file, records.encode(outcome)
+        if form not in file.forms:
+            if len(file.forms) >= _MOST_FORMS:
+                file.forms.clear()
+            try:
+                message = _ENCODER.encode(("form", form))
+            except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
+                message = _ENCODER.encode(("form", _spell_out(form)))
+            byte = file.append(message)
+            if byte is None:
+                return
+            file.forms[form] = byte
+        number = self.first + place
+        file.append(_ENCODER.encode(OutcomeRecord(self.row, number, file.forms[form], array("d", numbers).tobytes())))
 
 
 class Store:
@@ -268,7 +266,7 @@ class Store:
         """Close the file of this process, once it is on the disk."""
         key = str(self.folder), self._session, os.getpid()
         if file := _files.pop(key, None):
-            file.close(sync=True)
+            file.close()
             self.write_error = self.write_error or file.write_error
 
 

@@ -65,18 +65,6 @@ class Dribbles(Springs):
             time.sleep(0.05)
 
 
-class HangsLater(Springs):
-    """It answers once in each process."""
-
-    answered = False
-
-    def residual(self, interface, pairing, z):
-        if HangsLater.answered:
-            time.sleep(1000)
-        HangsLater.answered = True
-        return super().residual(interface, pairing, z)
-
-
 def load(name):
     """Return the formulation of a class above."""
     return subject_of(name, globals()[name])

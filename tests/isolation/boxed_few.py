@@ -25,26 +25,10 @@ PTRACE_SEIZE = 0x4206
 TARGETS = "TARGETS_OF_BOXED_FEW"  # The environment variable with what the attempts aim at, separated by lines.
 
 
-def write_file(path):
-    Path(path).write_text("changed", encoding="utf-8")
-
-
-def delete_file(path):
-    Path(path).unlink()
-
-
 def read_file(path):
     if Path(path).read_text(encoding="utf-8"):
         return
     raise FileNotFoundError
-
-
-def see_process(number):
-    psutil.Process(int(number)).cmdline()
-
-
-def stop_process(number):
-    os.kill(int(number), signal.SIGSTOP)
 
 
 def fork_often(count):
@@ -66,14 +50,6 @@ def fill_memory(megabytes):
         raise MemoryError
 
 
-def limit_process(number):
-    psutil.Process(int(number)).rlimit(psutil.RLIMIT_CORE, (0, 0))
-
-
-def connect_by_network(port):
-    socket.create_connection(("127.0.0.1", int(port)), 1).close()
-
-
 def talk_to_itself(host):
     """Listen to a port, and connect to it."""
     with socket.create_server((host, 0)) as listener:
@@ -90,21 +66,9 @@ def connect_by_name(name):
         line.connect("\0" + name)
 
 
-def open_to_write(path):
-    os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK))
-
-
-def make_file(path):
-    os.close(os.open(path, os.O_WRONLY | os.O_CREAT, 0o600))
-
-
 def list_folder(path):
     if not os.listdir(path):
         raise FileNotFoundError
-
-
-def attach_to(number):
-    _call("ptrace", PTRACE_SEIZE, int(number), None, None)
 
 
 def make_user_namespace(flags):
@@ -133,13 +97,26 @@ def write_to_terminal(path):
         terminal.write("\a")
 
 
+ATTEMPTS = {
+    "write_file": lambda path: Path(path).write_text("changed", encoding="utf-8"),
+    "delete_file": os.unlink,
+    "make_file": lambda path: os.close(os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)),
+    "open_to_write": lambda path: os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK)),
+    "see_process": lambda number: psutil.Process(int(number)).cmdline(),
+    "stop_process": lambda number: os.kill(int(number), signal.SIGSTOP),
+    "limit_process": lambda number: psutil.Process(int(number)).rlimit(psutil.RLIMIT_CORE, (0, 0)),
+    "attach_to": lambda number: _call("ptrace", PTRACE_SEIZE, int(number), None, None),
+    "connect_by_network": lambda port: socket.create_connection(("127.0.0.1", int(port)), 1).close(),
+}
+
+
 def try_everything():
     """Try everything that the environment names, and return what did not fail."""
     successes = []
     for line in filter(None, os.environ.get(TARGETS, "").splitlines()):
         verb, _, target = line.partition(" ")
         try:
-            globals()[verb](target)
+            (ATTEMPTS.get(verb) or globals()[verb])(target)
         except (OSError, MemoryError, psutil.Error):
             continue
         successes.append(verb)

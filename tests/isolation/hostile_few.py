@@ -121,11 +121,6 @@ class RaisesInMake:
         return np.zeros_like(z)
 
 
-class Kills(Springs):
-    def residual(self, interface, pairing, z):
-        os.kill(os.getpid(), signal.SIGSEGV)
-
-
 class KillsAtTimes(Springs):
     """It ends its process in some states, on a slave of many nodes."""
 
@@ -133,49 +128,6 @@ class KillsAtTimes(Springs):
         if interface.n_slave_nodes >= 6:
             os.kill(os.getpid(), signal.SIGSEGV)
         return super().residual(interface, pairing, z)
-
-
-class Exits(Springs):
-    def residual(self, interface, pairing, z):
-        print("good bye")
-        sys.stdout.flush()
-        os._exit(0)
-
-
-class ExitsWithMinusOne(Springs):
-    def residual(self, interface, pairing, z):
-        os._exit(-1)
-
-
-class KillsInPair(Springs):
-    def pair(self, interface, z):
-        os.abort()
-
-
-class RaisesInPair(Springs):
-    def pair(self, interface, z):
-        raise RuntimeError("no pairing today")
-
-
-class Hangs(Springs):
-    def residual(self, interface, pairing, z):
-        time.sleep(1000)
-
-
-class HangsInPair(Springs):
-    def pair(self, interface, z):
-        time.sleep(1000)
-
-
-class Cuts(Springs):
-    """It cuts and fills every open file of its process, so also the one that tells how far it is."""
-
-    def residual(self, interface, pairing, z):
-        for number in range(3, 50):
-            with contextlib.suppress(OSError):
-                os.pwrite(number, b"\xff" * 100, 0)
-                os.ftruncate(number, 0)
-        time.sleep(1000)
 
 
 class Counts(Springs):
@@ -229,44 +181,34 @@ class LoadsLibrary(Springs):
         super().__init__(penalty=penalty)
 
 
-class TakesAll(Springs):
-    def residual(self, interface, pairing, z):
-        np.ones(10**12)
+def write_everywhere(data):
+    """Write to every open file of the process, so also to the line to the judge."""
+    for number in range(3, 50):
+        with contextlib.suppress(OSError):
+            os.write(number, data)
+
+
+def cut_everywhere():
+    """Cut and fill every open file of the process, so also the one that tells how far it is."""
+    for number in range(3, 50):
+        with contextlib.suppress(OSError):
+            os.pwrite(number, b"\xff" * 100, 0)
+            os.ftruncate(number, 0)
+
+
+def throw(error):
+    raise error
 
 
 class Forges(Springs):
-    """It writes rubbish to every open file of its process, so also to the line to the judge."""
-
     def residual(self, interface, pairing, z):
-        for number in range(3, 50):
-            with contextlib.suppress(OSError):
-                os.write(number, b"\x03" + b"\x00" * 7 + b"abc" * 100)
+        write_everywhere(b"\x03" + b"\x00" * 7 + b"abc" * 100)
         return super().residual(interface, pairing, z)
-
-
-class TooLong(Springs):
-    """It promises an answer of an exabyte."""
-
-    def residual(self, interface, pairing, z):
-        for number in range(3, 50):
-            with contextlib.suppress(OSError):
-                os.write(number, b"\xff" * 6 + b"\x00" * 2)
-        time.sleep(1000)
 
 
 class Unspeakable(Exception):
     def __str__(self):
         raise RuntimeError
-
-
-class RaisesUnspeakable(Springs):
-    def residual(self, interface, pairing, z):
-        raise Unspeakable
-
-
-class Shouts(Springs):
-    def residual(self, interface, pairing, z):
-        raise ValueError("x" * 20_000_000)
 
 
 class Prints(Springs):
@@ -286,6 +228,26 @@ class LeavesChildren(Springs):
                 time.sleep(1000)
             os._exit(0)
         return super().residual(interface, pairing, z)
+
+
+# {plugin: its method, and what that does instead}
+INSTEAD = {
+    "Kills": ("residual", lambda: os.kill(os.getpid(), signal.SIGSEGV)),
+    "Exits": ("residual", lambda: (print("good bye", flush=True), os._exit(0))),
+    "ExitsWithMinusOne": ("residual", lambda: os._exit(-1)),
+    "KillsInPair": ("pair", os.abort),
+    "RaisesInPair": ("pair", lambda: throw(RuntimeError("no pairing today"))),
+    "Hangs": ("residual", lambda: time.sleep(1000)),
+    "HangsInPair": ("pair", lambda: time.sleep(1000)),
+    "Cuts": ("residual", lambda: (cut_everywhere(), time.sleep(1000))),
+    "TakesAll": ("residual", lambda: np.ones(10**12)),
+    # It promises an answer of an exabyte.
+    "TooLong": ("residual", lambda: (write_everywhere(b"\xff" * 6 + b"\x00" * 2), time.sleep(1000))),
+    "RaisesUnspeakable": ("residual", lambda: throw(Unspeakable())),
+    "Shouts": ("residual", lambda: throw(ValueError("x" * 20_000_000))),
+}
+for _name, (_method, _act) in INSTEAD.items():
+    globals()[_name] = type(_name, (Springs,), {_method: lambda self, *_, act=_act: act()})
 
 
 def load(name: str) -> Subject:
