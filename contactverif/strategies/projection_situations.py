@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from math import cos, floor, hypot, ldexp, log2, radians, sin
 from typing import overload
 
@@ -31,12 +31,17 @@ from contactverif.strategies.given_interface import touches
 from contactverif.strategies.panel_chains import Chain, assemble_chains
 from contactverif.strategies.samples import Motion, motions, penalties, seeds, shuffles
 
+Point = tuple[float, float]
+Steps = tuple[list[Point], int]  # Vectors of slave segments from left to right, and which of them carries the point.
+
 _PAST = float(TAU)  # Formulations may still see contact past a free end by this share of the segment.
 FURTHEST = 2**20  # The largest offset, in units of the lattice.
-NODES_AND_OTHERS = (-1.0, 1.0, -0.5, 0.5, 0.0, -1.0, 1.0)  # Places c; every other one is a node.
-ROUND_PLACES = (*NODES_AND_OTHERS, -(3**-0.5), 3**-0.5, 0.75)  # Gauss points too, which are not on the lattice.
-TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # The slope of a slave segment.
-_SIZES = st.integers(1, 28), st.sampled_from([1.0, 0.75])  # The draws e and part of a gap 2^-e × part.
+_FINEST = 31  # Distances from a bisector go down to 2^-31 and 0.
+_NODES_AND_OTHERS = (-1.0, 1.0, -0.5, 0.5, 0.0, -1.0, 1.0)  # Places c; every other one is a node.
+_C = st.sampled_from(_NODES_AND_OTHERS)
+# With Gauss points, which are not on the lattice.
+_ROUND_C = st.sampled_from((*_NODES_AND_OTHERS, -(3**-0.5), 3**-0.5, 0.75))
+_TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # The slope of a slave segment.
 _TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
 _STRETCHES = st.sampled_from([1.0, 2.0, 0.5, 0.75])  # The slave's reference over its present length.
 _COUNTS = st.integers(0, 2)
@@ -44,6 +49,22 @@ _COUNTS = st.integers(0, 2)
 # draws decide.
 _COMPANY = st.tuples(*[st.sampled_from([False, True, True, True])] * 2).map(any)
 _LENGTHS = st.sampled_from([1.0, 2.0, 0.5, 0.25, 4.0])
+_WHOLE_LENGTHS = st.integers(1, 8).map(float)
+_NEIGHBOURS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 0.5, 3.0]), _TILTS), max_size=2)  # (length, slope)
+_SIDES = st.sampled_from([1.0, 2.0, 4.0, 3.0])
+_SLOPES = st.sampled_from([0.0, 0.125, 0.5, 1.0])
+_ENDS = st.lists(st.sampled_from([1.0, 2.0]), max_size=1)
+
+
+def _gap(exponent: int, part: float, sign: int) -> float:
+    # All gaps take as many draws, or hypothesis would count zero as the simplest one.
+    return ldexp(sign * part, -exponent)
+
+
+# Gaps in units of a segment: 1e-9 to 1/2, half of them in penetration, some exactly zero.
+_SIZES = st.integers(1, 28), st.sampled_from([1.0, 0.75])
+_GAPS = st.builds(_gap, *_SIZES, st.sampled_from([-1, 1, -1, 1, -1, 0]))
+_NONZERO_GAPS = st.builds(_gap, *_SIZES, st.sampled_from([-1, 1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +96,7 @@ def exact_turns() -> SearchStrategy[ExactTurn | Motion]:
     return st.one_of(st.just(ExactTurn()), turns, turns)
 
 
-@cache
-def _any_motions() -> SearchStrategy[ExactTurn | Motion]:
-    return st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
+_ANY_MOTIONS = st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,20 +115,20 @@ class Sketch:
 
     def mirror(self) -> Sketch:
         """Return the mirror image in the y-axis, every chain walked the other way."""
+
+        def flip(chain: Chain) -> Chain:
+            return replace(chain, points=chain.points[::-1] * [-1, 1] + 0.0)
+
         n_segments = len(self.slave.points) - (not self.slave.closed)
         # A closed chain keeps its joint between the last node and the first.
         segment = n_segments - 1 if self.slave.closed else n_segments - 1 - self.segment
-        masters = [_mirror(chain) for chain in self.masters]
-        return replace(self, masters=masters, slave=_mirror(self.slave), segment=segment, c=-self.c)
-
-
-def _mirror(chain: Chain) -> Chain:
-    return replace(chain, points=chain.points[::-1] * [-1, 1] + 0.0)
+        masters = [flip(chain) for chain in self.masters]
+        return replace(self, masters=masters, slave=flip(self.slave), segment=segment, c=-self.c)
 
 
 @st.composite
-def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
-    """Draw a sketch and put it somewhere; parameters "probe_segment" and "probe_c" name the point that it is about.
+def _sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
+    """Draw a sketch and put it somewhere.
 
     Many kinds are open, edge-on or past an end. So most cases have company: beside the sketch stands a slave segment in
     contact with a master segment.
@@ -117,13 +136,19 @@ def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
     sketch = draw(sketches)
     if sketch.mirrored and draw(st.booleans()):
         sketch = sketch.mirror()
-    motion = draw(exact_turns() if sketch.exact else _any_motions())
+    motion = draw(exact_turns() if sketch.exact else _ANY_MOTIONS)
     penalty, seed = draw(penalties()), draw(seeds())
     stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(shuffles())
     reference = replace(sketch.slave, points=sketch.slave.points * stretch)
     slaves, masters, references = [sketch.slave], list(sketch.masters), [reference]
     if draw(_COMPANY):  # Drawn last, so that it goes first.
-        slave, master = _company(np.vstack([chain.points for chain in (*slaves, *masters)]))
+        # It is upside down: the slave is below and runs in −x, the master above in +x. So no slave of a sketch, which
+        # runs in +x, faces that master, and none is near it.
+        points = np.vstack([chain.points for chain in (*slaves, *masters)])
+        low, high = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
+        x, y = high[0] + (high - low).max(), low[1]
+        slave = Chain(np.array([[x + 1.5, y + 0.125], [x + 0.5, y + 0.125]]))
+        master = Chain(np.array([[x, y], [x + 2.0, y]]))
         slaves, masters, references = [*slaves, slave], [*masters, master], [*references, slave]
     interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
     current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
@@ -133,150 +158,123 @@ def sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
     return Case(interface, motion(current).reshape(-1), penalty, parameters, seed, kind=sketch.kind)
 
 
-def _company(points: FloatArray) -> tuple[Chain, Chain]:
-    """Return a slave segment that penetrates a master segment, to the right of a sketch's points (n, 2).
-
-    They are upside down: the slave is below and runs in −x, the master above in +x. So no slave of a sketch, which runs
-    in +x, faces that master, and none is near it.
-    """
-    low, high = np.floor(points.min(axis=0)), np.ceil(points.max(axis=0))
-    x, y = high[0] + (high - low).max(), low[1]
-    master = Chain(np.array([[x, y], [x + 2.0, y]]))
-    return Chain(np.array([[x + 1.5, y + 0.125], [x + 0.5, y + 0.125]])), master
+@st.composite
+def _slave_steps(draw: DrawFn, unit: float) -> Steps:
+    before, after = draw(_COUNTS), draw(_COUNTS)
+    length = unit * draw(_LENGTHS)
+    return [(length, length * draw(_TILTS)) for _ in range(before + 1 + after)], before
 
 
-@cache
-def gaps() -> SearchStrategy[float]:
-    """Return gaps in units of a segment: 1e-9 to 1/2, half of them in penetration, some exactly zero."""
-    return st.builds(_gap, *_SIZES, st.sampled_from([-1, 1, -1, 1, -1, 0]))
+def _sketch(kind: str, masters: Sequence[Chain], point: Point, c: float, steps: Steps, **flags: bool) -> Sketch:
+    """Return the sketch of an open slave chain that has the point at c of one of its segments."""
+    vectors, segment = np.array(steps[0], dtype=np.float64), steps[1]
+    nodes = np.concatenate([np.zeros((1, 2)), np.cumsum(vectors, axis=0)])
+    start = np.array(point) - nodes[segment] - (1 + c) / 2 * vectors[segment]
+    return Sketch(kind, masters, Chain(nodes + start), segment, c, **flags)
 
 
-@cache
-def nonzero_gaps() -> SearchStrategy[float]:
-    """Return gaps as `gaps` does, without zero."""
-    return st.builds(_gap, *_SIZES, st.sampled_from([-1, 1]))
-
-
-def _gap(exponent: int, part: float, sign: int) -> float:
-    # All gaps take as many draws, or hypothesis would count zero as the simplest one.
-    return ldexp(sign * part, -exponent)
-
-
-def upper_side(left_to_right: Sequence[tuple[float, float]]) -> Chain:
-    """Return the chain of a body below these points, which go from left to right."""
+def _upper_side(left_to_right: Sequence[Point]) -> Chain:
+    """Return the chain of a body below these points."""
     return Chain(np.array(left_to_right, dtype=np.float64)[::-1])
 
 
-@st.composite
-def slave_steps(draw: DrawFn, unit: float) -> tuple[list[tuple[float, float]], int]:
-    """Draw the vectors of slave segments from left to right, and the number of the segment that carries the point."""
-    before, after = draw(_COUNTS), draw(_COUNTS)
-    length = unit * draw(_LENGTHS)
-    steps = [(length, length * draw(TILTS)) for _ in range(before + 1 + after)]
-    return steps, before
+def _graph(draw: DrawFn, length: float, *, left: bool = True, slopes: bool = True) -> Chain:
+    """Draw a master that is a graph with slopes up to 45° besides the segment from (0, 0) to (length, 0).
 
-
-def slave_through(point: tuple[float, float], c: float, steps: Sequence[tuple[float, float]], segment: int) -> Chain:
-    """Return the open chain with these vectors whose segment of this number has the point at c."""
-    vectors = np.array(steps, dtype=np.float64)
-    nodes = np.concatenate([np.zeros((1, 2)), np.cumsum(vectors, axis=0)])
-    start = np.array(point) - nodes[segment] - (1 + c) / 2 * vectors[segment]
-    return Chain(nodes + start)
-
-
-Points = list[tuple[float, float]]
-_WHOLE_LENGTHS = st.integers(1, 8).map(float)
-_NEIGHBOURS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 0.5, 3.0]), TILTS), max_size=2)  # (length, slope)
-_FINEST = 31  # Distances from a bisector go down to 2^-31 and 0.
-_SIDES = st.sampled_from([1.0, 2.0, 4.0, 3.0])
-_SLOPES = st.sampled_from([0.0, 0.125, 0.5, 1.0])
-_ENDS = st.lists(st.sampled_from([1.0, 2.0]), max_size=1)
+    A point over that segment, no farther from it than from its ends, is nearer to it than to all others.
+    """
+    right_to_left: list[Point] = [(length, 0.0), (0.0, 0.0)]
+    for size, slope in draw(_NEIGHBOURS):
+        x, y = right_to_left[0]
+        right_to_left.insert(0, (x + size, y + size * slope * slopes))
+    for size, slope in draw(_NEIGHBOURS) if left else ():
+        x, y = right_to_left[-1]
+        right_to_left.append((x - size, y + size * slope * slopes))
+    return Chain(np.array(right_to_left))
 
 
 @st.composite
-def inside(draw: DrawFn) -> Sketch:
+def _feet_inside(draw: DrawFn, *, exact: bool = False) -> tuple[float, Point]:
+    """Draw a length, and a point over the inside of a segment of that length, no farther from it than from its ends."""
+    length, denominator = draw(_WHOLE_LENGTHS), 8 if exact else draw(st.sampled_from([8, 7]))
+    part = draw(st.integers(1, denominator - 1)) / denominator
+    room = 2.0 ** floor(log2(2 * min(part, 1 - part)))
+    return length, (part * length, draw(_GAPS) * room * length)
+
+
+@st.composite
+def _inside(draw: DrawFn, kind: str) -> Sketch:
     """Draw a foot inside a segment, whose neighbours are bent by up to 45°."""
     length, point = draw(_feet_inside())
-    c = draw(st.sampled_from(ROUND_PLACES))
-    steps, segment = draw(slave_steps(length))
-    return Sketch("inside a segment", [_graph(draw, length)], slave_through(point, c, steps, segment), segment, c)
+    c, steps = draw(_ROUND_C), draw(_slave_steps(length))
+    return _sketch(kind, [_graph(draw, length)], point, c, steps)
 
 
 @st.composite
-def angle(draw: DrawFn, kind: str, degrees: float) -> Sketch:
+def _angle(draw: DrawFn, kind: str, degrees: float) -> Sketch:
     """Draw a foot inside a segment; the slave segment is turned against the master by this angle, either way."""
     exact = {90.0: (0.0, 1.0), 180.0: (-1.0, 0.0)}
     length, point = draw(_feet_inside(exact=degrees in exact))
-    c, size = draw(st.sampled_from(NODES_AND_OTHERS)), length * draw(st.sampled_from([1.0, 0.5, 2.0]))
+    c, size = draw(_C), length * draw(st.sampled_from([1.0, 0.5, 2.0]))
     along, across = exact.get(degrees, (cos(radians(degrees)), sin(radians(degrees))))
-    steps = [(size * along, size * across * draw(st.sampled_from([1.0, -1.0])))] * draw(st.integers(1, 3))
-    segment = draw(st.integers(0, len(steps) - 1))
-    slave = slave_through(point, c, steps, segment)
-    return Sketch(kind, [_graph(draw, length)], slave, segment, c, exact=degrees in exact)
+    vectors = [(size * along, size * across * draw(st.sampled_from([1.0, -1.0])))] * draw(st.integers(1, 3))
+    segment = draw(st.integers(0, len(vectors) - 1))
+    return _sketch(kind, [_graph(draw, length)], point, c, (vectors, segment), exact=degrees in exact)
 
 
 @st.composite
-def one_of_several(draw: DrawFn, role: str) -> Sketch:
+def _one_of_several(draw: DrawFn, kind: str) -> Sketch:
     """Draw a slave segment over three to six master segments; its point is over the first, the last, or another.
 
     The order is that of the master, which runs in −x.
     """
-    width, place = (
-        draw(_WHOLE_LENGTHS),
-        {"first": (0.5, 1.0), "intermediate": (0.0, -0.5, 0.5), "last": (-0.5, -1.0)}[role],
-    )
-    c = draw(st.sampled_from(place))
+    width, role = draw(_WHOLE_LENGTHS), kind.partition(" ")[0]
+    c = draw(st.sampled_from({"first": (0.5, 1.0), "intermediate": (0.0, -0.5, 0.5), "last": (-0.5, -1.0)}[role]))
     # Master nodes lie at odd sixteenths of the slave segment, and the point at an eighth.
     here = round(8 * (1 + c))
-    left = draw(st.lists(st.integers(0, here // 2 - 1), min_size=2, max_size=3, unique=True)) if role == "first" else []
-    right = draw(st.lists(st.integers(here // 2, 7), min_size=2, max_size=3, unique=True)) if role == "last" else []
-    if role == "intermediate":
-        left = draw(st.lists(st.integers(0, here // 2 - 1), min_size=1, max_size=2, unique=True))
-        right = draw(st.lists(st.integers(here // 2, 7), min_size=1, max_size=2, unique=True))
+    sides = st.integers(0, here // 2 - 1), st.integers(here // 2, 7)  # To the left of the point, and to its right
+    counts = {"first": [(2, 3), None], "intermediate": [(1, 2), (1, 2)], "last": [None, (2, 3)]}[role]
+    odd = []
+    for places, count in zip(sides, counts, strict=True):
+        odd += draw(st.lists(places, min_size=count[0], max_size=count[1], unique=True)) if count else []
     beyond = draw(st.tuples(st.sampled_from([0.25, 1.0]), st.sampled_from([0.25, 1.0])))
-    nodes = [-beyond[0], *((2 * k + 1) / 16 for k in sorted(left + right)), 1 + beyond[1]]
-    line: Points = [(node * width, 0.0) for node in nodes]
+    nodes = [-beyond[0], *((2 * k + 1) / 16 for k in sorted(odd)), 1 + beyond[1]]
     before, after = draw(st.integers(0, 1)), draw(st.integers(0, 1))
     tilt = draw(st.sampled_from([0.0, 0.125, -0.125, 0.25]))
-    point = ((1 + c) / 2 * width, draw(gaps()) * width / 8)
-    slave = slave_through(point, c, [(width, tilt * width)] * (before + 1 + after), before)
-    return Sketch(f"{role} of several segments", [upper_side(line)], slave, before, c, mirrored=False)
+    point = ((1 + c) / 2 * width, draw(_GAPS) * width / 8)
+    steps = [(width, tilt * width)] * (before + 1 + after), before
+    return _sketch(kind, [_upper_side([(node * width, 0.0) for node in nodes])], point, c, steps, mirrored=False)
 
 
 @st.composite
-def past_end(draw: DrawFn, kind: str) -> Sketch:
+def _past_end(draw: DrawFn, kind: str) -> Sketch:
     """Draw a point past the free left end of the master by somewhat less, or somewhat more, than τ of its segment."""
-    length, c = draw(_WHOLE_LENGTHS), draw(st.sampled_from(ROUND_PLACES))
-    if "inside" in kind:
-        past = _PAST * (1 - ldexp(1.0, -draw(st.integers(1, 20))))
-    else:
-        past = _PAST * (1 + ldexp(1.0, -draw(st.integers(-7, 20))))
-    steps, segment = draw(slave_steps(length))
-    slave = slave_through((-past * length, draw(gaps()) * length), c, steps, segment)
-    return Sketch(kind, [_graph(draw, length, left=False)], slave, segment, c)
+    length, c, inside = draw(_WHOLE_LENGTHS), draw(_ROUND_C), "inside" in kind
+    off = ldexp(1.0, -draw(st.integers(1 if inside else -7, 20)))
+    past = _PAST * (1 - off if inside else 1 + off)
+    steps, gap = draw(_slave_steps(length)), draw(_GAPS) * length
+    return _sketch(kind, [_graph(draw, length, left=False)], (-past * length, gap), c, steps)
 
 
 @st.composite
-def free_end(draw: DrawFn) -> Sketch:
+def _free_end(draw: DrawFn, kind: str) -> Sketch:
     """Draw a point whose foot is exactly the free left end of the master."""
-    length, c = draw(_WHOLE_LENGTHS), draw(st.sampled_from(NODES_AND_OTHERS))
-    steps, segment = draw(slave_steps(length))
-    slave = slave_through((0.0, draw(gaps()) * length), c, steps, segment)
-    return Sketch("free end hit exactly", [_graph(draw, length, left=False)], slave, segment, c, exact=True)
+    length, c = draw(_WHOLE_LENGTHS), draw(_C)
+    steps, gap = draw(_slave_steps(length)), draw(_GAPS) * length
+    return _sketch(kind, [_graph(draw, length, left=False)], (0.0, gap), c, steps, exact=True)
 
 
 @st.composite
-def small_overlap(draw: DrawFn) -> Sketch:
+def _small_overlap(draw: DrawFn, kind: str) -> Sketch:
     """Draw a slave whose last node is 2^-k of a master segment inside the master's free end, the rest outside."""
     length, overlap = draw(_WHOLE_LENGTHS), ldexp(1.0, -draw(st.integers(2, 30)))
-    steps, segment = draw(slave_steps(2 * length))
-    slave = slave_through((overlap * length, draw(gaps()) * length * 0.5), 1.0, steps[: segment + 1], segment)
-    masters = [_graph(draw, length, left=False)]
-    return Sketch("overlap going to zero", masters, slave, segment, 1.0, exact=True)
+    vectors, segment = draw(_slave_steps(2 * length))
+    point, steps = (overlap * length, draw(_GAPS) * length * 0.5), (vectors[: segment + 1], segment)
+    return _sketch(kind, [_graph(draw, length, left=False)], point, 1.0, steps, exact=True)
 
 
 @st.composite
-def closing_segment(draw: DrawFn) -> Sketch:
+def _closing_segment(draw: DrawFn, kind: str) -> Sketch:
     """Draw a disc or a hole, and a point over the segment that joins its last node to the first.
 
     The slave is open, or a closed box whose own closing segment carries the point.
@@ -285,82 +283,69 @@ def closing_segment(draw: DrawFn) -> Sketch:
     height = length * draw(st.sampled_from([-1.0, 1.0, -2.0, 2.0]))  # Below the x-axis is a disc, above it a hole.
     between = draw(st.sampled_from([[], [0.5], [0.25, 0.75]]))
     nodes = [(0.0, 0.0), (0.0, height), *((length * part, height) for part in between), (length, height), (length, 0.0)]
-    master = Chain(np.array(nodes), closed=True)
-    c, point = draw(st.sampled_from(ROUND_PLACES)), (x, y / 2)
-    steps, segment = draw(slave_steps(length / 4))
-    if draw(st.booleans()):
-        size = length / 4
-        (left, right) = slave_through(point, c, [(size, 0.0)], 0).points
-        box = np.array([right, right + [0, size], left + [0, size], left])
-        return Sketch("closing segment", [master], Chain(box, closed=True), 3, c, ordered=True)
-    slave = slave_through(point, c, steps, segment)
-    return Sketch("closing segment", [master], slave, segment, c, ordered=True)
+    masters, point, size = [Chain(np.array(nodes), closed=True)], (x, y / 2), length / 4
+    c, steps = draw(_ROUND_C), draw(_slave_steps(size))
+    if not draw(st.booleans()):
+        return _sketch(kind, masters, point, c, steps, ordered=True)
+    sketch = _sketch(kind, masters, point, c, ([(size, 0.0)], 0), ordered=True)
+    left, right = sketch.slave.points
+    box = np.array([right, right + [0, size], left + [0, size], left])
+    return replace(sketch, slave=Chain(box, closed=True), segment=3)
 
 
 @st.composite
-def second_body(draw: DrawFn) -> Sketch:
+def _second_body(draw: DrawFn, kind: str) -> Sketch:
     """Draw another chain of the master behind the first; the point may even be nearer to the second."""
     length, part = draw(_WHOLE_LENGTHS), draw(st.integers(1, 7)) / 8
     behind = length * draw(st.sampled_from([1.0, 0.25, 0.0625]))
-    gap = draw(gaps()) * behind
+    gap = draw(_GAPS) * behind
     if draw(st.sampled_from([False, False, False, True])) and gap < 0:
         gap = -behind - gap
-    c = draw(st.sampled_from(ROUND_PLACES))
-    steps, segment = draw(slave_steps(length / 8))
+    c, steps = draw(_ROUND_C), draw(_slave_steps(length / 8))
     first = _graph(draw, length, slopes=False)
     cuts = draw(st.sampled_from([[], [0.5625], [0.3125, 0.6875]]))  # Odd sixteenths: the point is at an eighth.
-    second = upper_side([(x * length, -behind) for x in (-0.5, *cuts, 1.5)])
+    second = _upper_side([(x * length, -behind) for x in (-0.5, *cuts, 1.5)])
     if draw(st.booleans()):  # The second chain faces away: it is the lower side of the first body.
         second = Chain(second.points[::-1])
-    slave = slave_through((part * length, gap), c, steps, segment)
-    return Sketch("second body behind", [first, second], slave, segment, c)
+    return _sketch(kind, [first, second], (part * length, gap), c, steps)
 
 
 @st.composite
-def other_node(draw: DrawFn) -> Sketch:
+def _other_node(draw: DrawFn, kind: str) -> Sketch:
     """Draw a point over the middle of a long segment, nearer to the tip of a hook than to both ends of it."""
-    length, c = 16.0, draw(st.sampled_from(ROUND_PLACES))
-    tip = (8.0 + draw(st.integers(0, 2)), draw(st.sampled_from([3.0, 4.0, -3.0, -4.0])))
-    steps, segment = draw(slave_steps(0.25))
-    slave = slave_through((8.0, 2 * draw(gaps())), c, steps, segment)
-    hook = upper_side([(0.0, 0.0), (length, 0.0), tip])
-    return Sketch("nearest node not on nearest segment", [hook], slave, segment, c)
+    c, tip = draw(_ROUND_C), (8.0 + draw(st.integers(0, 2)), draw(st.sampled_from([3.0, 4.0, -3.0, -4.0])))
+    steps, gap = draw(_slave_steps(0.25)), 2 * draw(_GAPS)
+    return _sketch(kind, [_upper_side([(0.0, 0.0), (16.0, 0.0), tip])], (8.0, gap), c, steps)
 
 
 @st.composite
-def node_hit(draw: DrawFn) -> Sketch:
+def _node_hit(draw: DrawFn, kind: str) -> Sketch:
     """Draw a point whose foot on the nearest segment is exactly a node between two segments.
 
     The left segment is collinear, or bent to the side where the node stays nearest.
     """
-    gap, right, left = draw(nonzero_gaps()), draw(_SIDES), draw(_SIDES)
+    gap, right, left = draw(_NONZERO_GAPS), draw(_SIDES), draw(_SIDES)
     slope = draw(_SLOPES) * (1 if gap < 0 else -1)
-    line: Points = [(-left, slope * left), (0.0, 0.0), (right, 0.0)]
-    line += [(right + length, 0.0) for length in draw(_ENDS)]
-    c = draw(st.sampled_from(NODES_AND_OTHERS))
-    steps, segment = draw(slave_steps(1.0))
-    return Sketch(
-        "node hit exactly", [upper_side(line)], slave_through((0.0, gap), c, steps, segment), segment, c, True
-    )
+    line = [(-left, slope * left), (0.0, 0.0), (right, 0.0), *((right + length, 0.0) for length in draw(_ENDS))]
+    return _sketch(kind, [_upper_side(line)], (0.0, gap), draw(_C), draw(_slave_steps(1.0)), exact=True)
 
 
 @st.composite
-def coincident_nodes(draw: DrawFn) -> Sketch:
+def _coincident_nodes(draw: DrawFn, kind: str) -> Sketch:
     """Draw matching meshes: each slave node stands over a master node, at the same place if the gap is zero."""
     steps = draw(st.lists(st.tuples(_SIDES, _SLOPES, st.sampled_from([1, -1])), min_size=1, max_size=4))
-    level, gap = draw(st.sampled_from([True, False])), draw(gaps())
-    line: Points = [(0.0, 0.0)]
+    level, gap = draw(st.sampled_from([True, False])), draw(_GAPS)
+    line = [(0.0, 0.0)]
     for length, slope, sign in steps:
         line.append((line[-1][0] + length, line[-1][1] + (0.0 if level else sign * slope * length)))
-    gap = gap if level else 0.0
     more = [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
     segment, c = draw(st.integers(0, len(steps) - 1)), draw(st.sampled_from([-1.0, 1.0]))
-    slave = upper_side([(x, y + gap) for x, y in line[::-1]])
-    return Sketch("coincident nodes", [upper_side(line + more)], slave, segment, c, True)
+    slave = Chain(np.array([(x, y + (gap if level else 0.0)) for x, y in line]))
+    return Sketch(kind, [_upper_side(line + more)], slave, segment, c, exact=True)
 
 
 @st.composite
-def vertex(draw: DrawFn, kind: str) -> Sketch:
+def _vertex(draw: DrawFn, kind: str) -> Sketch:
     """Draw a point near the bisector of a vertex, on it, or off it by 2^-k, on either side of the master.
 
     Where the vertex sticks out, a penetrating point may be nearest to two segments, and an open one to the node alone;
@@ -371,13 +356,11 @@ def vertex(draw: DrawFn, kind: str) -> Sketch:
     else:
         up, steep = (-1 if kind == "convex vertex" else 1), draw(st.sampled_from([1.0, 0.5, 0.25, 0.125]))
     left, right = draw(_SIDES), draw(_SIDES)
-    line: Points = [(-left, up * steep * left), (0.0, 0.0), (right, up * steep * right)]
+    line = [(-left, up * steep * left), (0.0, 0.0), (right, up * steep * right)]
     line += [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
-    gap = draw(nonzero_gaps())
-    c = draw(st.sampled_from(NODES_AND_OTHERS))
-    steps, segment = draw(slave_steps(1.0))
+    gap, c, steps = draw(_NONZERO_GAPS), draw(_C), draw(_slave_steps(1.0))
     point = (draw(_off_the_bisector(abs(gap) * min(steep, 1.0))), gap)
-    return Sketch(kind, [upper_side(line)], slave_through(point, c, steps, segment), segment, c, True)
+    return _sketch(kind, [_upper_side(line)], point, c, steps, exact=True)
 
 
 @st.composite
@@ -393,78 +376,50 @@ def _off_the_bisector(draw: DrawFn, reach: float) -> float:
 
 
 @st.composite
-def three_segments(draw: DrawFn) -> Sketch:
+def _three_segments(draw: DrawFn, kind: str) -> Sketch:
     """Draw the centre of a groove or of a rib: three segments are equally near."""
     width, wall = draw(_SIDES), draw(st.sampled_from([1.0, 0.5, 2.0]))
-    groove: Points = [(-width, wall * width), (-width, -width), (width, -width), (width, wall * width)]
-    rib: Points = [(-width, -wall * width), (-width, width), (width, width), (width, -wall * width)]
-    return _at_origin(draw, "equidistant from three segments", groove, rib)
+    top, groove = wall * width, draw(st.booleans())
+    line = [(-width, top), (-width, -width), (width, -width), (width, top)]
+    return _at_origin(draw, kind, line if groove else [(x, -y) for x, y in line])
 
 
 @st.composite
-def three_nodes(draw: DrawFn) -> Sketch:
+def _three_nodes(draw: DrawFn, kind: str) -> Sketch:
     """Draw a point to which three tips of the master, or three bottoms of its grooves, are equally near."""
     end = draw(st.sampled_from([8.0, 6.0]))
     tips = [(-5.0, -end), (-3.0, -4.0), (-2.0, -end), (0.0, -5.0), (2.0, -end), (3.0, -4.0), (5.0, -end)]
-    return _at_origin(draw, "equidistant from three nodes", tips, [(x, -y) for x, y in tips])
+    return _at_origin(draw, kind, tips if draw(st.booleans()) else [(x, -y) for x, y in tips])
 
 
-def _at_origin(draw: DrawFn, kind: str, above: Points, below: Points) -> Sketch:
-    """Return a sketch whose slave point is the origin: the master is below it, or it penetrates the master."""
-    line = above if draw(st.booleans()) else below
-    c = draw(st.sampled_from(NODES_AND_OTHERS))
-    steps, segment = draw(slave_steps(0.5))
-    return Sketch(kind, [upper_side(line)], slave_through((0.0, 0.0), c, steps, segment), segment, c, True)
+def _at_origin(draw: DrawFn, kind: str, line: Sequence[Point]) -> Sketch:
+    return _sketch(kind, [_upper_side(line)], (0.0, 0.0), draw(_C), draw(_slave_steps(0.5)), exact=True)
 
 
-@st.composite
-def _feet_inside(draw: DrawFn, *, exact: bool = False) -> tuple[float, tuple[float, float]]:
-    """Draw a length, and a point over the inside of a segment of that length, no farther from it than from its ends."""
-    length, denominator = draw(_WHOLE_LENGTHS), 8 if exact else draw(st.sampled_from([8, 7]))
-    part = draw(st.integers(1, denominator - 1)) / denominator
-    room = 2.0 ** floor(log2(2 * min(part, 1 - part)))
-    return length, (part * length, draw(gaps()) * room * length)
-
-
-def _graph(draw: DrawFn, length: float, *, left: bool = True, slopes: bool = True) -> Chain:
-    """Draw a master that is a graph with slopes up to 45° besides the segment from (0, 0) to (length, 0).
-
-    A point over that segment, no farther from it than from its ends, is nearer to it than to all others.
-    """
-    right_to_left: Points = [(length, 0.0), (0.0, 0.0)]
-    for size, slope in draw(_NEIGHBOURS):
-        x, y = right_to_left[0]
-        right_to_left.insert(0, (x + size, y + size * slope * slopes))
-    for size, slope in draw(_NEIGHBOURS) if left else ():
-        x, y = right_to_left[-1]
-        right_to_left.append((x - size, y + size * slope * slopes))
-    return Chain(np.array(right_to_left))
-
-
-_SKETCHES: dict[str, SearchStrategy[Sketch]] = {
-    "inside a segment": inside(),
-    "first of several segments": one_of_several("first"),
-    "intermediate of several segments": one_of_several("intermediate"),
-    "last of several segments": one_of_several("last"),
-    "node hit exactly": node_hit(),
-    "coincident nodes": coincident_nodes(),
-    "convex vertex": vertex("convex vertex"),
-    "concave vertex": vertex("concave vertex"),
-    "master angle below 90°": vertex("master angle below 90°"),
-    "equidistant from three segments": three_segments(),
-    "equidistant from three nodes": three_nodes(),
-    "free end hit exactly": free_end(),
-    "past a free end, inside τ": past_end("past a free end, inside τ"),
-    "past a free end, outside τ": past_end("past a free end, outside τ"),
-    "overlap going to zero": small_overlap(),
-    "edge-on, 89.9°": angle("edge-on, 89.9°", 89.9),
-    "edge-on, 90°": angle("edge-on, 90°", 90.0),
-    "from behind": angle("from behind", 180.0),
-    "second body behind": second_body(),
-    "closing segment": closing_segment(),
-    "nearest node not on nearest segment": other_node(),
+_MAKERS = {
+    "inside a segment": _inside,
+    "first of several segments": _one_of_several,
+    "intermediate of several segments": _one_of_several,
+    "last of several segments": _one_of_several,
+    "node hit exactly": _node_hit,
+    "coincident nodes": _coincident_nodes,
+    "convex vertex": _vertex,
+    "concave vertex": _vertex,
+    "master angle below 90°": _vertex,
+    "equidistant from three segments": _three_segments,
+    "equidistant from three nodes": _three_nodes,
+    "free end hit exactly": _free_end,
+    "past a free end, inside τ": _past_end,
+    "past a free end, outside τ": _past_end,
+    "overlap going to zero": _small_overlap,
+    "edge-on, 89.9°": partial(_angle, degrees=89.9),
+    "edge-on, 90°": partial(_angle, degrees=90.0),
+    "from behind": partial(_angle, degrees=180.0),
+    "second body behind": _second_body,
+    "closing segment": _closing_segment,
+    "nearest node not on nearest segment": _other_node,
 }
-KINDS = tuple(_SKETCHES)
+KINDS = tuple(_MAKERS)
 _NEAR = st.integers(1, 20).map(lambda k: ldexp(1.0, -k))
 _FEET = st.one_of(  # ξ on the master segment: inside, at a node, near one, and past one by less or more than τ.
     st.integers(1, 6).map(lambda sevenths: sevenths / 7),
@@ -480,7 +435,7 @@ _DEGREES = st.sampled_from([*[0.0] * 6, *[5.0, -20.0, 45.0] * 2, 89.9, 90.0, 180
 @cache
 def cases_of_kind(kind: str) -> SearchStrategy[Case]:
     """Return cases of one kind; the parameters "probe_segment" and "probe_c" name the slave point of this kind."""
-    return sketch_cases(_SKETCHES[kind])
+    return _sketch_cases(_MAKERS[kind](kind))
 
 
 @overload
@@ -512,7 +467,7 @@ def _states(draw: DrawFn, interface: Interface) -> Case:
     """
     slave_segment = draw(st.integers(0, len(interface.slave) - 1))
     home = draw(st.integers(0, len(interface.master) - 1))
-    c, xi, gap, degrees = draw(st.sampled_from(ROUND_PLACES)), draw(_FEET), draw(gaps()), draw(_DEGREES)
+    c, xi, gap, degrees = draw(_ROUND_C), draw(_FEET), draw(_GAPS), draw(_DEGREES)
     if draw(st.booleans()):
         xi = 1 - xi
     penalty, seed = draw(penalties()), draw(seeds())
@@ -539,11 +494,7 @@ def _set_point(
     target = first + foot[1] * along + gap * np.array([along[1], -along[0]])
     slave, c = positions[: interface.n_slave_nodes], point[1]
     a, b = slave[interface.slave.segments[point[0]]]
-    slave[:] = (slave - ((1 - c) / 2 * a + (1 + c) / 2 * b)) @ _turn(b - a, -along, degrees).T + target
+    angle = np.arctan2(-along[1], -along[0]) - np.arctan2(*(b - a)[::-1]) + np.radians(degrees)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    slave[:] = (slave - ((1 - c) / 2 * a + (1 + c) / 2 * b)) @ turn.T + target
     return positions
-
-
-def _turn(before: FloatArray, after: FloatArray, degrees: float) -> FloatArray:
-    """Return the rotation (2, 2) that turns one direction into another, and by some degrees more."""
-    angle = np.arctan2(after[1], after[0]) - np.arctan2(before[1], before[0]) + np.radians(degrees)
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
