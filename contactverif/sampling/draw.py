@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import cast
 
 from hypothesis.strategies import SearchStrategy
@@ -74,10 +75,6 @@ class Sampling:
         """Return what properties have in common if their cases are the same: the seed, and what makes them."""
         return self.key(question), question.bodies
 
-    def block_name(self, question: Property) -> str:
-        """Return the name of the cases of a property in a journal."""
-        return f"{self.key(question)} {'bodies' if question.bodies else 'interfaces'}"
-
 
 def strategy_name(question: Property) -> str:
     """Return the stored name of the strategy of a property (`random_source`), or else the id of the property.
@@ -136,7 +133,7 @@ def draw_block(
     size = min(BLOCK, examples - past)
     draws = _draw_block(source, seed, number, size, _counted_from(past, report))
     if draws is None:
-        return _draw_with_engine(source, seed=seed, examples=examples, progress=report)
+        return _draw_with_engine(source, seed, examples, report)
     short = len(draws) < size
     return PlannedCases(tuple(draw.case for draw in draws), short, short or past + size == examples)
 
@@ -152,7 +149,7 @@ def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> C
         return source[number]
     draws = _block_of(source, seed, examples, number)
     if draws is None:
-        return _draw_with_engine(source, seed=seed, examples=examples, progress=lambda _: None).cases[number]
+        return _draw_with_engine(source, seed, examples, lambda _: None).cases[number]
     return draws[number % BLOCK].case
 
 
@@ -187,14 +184,12 @@ def shrink(
         strategies = _strategies_in_turn(source)
         _, strategy = strategies[first % len(strategies)]
         shrink_choices(strategy, draws[first % BLOCK].stored_choices(), seed=seed, fails=fails, limit=limit)
-    elif isinstance(source, Mapping):
-        parts = _draw_each_kind(source, seed=seed, examples=examples, progress=lambda _: None)
-        n, place = _deal(parts)[first]
-        kind, share = _shares(source, examples)[n]
-        strategy = _strategy_of_kind(source, kind)
-        shrink_drawn(strategy, seed=f"{seed}/{kind}", examples=share, first=place, fails=fails, limit=limit)
-    else:
-        shrink_drawn(source, seed=seed, examples=examples, first=first, fails=fails, limit=limit)
+        return
+    parts = _parts(source, seed, examples)
+    n, place = 0, first
+    if len(parts) > 1:
+        n, place = _deal([draw_all(*part, progress=lambda _: None)[0] for part in parts])[first]
+    shrink_drawn(*parts[n], first=place, fails=fails, limit=limit)
 
 
 def check_names(cases: Sequence[Case]) -> None:
@@ -206,7 +201,7 @@ def check_names(cases: Sequence[Case]) -> None:
 
 
 def _block_of(source: RandomSource, seed: str, examples: int, number: int) -> list[Draw] | None:
-    """Return the block that the case with this number belongs to; None if hypothesis' engine draws it."""
+    """Return the block of the case with this number; None if hypothesis' engine draws it."""
     block = number // BLOCK
     return _draw_block(source, seed, block, min(BLOCK, examples - block * BLOCK), lambda _: None)
 
@@ -242,56 +237,42 @@ def _counted_from(past: int, progress: Callable[[int], None]) -> Callable[[int],
 
 
 def _strategies_in_turn(source: RandomSource) -> list[tuple[str, SearchStrategy[Case]]]:
-    """Return each kind and its strategy; one without a name if there are no kinds."""
+    """Return each kind and its strategy; one without a name if there are no kinds. A case without a kind gets its."""
+
+    def name_kind(kind: str, case: Case) -> Case:
+        return case if case.kind else replace(case, kind=kind)
+
     if isinstance(source, Mapping):
-        return [(kind, _strategy_of_kind(source, kind)) for kind in source]
+        return [(kind, strategy.map(partial(name_kind, kind))) for kind, strategy in source.items()]
     return [("", source)]
 
 
-def _draw_with_engine(
-    source: RandomSource, *, seed: str, examples: int, progress: Callable[[int], None]
-) -> PlannedCases:
-    """Return all cases, drawn by hypothesis' engine."""
-    if not isinstance(source, Mapping):
-        return PlannedCases(*draw_all(source, seed=seed, examples=examples, progress=progress))
-    parts = _draw_each_kind(source, seed=seed, examples=examples, progress=progress)
-    complete = zip(parts, _shares(source, examples), strict=True)
-    return PlannedCases(
-        tuple(parts[n].cases[place] for n, place in _deal(parts)),
-        exhausted=all(part.exhausted or len(part.cases) == share for part, (_, share) in complete),
-    )
+def _parts(source: RandomSource, seed: str, examples: int) -> list[tuple[SearchStrategy[Case], str, int]]:
+    """Return the strategy of each kind, its seed, and its number of cases, equal up to one, for hypothesis' engine."""
+    kinds = _strategies_in_turn(source)
+    least, more = divmod(examples, len(kinds))
+    parts = [
+        (strategy, f"{seed}/{kind}" if kind else seed, least + (place < more))
+        for place, (kind, strategy) in enumerate(kinds)
+    ]
+    return [part for part in parts if part[2]]
 
 
-def _draw_each_kind(
-    strategies: Mapping[str, SearchStrategy[Case]], *, seed: str, examples: int, progress: Callable[[int], None]
-) -> list[PlannedCases]:
-    """Return the cases of each kind that gets any."""
-    parts: list[PlannedCases] = []
-    for kind, share in _shares(strategies, examples):
-        past = sum(len(part.cases) for part in parts)
-        strategy = _strategy_of_kind(strategies, kind)
-        report = _counted_from(past, progress)
-        part = draw_all(strategy, seed=f"{seed}/{kind}", examples=share, progress=report)
-        parts.append(PlannedCases(*part))
-    return parts
+def _draw_with_engine(source: RandomSource, seed: str, examples: int, progress: Callable[[int], None]) -> PlannedCases:
+    cases: list[tuple[Case, ...]] = []
+    complete = True
+    for strategy, own_seed, share in _parts(source, seed, examples):
+        report = _counted_from(sum(map(len, cases)), progress)
+        part, exhausted = draw_all(strategy, own_seed, share, progress=report)
+        cases.append(part)
+        complete &= exhausted or len(part) == share
+    return PlannedCases(tuple(cases[n][place] for n, place in _deal(cases)), complete)
 
 
-def _deal(parts: Sequence[PlannedCases]) -> list[tuple[int, int]]:
+def _deal(parts: Sequence[tuple[Case, ...]]) -> list[tuple[int, int]]:
     """Return (part, place in it) of all cases in the order of a run: the first of each part, then the second, ….
 
     So the first cases of a run are of all kinds.
     """
-    most = max((len(part.cases) for part in parts), default=0)
-    return [(n, place) for place in range(most) for n, part in enumerate(parts) if place < len(part.cases)]
-
-
-def _strategy_of_kind(strategies: Mapping[str, SearchStrategy[Case]], kind: str) -> SearchStrategy[Case]:
-    """Return the strategy of a kind; a case that names no kind gets this one."""
-    return strategies[kind].map(lambda case: case if case.kind else replace(case, kind=kind))
-
-
-def _shares(kinds: Mapping[str, object], examples: int) -> list[tuple[str, int]]:
-    """Return each kind with its number of cases, equal up to one; kinds that get none are left out."""
-    least, more = divmod(examples, len(kinds))
-    shares = [(kind, least + (place < more)) for place, kind in enumerate(kinds)]
-    return [(kind, share) for kind, share in shares if share]
+    most = max(map(len, parts), default=0)
+    return [(n, place) for place in range(most) for n, part in enumerate(parts) if place < len(part)]

@@ -45,9 +45,8 @@ def one_thread() -> AbstractContextManager[Any]:
     return context
 
 
-@cache
+@cache  # To look for the libraries that are loaded takes some milliseconds.
 def _blas() -> Any:
-    """Return what knows the libraries that are loaded; to look for them takes some milliseconds."""
     import_module("scipy.linalg")  # It brings a BLAS of its own, which would not be found later.
     return ThreadpoolController()
 
@@ -160,7 +159,7 @@ class _Context(BuildContext):
     """The test that strategies draw for. It remembers nothing, because no case is described in words."""
 
     def record_call(self, *_: Any, **__: Any) -> None:
-        """Forget how an object was made."""
+        pass
 
 
 class _RandomChoices(ConjectureData):
@@ -183,7 +182,6 @@ class _RandomChoices(ConjectureData):
         return tuple(self._choices)
 
     def draw(self, strategy: Any, label: int | None = None, observe_as: str | None = None) -> Any:
-        """Draw from a strategy, without a record of which choices belong to it."""
         checked = self._checked.get(id(strategy))
         if checked is None:
             strategy.validate()
@@ -201,16 +199,14 @@ class _RandomChoices(ConjectureData):
         finally:
             self.depth -= 1
 
+    # It records neither spans nor labels.
     def start_span(self, label: int) -> None:
-        """Count the depth alone."""
         self.depth += 1
 
     def stop_span(self, *, discard: bool = False) -> None:
-        """Count the depth alone."""
         self.depth -= 1
 
     def track_arg_label(self, label: str) -> Any:
-        """Record nothing."""
         return _NO_LABELS
 
     def draw_boolean(self, p: float = 0.5, *, forced: bool | None = None, observe: bool = True) -> bool:
@@ -247,7 +243,6 @@ class _RandomChoices(ConjectureData):
         return value
 
     def _draw_narrow(self, least: int, most: int, simplest: int) -> int:
-        """Return an integer of a narrow range: any, the last one from this range, or the simplest."""
         range_ = least, most
         if self._p_repeat and range_ in self._past and self._between_0_and_1() < self._p_repeat:
             return self._past[range_]
@@ -257,18 +252,15 @@ class _RandomChoices(ConjectureData):
         self._past[range_] = value
         return value
 
-    def _draw(self, choice_type: Any, constraints: Any, *, observe: bool, forced: Any) -> Any:
-        """Return a float, a text or bytes."""
-        value = forced
-        if forced is None:
-            value = getattr(self.provider, f"draw_{choice_type}")(**constraints)
+    def _draw(self, choice_type: Any, constraints: Any, *, observe: bool, forced: Any) -> Any:  # Float, text or bytes.
+        value = getattr(self.provider, f"draw_{choice_type}")(**constraints) if forced is None else forced
         if observe:
             self._choices.append(value)
         return value
 
 
 def draw_all(
-    strategy: SearchStrategy[Case], *, seed: str, examples: int, progress: Callable[[int], None]
+    strategy: SearchStrategy[Case], seed: str, examples: int, *, progress: Callable[[int], None]
 ) -> tuple[tuple[Case, ...], bool]:
     """Return different cases that the engine draws, and whether the strategy has no others; it may have fewer."""
     cases: list[Case] = []
@@ -297,7 +289,7 @@ def shrink_choices(strategy: SearchStrategy[Case], choices: bytes, *, seed: str,
 
 
 def shrink_drawn(
-    strategy: SearchStrategy[Case], *, seed: str, examples: int, first: int, fails: Fails, limit: int
+    strategy: SearchStrategy[Case], seed: str, examples: int, *, first: int, fails: Fails, limit: int
 ) -> None:
     """Shrink the case with the number `first` of those of `draw_all`. The cases before it are drawn once more."""
     _shrink(strategy, _settings(examples, Phase.generate, Phase.shrink), first, seed=seed, fails=fails, limit=limit)
@@ -398,18 +390,16 @@ def reproducible() -> Iterator[None]:
     it. If a later version lacks the function that is replaced here, nothing is replaced, and the test of determinism
     shows whether that matters.
     """
-    name = "_get_local_constants"
+    name, none = "_get_local_constants", Constants()
     original = getattr(providers, name, None)
-    if original is None:
-        with one_thread():
+    with one_thread():
+        if original is None:
             yield
-        return
-    none = Constants()
-    setattr(providers, name, lambda: none)
-    providers.CONSTANTS_CACHE.cache.clear()
-    try:
-        with one_thread():
-            yield
-    finally:
-        setattr(providers, name, original)
+            return
+        setattr(providers, name, lambda: none)
         providers.CONSTANTS_CACHE.cache.clear()
+        try:
+            yield
+        finally:
+            setattr(providers, name, original)
+            providers.CONSTANTS_CACHE.cache.clear()

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache, partial
-from itertools import accumulate, cycle
+from itertools import cycle
 from typing import overload
 
 import numpy as np
@@ -68,18 +68,18 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
     the unit of z, before any rigid motion) and "direction" (2,) (unit vector, from the slave's first to its last node).
     There are none if the interface is not flat, or its slave is not over its master.
     """
-    return uniform_penetrations(_panels()) if interface is None else given_interface.flat_cases(interface)
+    return _uniform_penetrations(_panels()) if interface is None else given_interface.flat_cases(interface)
 
 
 @st.composite
-def uniform_penetrations(draw: DrawFn, panels: SearchStrategy[list[Sides]]) -> Case:
-    """Draw meshes and push the slave into the master by the same depth everywhere; the case is that of `flat_cases`."""
-    sides = draw(panels)
+def _uniform_penetrations(draw: DrawFn, sides: SearchStrategy[list[Sides]]) -> Case:
+    lines = draw(sides)
     quarters, unit = draw(_DEPTHS), draw(depth_units())
     motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
     slide, shuffle = draw(_SLIDES), draw(shuffles())
-    penetration = quarters / 4 * unit * min(shortest(_line(x)) for side in sides for x in side)
-    interface, z, along = assemble_panels([_panel(*side, penetration, slide) for side in sides], motion, shuffle)
+    penetration = quarters / 4 * unit * min(shortest(_line(x)) for line in lines for x in line)
+    panels = [Panel(_line(x, -penetration), _line(below[::-1]), _line(x + slide)) for x, below in lines]
+    interface, z, along = assemble_panels(panels, motion, shuffle)
     parameters = {"penetration": np.array(penetration * motion.scale), "along": along, "direction": motion.direction}
     return Case(interface, z, penalty, parameters, seed)
 
@@ -95,9 +95,7 @@ def _panels() -> SearchStrategy[list[Sides]]:
 def _places(
     refinement: int, repeats: int, slave: Sequence[float], master: Sequence[float], left: int, right: int, sevenths: int
 ) -> Sides:
-    """Return the ascending x of the nodes of a slave chain and of a master chain that covers it.
-
-    The master goes beyond the slave by `left` and `right`.
+    """Return a slave chain and a master chain that goes beyond it by `left` and `right`.
 
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.
@@ -115,10 +113,6 @@ def _places(
 
 def _line(x: FloatArray, height: float = 0.0) -> FloatArray:
     return np.column_stack([x, np.full(len(x), height)])
-
-
-def _panel(slave_x: FloatArray, master_x: FloatArray, penetration: float, slide: int) -> Panel:
-    return Panel(_line(slave_x, -penetration), _line(master_x[::-1]), _line(slave_x + slide))
 
 
 @random_source("contactverif.strategies.class_meshes.normal_cases", needs=OF_CLASS)
@@ -151,7 +145,7 @@ def overhung_cases(interface: Interface | None = None) -> SearchStrategy[Case] |
 
 def _cases(interface: Interface | None, *, midpoints: bool, least: int = 0) -> SearchStrategy[Case] | None:
     if interface is None:
-        return uniform_penetrations(_class_panels(midpoints, least))
+        return _uniform_penetrations(_class_panels(midpoints, least))
     states, direction = flat_cases(interface), given_interface.slave_direction(interface)
     if states is None or direction is None:
         return None
@@ -161,9 +155,8 @@ def _cases(interface: Interface | None, *, midpoints: bool, least: int = 0) -> S
 @cache
 def _class_panels(midpoints: bool, least: int) -> SearchStrategy[list[Sides]]:
     middles, overhang = _CARRIES if midpoints else st.just([0]), st.integers(least, _FURTHEST)
-    side = st.builds(
-        _class_places, _CLASS_REPEATS, lengths(), _CARRIES, middles, overhang, overhang, st.just(least > 0)
-    )
+    inner = st.just(least > 0)
+    side = st.builds(_class_places, _CLASS_REPEATS, lengths(), _CARRIES, middles, overhang, overhang, inner)
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
 
@@ -176,7 +169,7 @@ def _class_places(
     right: int,
     inner: bool,
 ) -> Sides:
-    """Return the ascending x of the nodes of a slave chain, and of a master chain made from it.
+    """Return a slave chain, and a master chain made from it.
 
     Where the master ends with the slave, their end nodes coincide. Where it goes beyond, one of its inner nodes may lie
     on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
@@ -240,14 +233,12 @@ def linear_flat_cases(draw: DrawFn) -> Case:
 def _slave_and_master(
     slave_lengths: list[int], master_lengths: list[int], offsets: list[int], slave_bits: int, master_bits: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the places of both surfaces' nodes along the line; the master goes beyond the slave by 1."""
-    end = float(sum(slave_lengths))
-    slave = _rounded_places([float(place) for place in accumulate(slave_lengths, initial=0)], offsets, 7, slave_bits)
-    inside = [float(place) for place in accumulate(master_lengths, initial=0) if place < end + 1]
-    return slave, _rounded_places([-1.0, *inside, end + 1], offsets, 13, master_bits)
+    """Return places along the line, moved by up to 1/16 and rounded; the master goes beyond the slave by 1."""
 
+    def place(x: FloatArray, over: int, bits: int) -> FloatArray:
+        moved = x + repeat_cyclically(offsets, len(x)) / over / 16
+        return np.round(moved * 2.0**bits) * 2.0**-bits
 
-def _rounded_places(places: list[float], offsets: list[int], over: int, fineness: int) -> FloatArray:
-    """Return the places, each moved by up to 1/16 and rounded to a multiple of 2^-fineness."""
-    moved = places + repeat_cyclically(offsets, len(places)) / over / 16
-    return np.round(moved * 2.0**fineness) * 2.0**-fineness
+    slave, master = ends_of(slave_lengths), ends_of(master_lengths)
+    end = slave[-1] + 1
+    return place(slave, 7, slave_bits), place(np.array([-1.0, *master[master < end], end]), 13, master_bits)

@@ -8,10 +8,10 @@ A formulation looks for contact at nodes, at points inside segments or on whole 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import cycle
+from itertools import cycle, pairwise
 from math import floor, log2
 
 import numpy as np
@@ -41,13 +41,12 @@ STEEPEST = 1e-3  # An edge seen at a smaller slope than this from a point counts
 SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the largest.
 
 
-def covered_start(start: float, slave: Sequence[float], width: float) -> float:
+def _covered_start(start: float, slave: Sequence[float], width: float) -> float:
     """Return where a slave of these lengths starts so that half of one of its segments lies between 0 and `width`.
 
-    Half of its first or last segment fits into the width. The start stays if half of some segment is covered there.
+    Half of its first or last segment fits into the width.
     """
-    x = start + ends_of(slave)
-    if any(True for _ in _covered_halves(x, 0.0, width)):
+    if _covered_halves(start + ends_of(slave), 0.0, width):
         return start
     if start >= 0:
         return min(start, width - slave[0] / 2)
@@ -55,11 +54,8 @@ def covered_start(start: float, slave: Sequence[float], width: float) -> float:
     return min(max(start, slave[-1] / 2 - total), width - total)
 
 
-def sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
-    """Return the slave (n, 2), lowered as a whole until half of a segment is below the line (m, 2) by `depth` or more.
-
-    Both run from left to right.
-    """
+def _sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
+    """Lower a slave (n, 2) until half of a segment is below the line (m, 2) by `depth`. Both run from left to right."""
     heights = []
     for left, right in _covered_halves(slave[:, 0], line[0, 0], line[-1, 0]):
         places = np.array([left, right, *line[(line[:, 0] > left) & (line[:, 0] < right), 0]])
@@ -70,7 +66,7 @@ def sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
     return slave - [0.0, float(on_lattice(np.array(lift + 2.0**-20)))]
 
 
-def radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outside: bool, closed: bool) -> float:
+def _radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outside: bool, closed: bool) -> float:
     """Return the factor for the distances of the slave (n, 2) from the origin by which half of a segment penetrates.
 
     The master's polygon (m, 2) is convex and runs counter-clockwise; its body is outside of it, or inside. The factor
@@ -92,13 +88,11 @@ def radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outsi
     return factor if SMALLEST < factor < 1 else 1.0  # A polygon beside the centre may have no place for a segment.
 
 
-def _covered_halves(x: FloatArray, begin: float, end: float) -> Iterator[tuple[float, float]]:
-    """Yield both halves of each segment between ascending places that lie between `begin` and `end`."""
-    for left, right in zip(x[:-1].tolist(), x[1:].tolist(), strict=True):
-        middle = (left + right) / 2
-        for half in ((left, middle), (middle, right)):
-            if begin <= half[0] and half[1] <= end:
-                yield half
+def _covered_halves(x: FloatArray, begin: float, end: float) -> list[tuple[float, float]]:
+    """Return the halves of segments between ascending places that lie between `begin` and `end`."""
+    pairs = [(left, right, (left + right) / 2) for left, right in pairwise(x.tolist())]
+    halves = [half for left, right, middle in pairs for half in ((left, middle), (middle, right))]
+    return [half for half in halves if begin <= half[0] and half[1] <= end]
 
 
 RADIUS = 4.0
@@ -130,7 +124,7 @@ class Ring:
         slave = on_lattice(reference + outward * depth[:, None]) + shift
         least, closed = min(self.unit * length / 4, RADIUS / 16), self.degrees == 360
         edges = master[::-1] if self.inner_slave else master
-        factor = radial_factor(slave, edges, least, outside=self.inner_slave, closed=closed)
+        factor = _radial_factor(slave, edges, least, outside=self.inner_slave, closed=closed)
         return Panel(slave * factor, master, reference, closed=closed)
 
     def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
@@ -141,15 +135,20 @@ class Ring:
         return points if inner else points[::-1]
 
 
-def rings() -> SearchStrategy[Ring]:
-    """Return arcs of 60° to 180°, and closed rings."""
+_DEPTH = st.one_of(depths(), depths(lowest=-6))
+
+
+def _rings() -> SearchStrategy[Ring]:
+    """Return arcs of 60° to 180°, and closed rings.
+
+    Each call makes another strategy, since `st.one_of` counts one that it has twice, or an equal one, only once.
+    """
     weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
     degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
-    depth = st.one_of(depths(), depths(lowest=-6))
-    return st.builds(Ring, weights, weights, degrees, st.booleans(), depth, depth_units())
+    return st.builds(Ring, weights, weights, degrees, st.booleans(), _DEPTH, depth_units())
 
 
-_RINGS = rings()
+_RINGS = _rings()
 
 
 @st.composite
@@ -217,7 +216,7 @@ class Broken:
             needed = max(self.slave[0], self.slave[-1]) / 2 + 2 * (length / 8)
             if line[-1, 0] < needed:
                 line = np.vstack([line, [needed + length / 8, line[-1, 1]]])
-            start = covered_start(start, self.slave, line[-1, 0] - length / 8)
+            start = _covered_start(start, self.slave, line[-1, 0] - length / 8)
         x = start + ends_of(self.slave)
         reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
@@ -227,7 +226,7 @@ class Broken:
         x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
         slave = np.column_stack([x, on_lattice(np.interp(x, *line.T)) + rise - depth])
-        return Panel(sink_below(slave, line, self.unit * length / 4), line[::-1], reference)
+        return Panel(_sink_below(slave, line, self.unit * length / 4), line[::-1], reference)
 
     def _master(self, offsets: Sequence[int]) -> FloatArray:
         """Return points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.
@@ -254,30 +253,25 @@ def _broken_lines() -> SearchStrategy[Broken]:
         st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
     )
     plain = lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
-    depth = st.one_of(depths(), depths(lowest=-6))
-    start = st.integers(-2, 2)
+    others = st.integers(-2, 2), _TILTS, _DEPTH, depth_units()
     return st.one_of(
-        st.builds(Broken, flat, st.just(0.0), lengths(), start, _TILTS, depth, depth_units()),
-        st.builds(Broken, bent, _BENDS, plain, start, _TILTS, depth, depth_units()),
+        st.builds(Broken, flat, st.just(0.0), lengths(), *others), st.builds(Broken, bent, _BENDS, plain, *others)
     )
 
 
 def _ledge(floor: Sequence[float], slave: Sequence[float], rise: int, quarters: Sequence[int], unit: float) -> Broken:
-    """Return a floor whose free end is an upright wall.
-
-    The slave begins on it with a long segment beyond the wall.
+    """Return a floor whose free end is an upright wall. The slave begins on it with a long segment beyond the wall.
 
     The area of competence of that segment's first quarter point goes past the wall: a walk ends edge-on.
     """
-    steps = [*((length, 0, 0) for length in floor), (0.0, rise, _WALL)]
-    end = int(sum(floor))
+    steps, end = [*((length, 0, 0) for length in floor), (0.0, rise, _WALL)], int(sum(floor))
     return Broken(steps, 0.0, [6.0, *slave], end - min(end, 2), 0.0, quarters, unit, upright=True)
 
 
 @cache
 def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
     """Return one or two panels; ledges, which are kinks, only if not smooth."""
-    shapes: list[SearchStrategy[Broken | Ring]] = [_broken_lines(), _broken_lines(), _broken_lines(), rings(), rings()]
+    shapes: list[SearchStrategy[Broken | Ring]] = [*[_broken_lines()] * 3, _rings(), _rings()]
     if not smooth:
         plain = lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
         shapes.append(st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), depths(), depth_units()))
@@ -325,7 +319,7 @@ def _facing(
     beside = np.concatenate([0.75 * x[:-1] + 0.25 * x[1:], 0.25 * x[:-1] + 0.75 * x[1:]])
     here, there = (np.interp(places, *slave.T) < np.interp(places, *line.T) for places in (x, beside))
     if not here[np.r_[: len(x) - 1, 1 : len(x)]][there].any():
-        slave = sink_below(slave, line, unit / 4 / 4)
+        slave = _sink_below(slave, line, unit / 4 / 4)
     return Panel(slave, line[::-1], np.column_stack([x, heights]))
 
 
@@ -337,7 +331,7 @@ def _on_bisector(
     x -= segments[0][0] * segments[0][1] / 4
     reach = 4 * x[-1]
     line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])
-    slave = sink_below(np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)]), line, unit / 4)
+    slave = _sink_below(np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)]), line, unit / 4)
     return Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
 
 

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import ONE_SIDED, STEEPEST_FACING, Interface, Surface, turns_of, ways_to_master
+from contactverif.contract.interface import (
+    ONE_SIDED,
+    STEEPEST_FACING,
+    TRIANGLE,
+    Interface,
+    Surface,
+    turns_of,
+    ways_to_master,
+)
 from contactverif.strategies.samples import OFFSETS, depth_units, depths, penalties, repeat_cyclically, seeds, shifts
 
-LEAST_LENGTH = 0.25  # A slave segment that is bent onto the master keeps this share of its length, seen along itself.
+# A slave segment or face that is bent onto the master keeps this share of its size, seen along itself or its normal.
+LEAST_SHARE = 0.25
 _QUARTERS = st.integers(1, 8)
 _ON = st.integers(0, 7)  # 0 is no offset
 _MODES = st.lists(st.integers(-8, 8), min_size=1, max_size=6)  # amplitudes of waves, in eighths
@@ -81,7 +92,7 @@ def states(interface: Interface, smooth: bool) -> SearchStrategy[Case]:
     The slave is bent onto the master, so that most of its nodes touch whatever the gap of the mesh is. Then all nodes
     move in waves, the slave is pushed as a whole until its deepest node penetrates, and a coprime offset is added.
     """
-    return _states(interface, close_gaps(interface), smooth)
+    return _states(interface, _close_gaps(interface), smooth)
 
 
 @st.composite
@@ -97,7 +108,11 @@ def _states(draw: DrawFn, interface: Interface, closed: FloatArray, smooth: bool
     for waves, part in ((slave_waves, slice(0, n_slave)), (master_waves, slice(n_slave, None))):
         positions[part] += depth / 4 * _waves(interface.nodes[part], waves)
     positions[:n_slave] += shifts(offsets, n_slave) / 2 * min(depth, shortest)
-    positions[:n_slave] += _push(interface, positions, depth)
+    # The slave is pushed until its deepest node penetrates. A node past the ends of the segment nearest to it counts
+    # only where none stands over one.
+    gaps, normals, over = _look(interface, positions, positions[:n_slave])
+    deepest = np.argmin(gaps + np.where(over, 0.0, interface.master.lengths(positions).sum()))
+    positions[:n_slave] += -(gaps[deepest] + depth) * normals[deepest]
     return Case(interface, positions.reshape(-1), penalty, {}, seed)
 
 
@@ -116,34 +131,36 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
     return displacement
 
 
-def close_gaps(interface: Interface) -> FloatArray:
-    """Return positions (n_nodes, 2) in which each slave node that sees the master lies on it.
+def _close_gaps(interface: Interface) -> FloatArray:
+    return _bend_slave(
+        interface,
+        *ways_to_master(interface),
+        lambda arms: np.hypot(*arms.T),
+        lambda nodes: np.diff(nodes[interface.slave.segments], axis=1)[:, 0],
+    )
 
-    Any other slave node moves as
-    the nearest node that sees the master. Where this would shorten a slave segment to less than
-    `LEAST_LENGTH` of its length or turn it too far, the slave stays as it is.
+
+def _bend_slave(
+    interface: Interface,
+    ways: FloatArray,
+    directions: FloatArray,
+    length: Callable[[FloatArray], FloatArray],
+    measure: Callable[[FloatArray], FloatArray],
+) -> FloatArray:
+    """Return positions (n_nodes, dim) in which each slave node that has a way (n_slave,) to the master lies on it.
+
+    Any other slave node moves as the nearest node that has one. Where this would shrink a segment or face to less than
+    `LEAST_SHARE` of its size, or turn it too far, the slave stays as it is. `length` is that of vectors (n, dim), and
+    `measure` gives the vector of each segment, or the normal of each face.
     """
     nodes, n_slave = interface.nodes, interface.n_slave_nodes
-    ways, normals = ways_to_master(interface)
-    facing = np.flatnonzero(np.isfinite(ways))
-    closed = nodes.copy()
+    facing, closed = np.flatnonzero(np.isfinite(ways)), nodes.copy()
     if len(facing):
-        nearest = [facing[np.argmin(np.hypot(*(nodes[facing] - node).T))] for node in nodes[:n_slave]]
-        closed[:n_slave] += ways[nearest, None] * normals[nearest]
-    before, after = (np.diff(positions[interface.slave.segments], axis=1)[:, 0] for positions in (nodes, closed))
-    kept = np.einsum("ij,ij->i", before, after) >= LEAST_LENGTH * np.einsum("ij,ij->i", before, before)
+        nearest = [facing[length(nodes[facing] - node).argmin()] for node in nodes[:n_slave]]
+        closed[:n_slave] += ways[nearest, None] * directions[nearest]
+    before, after = measure(nodes), measure(closed)
+    kept = np.einsum("ij,ij->i", before, after) >= LEAST_SHARE * np.einsum("ij,ij->i", before, before)
     return closed if kept.all() else nodes.copy()
-
-
-def _push(interface: Interface, positions: FloatArray, depth: float) -> FloatArray:
-    """Return the translation (2,) of the slave that brings its deepest node to the penetration `depth`.
-
-    A node past the ends of the segment nearest to it counts only where none stands over one.
-    """
-    gaps, normals, over = _look(interface, positions, positions[: interface.n_slave_nodes])
-    deepest = np.argmin(gaps + np.where(over, 0.0, interface.master.lengths(positions).sum()))
-    push: FloatArray = -(gaps[deepest] + depth) * normals[deepest]
-    return push
 
 
 def touches(interface: Interface, positions: FloatArray) -> bool:
@@ -174,7 +191,6 @@ def _look(interface: Interface, positions: FloatArray, points: FloatArray) -> tu
     return np.einsum("ij,ij->i", points - first[home], normals), normals, (foot >= 0) & (foot <= 1)
 
 
-LEAST_SHARE = 0.25  # A slave face that is bent onto the master keeps this share of its area, seen along its normal.
 _FACE_QUARTERS = st.integers(1, 4)  # The depth in quarters of a unit of the least height of a face.
 _WARPS = st.lists(st.integers(-4, 4), min_size=1, max_size=9)
 
@@ -223,24 +239,25 @@ def node_directions(surface: Surface, nodes: FloatArray) -> FloatArray:
 def close_surfaces(interface: Interface, directions: FloatArray) -> FloatArray:
     """Return positions (n_nodes, 3) in which each slave node that sees the master along its direction lies on it.
 
-    Any other slave node moves as the nearest node that does. Where this would shrink a slave face to less than
-    `LEAST_SHARE` of its area, seen along its normal, the slave stays as it is.
+    Any other slave node moves as the nearest node that does, unless that would shrink a slave face too much.
     """
-    nodes, n_slave = interface.nodes, interface.n_slave_nodes
-    ways = np.array([_way_along(interface, *pair) for pair in zip(nodes[:n_slave], directions, strict=True)])
-    facing = np.flatnonzero(np.isfinite(ways))
-    closed = nodes.copy()
-    if len(facing):
-        nearest = [facing[np.linalg.norm(nodes[facing] - node, axis=1).argmin()] for node in nodes[:n_slave]]
-        closed[:n_slave] += ways[nearest, None] * directions[nearest]
-    before, after = (turns_of(places[interface.slave.faces]).sum(axis=1) for places in (nodes, closed))
-    kept = np.einsum("fi,fi->f", before, after) >= LEAST_SHARE * np.einsum("fi,fi->f", before, before)
-    return closed if kept.all() else nodes.copy()
+    places = interface.nodes[: interface.n_slave_nodes]
+    ways = np.array([_way_along(interface, *pair) for pair in zip(places, directions, strict=True)])
+    return _bend_slave(
+        interface,
+        ways,
+        directions,
+        lambda arms: np.sqrt((arms**2).sum(axis=1)),
+        lambda nodes: turns_of(nodes[interface.slave.faces]).sum(axis=1),
+    )
 
 
 def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -> float:
     """Return the shortest way, forwards or backwards, from a point (3,) to a master face that faces it, or infinity."""
-    corners = interface.nodes[_triangles(interface.master.faces)]
+    faces = interface.master.faces  # Quadrilaterals are cut along their first diagonal.
+    if faces.shape[1] != TRIANGLE:
+        faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    corners = interface.nodes[faces]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     turns = np.cross(first, second)
     falls = turns @ direction
@@ -251,8 +268,3 @@ def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -
     ways = -np.einsum("fi,fi->f", turns, arms) / falls
     ways = ways[(s >= 0) & (t >= 0) & (s + t <= 1)]
     return float(ways[np.abs(ways).argmin()]) if len(ways) else np.inf
-
-
-def _triangles(faces: IntArray) -> IntArray:
-    """Return triangles (n, 3) in place of quadrilaterals, cut along their first diagonal."""
-    return faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

@@ -13,7 +13,7 @@ the vertex or the slave point is the origin.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import cos, floor, hypot, ldexp, log2, radians, sin
@@ -232,11 +232,10 @@ def _one_of_several(draw: DrawFn, kind: str) -> Sketch:
     c = draw(st.sampled_from({"first": (0.5, 1.0), "intermediate": (0.0, -0.5, 0.5), "last": (-0.5, -1.0)}[role]))
     # Master nodes lie at odd sixteenths of the slave segment, and the point at an eighth.
     here = round(8 * (1 + c))
-    sides = st.integers(0, here // 2 - 1), st.integers(here // 2, 7)  # To the left of the point, and to its right
-    counts = {"first": [(2, 3), None], "intermediate": [(1, 2), (1, 2)], "last": [None, (2, 3)]}[role]
-    odd = []
-    for places, count in zip(sides, counts, strict=True):
-        odd += draw(st.lists(places, min_size=count[0], max_size=count[1], unique=True)) if count else []
+    fewest, odd = 1 if role == "intermediate" else 2, list[int]()
+    for side, places in (("first", (0, here // 2 - 1)), ("last", (here // 2, 7))):  # Left of the point, and right of it
+        if role in (side, "intermediate"):
+            odd += draw(st.lists(st.integers(*places), min_size=fewest, max_size=fewest + 1, unique=True))
     beyond = draw(st.tuples(st.sampled_from([0.25, 1.0]), st.sampled_from([0.25, 1.0])))
     nodes = [-beyond[0], *((2 * k + 1) / 16 for k in sorted(odd)), 1 + beyond[1]]
     before, after = draw(st.integers(0, 1)), draw(st.integers(0, 1))
@@ -396,7 +395,7 @@ def _at_origin(draw: DrawFn, kind: str, line: Sequence[Point]) -> Sketch:
     return _sketch(kind, [_upper_side(line)], (0.0, 0.0), draw(_C), draw(_slave_steps(0.5)), exact=True)
 
 
-_MAKERS = {
+_MAKERS: dict[str, Callable[[str], SearchStrategy[Sketch]]] = {
     "inside a segment": _inside,
     "first of several segments": _one_of_several,
     "intermediate of several segments": _one_of_several,

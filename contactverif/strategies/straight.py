@@ -7,10 +7,10 @@ Each rule for gaps sees the same straight line or plane opposite. Everything sta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 from itertools import cycle
-from math import ceil, ldexp, log2
+from math import ceil, log2
 
 import numpy as np
 from hypothesis import strategies as st
@@ -18,7 +18,6 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
-from contactverif.problems.flat_states import rotation
 from contactverif.strategies.panel_chains import Chain, assemble_chains, on_lattice
 from contactverif.strategies.projection_situations import exact_turns
 from contactverif.strategies.samples import (
@@ -31,7 +30,7 @@ from contactverif.strategies.samples import (
     seeds,
     shuffles,
 )
-from contactverif.strategies.surfaces import surface_pairs
+from contactverif.strategies.surfaces import SpaceMotion, surface_pairs
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
 _SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.
@@ -112,8 +111,7 @@ def cases_over_a_body(draw: DrawFn) -> Case:
 def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return slave, flat master and slave reference in walking order, and a length larger than all depths."""
     x = ends_of(draw(_SLAVE))
-    shortest = float((x[1:] - x[:-1]).min())
-    shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) * shortest
+    shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) * float((x[1:] - x[:-1]).min())
     depth = shallow + (slope * (x - x[0]) if slope > 0 else slope * (x - x[-1]))
     # Lines along the slave's normal meet the master less than one depth aside; two depths keep off the corners.
     reach = float(ceil(2 * depth.max()) + 1)
@@ -137,12 +135,10 @@ def _cover(steps: Sequence[float], start: float, end: float) -> FloatArray:
 def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, reference: FloatArray, **others: FloatArray) -> Case:
     """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
     motion, penalty, seed, shuffle = draw(exact_turns()), draw(penalties()), draw(seeds()), draw(shuffles())
-    chains = [Chain(slave)], [Chain(master)], [Chain(reference)]
-    interface, order = assemble_chains(*chains, motion.scale, shuffle)
-    parameters = {}
-    for name, points in others.items():
-        moved = motion(points)
-        parameters[name] = moved[order].reshape(-1) if len(points) == len(order) and name == "bent" else moved
+    interface, order = assemble_chains([Chain(slave)], [Chain(master)], [Chain(reference)], motion.scale, shuffle)
+    parameters = {name: motion(points) for name, points in others.items()}
+    if "bent" in parameters:  # The positions of all nodes
+        parameters["bent"] = parameters["bent"][order].reshape(-1)
     return Case(interface, motion(np.vstack([slave, master])[order]).reshape(-1), penalty, parameters, seed)
 
 
@@ -154,33 +150,14 @@ _PARTS = st.integers(-2, 2)
 _HEIGHTS = st.sampled_from([-3.0, 1.0, -5.0, 3.0])
 
 
-@dataclass(frozen=True, slots=True)
-class ExactSpaceTurn:
-    """A similarity x → 2^k (W x + shift) with a turn W of integers, so that lattice points are not rounded."""
-
-    quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
-    shift: tuple[int, int, int] = (0, 0, 0)
-    exponent: int = 0
-
-    @property
-    def scale(self) -> float:
-        """The factor of all lengths, an integer × 2^k."""
-        return ldexp(float(sum(part * part for part in self.quaternion)), self.exponent)
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the points (n, 3), moved."""
-        rows, _ = rotation(self.quaternion)
-        return np.ldexp(points @ np.array(rows, dtype=np.float64).T + self.shift, self.exponent)
-
-
 @cache
-def _exact_space_turns() -> SearchStrategy[ExactSpaceTurn]:
+def _exact_space_turns() -> SearchStrategy[SpaceMotion]:
     """Return rest, or exact similarities with offsets up to 2^16 and scales 2^±20."""
     place = st.one_of(st.integers(-64, 64), st.integers(-(2**16), 2**16))
     exponent = st.one_of(st.just(0), st.integers(-20, 20))
     quaternion = st.tuples(st.integers(1, 3), _PARTS, _PARTS, _PARTS)
-    turns = st.builds(ExactSpaceTurn, quaternion, st.tuples(place, place, place), exponent)
-    return st.one_of(st.just(ExactSpaceTurn()), turns, turns)
+    turns = st.builds(partial(SpaceMotion, whole=True), quaternion, st.tuples(place, place, place), exponent)
+    return st.one_of(st.just(SpaceMotion(whole=True)), turns, turns)
 
 
 @random_source("contactverif.strategies.surfaces.plane_slaves.tilted_plane_cases")
@@ -203,7 +180,7 @@ def plane_cases_by_a_plate(draw: DrawFn) -> Case:
     return replace(case, parameters={"behind": turn(plate)})
 
 
-def _tilted_plane(draw: DrawFn) -> tuple[Case, ExactSpaceTurn]:
+def _tilted_plane(draw: DrawFn) -> tuple[Case, SpaceMotion]:
     """Return a case, and the similarity that took it where it is."""
     pair = draw(surface_pairs(same_domain=False, stretched=False, most=4))
     slopes, quarters = (draw(_SLOPES), draw(_SLOPES)), draw(_SIXTEENTHS_OF_DEPTH)

@@ -28,37 +28,33 @@ from contactverif.strategies.translations import FINENESS, FURTHEST
 
 @dataclass(frozen=True, slots=True)
 class SpaceMotion:
-    """A rigid motion after a scaling. The rotation is that of a quaternion of integers."""
+    """A similarity x → 2^k (Q x + shift). The rotation Q is that of a quaternion of integers.
+
+    A whole one leaves Q undivided, a matrix of integers that stretches too: so it rounds no point of a lattice.
+    """
 
     quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
     shift: tuple[int, int, int] = (0, 0, 0)  # In units of the lattice.
     exponent: int = 0
+    whole: bool = False
 
     @property
     def scale(self) -> float:
-        """The factor 2^k of all lengths."""
-        return ldexp(1.0, self.exponent)
-
-    @property
-    def matrix(self) -> FloatArray:
-        """The rotation Q (3, 3), each entry a rational rounded once."""
-        rows, size = rotation(self.quaternion)
-        return np.array(rows) / size
+        """The factor of all lengths: 2^k, or an integer × 2^k."""
+        return ldexp(float(rotation(self.quaternion)[1] if self.whole else 1), self.exponent)
 
     @property
     def normal(self) -> FloatArray:
         """The unit vector (3,) that the z-axis becomes."""
-        return self.matrix[:, 2].copy()
+        rows, size = rotation(self.quaternion)
+        return np.array(rows)[:, 2] / size
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
         rows, size = rotation(self.quaternion)
         turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
-        moved = turned / np.longdouble(size) + np.array(self.shift, dtype=np.longdouble)
-        return (moved * self.scale).astype(np.float64)
-
-
-REST = SpaceMotion()
+        moved = turned / np.longdouble(1 if self.whole else size) + np.array(self.shift, dtype=np.longdouble)
+        return (moved * ldexp(1.0, self.exponent)).astype(np.float64)
 
 
 @cache
@@ -67,7 +63,8 @@ def space_motions(*, furthest: int = 64, exponents: int = 20) -> SearchStrategy[
     part, place = st.integers(-4, 4), st.integers(-furthest, furthest)
     quaternion = st.tuples(st.integers(1, 5), part, part, part)
     exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))
-    return st.one_of(st.just(REST), st.builds(SpaceMotion, quaternion, st.tuples(place, place, place), exponent))
+    motions = st.builds(SpaceMotion, quaternion, st.tuples(place, place, place), exponent)
+    return st.one_of(st.just(SpaceMotion()), motions)
 
 
 MOST_CELLS = 6  # The most cells along a side.
@@ -148,10 +145,11 @@ class SurfacePair:
 
     slave: SurfaceGrid
     master: SurfaceGrid
-    same_domain: bool  # The master covers the slave's square exactly; else [−1/2, 3/2]², turned about its middle.
-    degrees: int  # The turn of a larger master.
+    same_domain: bool  # The master covers the slave's square exactly; else [−1/2, 3/2]².
+    degrees: int  # The turn of a larger master about its middle.
     stretch: int  # Coordinates across are multiplied by 2^-stretch.
     shuffle: int  # The numbering of nodes and faces; 0 for that of the grids.
+    matched: bool = False  # A larger master has the slave's nodes and a ring of others, so that nodes lie on nodes.
 
     def lay_out(self) -> tuple[Interface, FloatArray, FloatArray]:
         """Return the interface, the plane coordinates (n_nodes, 2) of its nodes, and the corners of the slave's domain.
@@ -159,51 +157,39 @@ class SurfacePair:
         The slave's body is above, so that its faces are seen from below.
         """
         factors = np.array([1.0, 2.0**-self.stretch])
-        slave, master = self.slave.points(), self._master_points()
-        plane = np.vstack([slave, master]) * factors
+        slave = self.slave.points()
+        plane = np.vstack([slave, self._master_points(slave)]) * factors
         faces = [self.slave.faces()[:, ::-1], self.master.faces() + len(slave)]
-        plane, faces = self._renumber(plane, faces, len(slave))
+        if self.shuffle:
+            random, n_slave = np.random.default_rng(self.shuffle), len(slave)
+            order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(len(plane) - n_slave)])
+            number = np.argsort(order)  # The new number of each node.
+            plane, faces = (
+                plane[order],
+                [
+                    np.array([np.roll(row, int(random.integers(len(row)))) for row in random.permutation(number[side])])
+                    for side in faces
+                ],
+            )
         nodes = np.column_stack([plane, np.zeros(len(plane))])
         return Interface(nodes, Surface(faces[0]), Surface(faces[1])), plane, _SQUARE * factors
 
-    def _master_points(self) -> FloatArray:
+    def _master_points(self, slave: FloatArray) -> FloatArray:
         """Return the master's nodes (n, 2) before the stretch."""
+        if self.matched and self.same_domain:
+            return slave
+        if self.matched:
+            columns = slave.reshape(self.slave.columns + 1, -1, 2)
+            points = np.pad(columns, ((1, 1), (1, 1), (0, 0)), mode="edge")
+            points[[0, -1], :, 0] = [[-0.5], [1.5]]
+            points[:, [0, -1], 1] = [-0.5, 1.5]
+            return points.reshape(-1, 2)
         points = self.master.points()
         if self.same_domain:
             return points
         angle = np.deg2rad(self.degrees)
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         return on_lattice((2 * points - 1) @ turn + 0.5)
-
-    def _renumber(self, plane: FloatArray, faces: list[IntArray], n_slave: int) -> tuple[FloatArray, list[IntArray]]:
-        """Return places (n_nodes, 2) and faces of both sides in other numbers, as the shuffle says."""
-        if not self.shuffle:
-            return plane, faces
-        random = np.random.default_rng(self.shuffle)
-        order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(len(plane) - n_slave)])
-        number = np.argsort(order)  # The new number of each node.
-        return plane[order], [
-            np.array([np.roll(row, int(random.integers(len(row)))) for row in random.permutation(number[side])])
-            for side in faces
-        ]
-
-
-@dataclass(frozen=True, slots=True)
-class MatchedPair(SurfacePair):
-    """A slave grid and a master grid with the same faces, and with a ring of more faces unless the domain is the same.
-
-    So each master node over the slave lies on a slave node.
-    """
-
-    def _master_points(self) -> FloatArray:
-        """Return the master's nodes (n, 2) before the stretch."""
-        points = self.slave.points()
-        if self.same_domain:
-            return points
-        points = np.pad(points.reshape(self.slave.columns + 1, -1, 2), ((1, 1), (1, 1), (0, 0)), mode="edge")
-        points[[0, -1], :, 0] = [[-0.5], [1.5]]
-        points[:, [0, -1], 1] = [-0.5, 1.5]
-        return points.reshape(-1, 2)
 
 
 @cache
@@ -224,18 +210,18 @@ def surface_pairs(
     grids = surface_grids(most=most, faces=faces, straight=straight)
     stretches = _STRETCHES if stretched else st.just(0)
 
-    def pair(slave: SurfaceGrid, master: SurfaceGrid, same: bool, *others: int) -> SurfacePair:
-        return SurfacePair(slave, master, same or master.straight, *others)
+    def pair(
+        slave: SurfaceGrid, master: SurfaceGrid, same: bool, degrees: int, stretch: int, shuffle: int
+    ) -> SurfacePair:
+        return SurfacePair(slave, master, same or master.straight, degrees, stretch, shuffle)
 
     return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, shuffles())
 
 
 @cache
-def matched_pairs() -> SearchStrategy[SurfacePair]:
-    """Return pairs with master nodes on slave nodes; half of them share their domain, and half do not."""
-
+def _matched_pairs() -> SearchStrategy[SurfacePair]:
     def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
-        return MatchedPair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number)
+        return SurfacePair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number, matched=True)
 
     return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, shuffles())
 
@@ -268,7 +254,7 @@ def skewed_surface_cases(
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")
 def matched_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases as `flat_surface_cases` does, with each master node over the slave on a slave node."""
-    return _flat_states(matched_pairs()) if interface is None else None
+    return _flat_states(_matched_pairs()) if interface is None else None
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.overhung_surface_cases")
@@ -312,9 +298,8 @@ def surface_cases(
 
     On an interface of the user they are states of this.
     """
-    if interface is not None:
-        return given_surface_states(interface, smooth=False)
-    return _tilted_states(surface_pairs(faces=faces), smooth=False)
+    own = _tilted_states(surface_pairs(faces=faces), smooth=False)
+    return own if interface is None else given_surface_states(interface, smooth=False)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
@@ -325,9 +310,8 @@ def smooth_surface_cases(
 
     On an interface of the user they are states of this.
     """
-    if interface is not None:
-        return given_surface_states(interface, smooth=True)
-    return _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
+    own = _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
+    return own if interface is None else given_surface_states(interface, smooth=True)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
