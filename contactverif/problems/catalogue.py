@@ -60,13 +60,7 @@ class NamedBlocks(NamedScene):
 
 
 BLOCKS: Mapping[str, NamedBlocks] = {
-    "a1": NamedBlocks(
-        "two slave segments over one master segment",
-        "case test A1, Fig. 8",
-        _MATERIAL,
-        [2, 2],
-        [4],
-    ),
+    "a1": NamedBlocks("two slave segments over one master segment", "case test A1, Fig. 8", _MATERIAL, [2, 2], [4]),
     "a2-uniform": NamedBlocks(
         "a uniform mesh on a rigid floor",
         "case test A2, Fig. 11(a)",
@@ -187,13 +181,7 @@ def load_scene(text: str, argument: str = "--scene") -> Scene:
     name, options = parse_name(argument, text, "NAME or NAME:OPTION=VALUE,OPTION=VALUE")
     if name not in SCENES:
         raise unknown_name_error(argument, name, SCENES)
-    defaults = options_of(name)
-    for option, value in options.items():
-        if option not in defaults:
-            error = unknown_name_error(f"{argument}: option of {text!r}", option, defaults)
-            raise MisuseError(error.argument, error.found, f"{error.needed}; there are {', '.join(defaults)}")
-        if needed := _describe_need(name, option, value):
-            raise MisuseError(f"{argument}: {option} of {text!r}", repr(value), needed)
+    _check_options(name, options, f"{argument}: ", repr(text))
     return make_scene(name, **options)
 
 
@@ -201,13 +189,7 @@ def make_scene(name: str, **options: Any) -> Scene:
     """Return a scene by its name, with options as keywords."""
     if name not in SCENES:
         raise unknown_name_error("scene", name, SCENES)
-    defaults = options_of(name)
-    for option, value in options.items():
-        if option not in defaults:
-            raise unknown_name_error(f"option of scene {name}", option, defaults)
-        is_default = value is None and defaults[option] is None
-        if not is_default and (needed := _describe_need(name, option, value)):
-            raise MisuseError(f"{option} of scene {name}", repr(value), needed)
+    _check_options(name, options, "", f"scene {name}")
     scene = _maker(name)(**options)
     with np.errstate(all="ignore"):  # Whatever overflows is refused.
         is_near = np.abs(scene.start).max(initial=0.0) <= DIVERGENCE_FACTOR * np.abs(scene.interface.nodes).max()
@@ -222,8 +204,20 @@ def options_of(name: str) -> Mapping[str, Any]:
     return {option: entry.default for option, entry in inspect.signature(_maker(name)).parameters.items()}
 
 
+def _check_options(name: str, options: Mapping[str, Any], begin: str, scene: str) -> None:
+    """Check options; a message says which "option of" the scene is wrong, and after a beginning lists all of them."""
+    defaults = options_of(name)
+    for option, value in options.items():
+        if option not in defaults:
+            error = unknown_name_error(f"{begin}option of {scene}", option, defaults)
+            needed = f"{error.needed}; there are {', '.join(defaults)}" if begin else error.needed
+            raise MisuseError(error.argument, error.found, needed)
+        is_default = value is None and defaults[option] is None
+        if not is_default and (needed := _describe_need(name, option, value)):
+            raise MisuseError(f"{begin}{option} of {scene}", repr(value), needed)
+
+
 def _maker(name: str) -> Callable[..., Scene]:
-    """Return the function that makes the scene of that name from its options."""
     return partial(make_blocks, name) if name in BLOCKS else make_disk
 
 
@@ -262,10 +256,8 @@ def make_blocks(
     """
     drawing = BLOCKS[name]
     p = drawing.pressure if pressure is None else pressure
-    slave_x, master_x = (
-        _grid(start, lengths, refine)
-        for start, lengths in ((drawing.slave_from, drawing.slave), (drawing.master_from, drawing.master))
-    )
+    slave_x = _grid(drawing.slave_from, drawing.slave, refine)
+    master_x = _grid(drawing.master_from, drawing.master, refine)
     layers = np.linspace(0.0, drawing.height, 2 * refine + 1)
     mean_segment = float(np.mean(drawing.slave)) / refine
     angle = radians(degrees)

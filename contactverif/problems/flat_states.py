@@ -66,14 +66,16 @@ def flat_state(
     reference = np.vstack([_place([(place, 0.0) for place in slave], turn, offset), master_nodes])
     interface = Interface(reference, Surface(slave_segments), Surface(master_segments))
     nodes = np.vstack([slave_nodes, master_nodes])
-    along, heights = read_frame(nodes, turn, nodes[count + master.flat[0]])
+    p, q, r = turn
+    along, heights = zip(*read_frame(nodes, [(p, q), (-q, p)], r, nodes[count + master.flat[0]]), strict=True)
     flat = [*range(count), *(count + node for node in master.flat)]
+    line = np.column_stack([[float(along[node]) for node in flat], np.zeros(len(flat))])
     weights = np.zeros(len(nodes))
-    weights[flat] = _weights(count, [along[node] for node in flat])
+    weights[flat] = uniform_pressure_weights(Interface.from_chains(line[:count], line[count:]), line[:, 0])
     parameters = {
         "penetration": np.array(float(-heights[0])),
         "along": np.array([float(place) for place in along]),
-        "direction": np.array(turn[:2]) / turn[2],
+        "direction": np.array([p, q]) / r,
         "weights": weights,
     }
     return Case(interface, nodes.reshape(-1), penalty, parameters, name=name)
@@ -85,11 +87,10 @@ def overhangs(case: Case) -> bool:
     return bool(slave.min() < master.min() or slave.max() > master.max())
 
 
-def read_frame(nodes: FloatArray, turn: Turn, origin: FloatArray) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the exact places of nodes along the interface and across it, as lengths from a point of it."""
-    p, q, r = turn
-    steps = [[Fraction(float(a)) - Fraction(float(b)) for a, b in zip(node, origin, strict=True)] for node in nodes]
-    return [(x * p + y * q) / r for x, y in steps], [(y * p - x * q) / r for x, y in steps]
+def read_frame(nodes: FloatArray, axes: Sequence[Sequence[int]], size: int, origin: FloatArray) -> list[list[Fraction]]:
+    """Return the exact places of nodes (n, dim) along axes of integers, as lengths from a point; `size` is theirs."""
+    steps = [[Fraction(a) - Fraction(b) for a, b in zip(node, origin.tolist(), strict=True)] for node in nodes.tolist()]
+    return [[sum(map(mul, step, axis), Fraction(0)) / size for axis in axes] for step in steps]
 
 
 def _place(points: Sequence[tuple[float, float]], turn: Turn, offset: tuple[float, float]) -> FloatArray:
@@ -98,15 +99,10 @@ def _place(points: Sequence[tuple[float, float]], turn: Turn, offset: tuple[floa
     return np.column_stack([offset[0] + (places * p - heights * q), offset[1] + (places * q + heights * p)])
 
 
-def _weights(n_slave: int, along: Sequence[Fraction]) -> FloatArray:
-    """Return the weights (n_nodes,) of the nodes of a slave and of a flat master, from places along both."""
-    points = np.column_stack([np.array([float(place) for place in along]), np.zeros(len(along))])
-    interface = Interface.from_chains(points[:n_slave], points[n_slave:])
-    return uniform_pressure_weights(interface, points[:, 0])
-
-
 _TURNS = {"": UPRIGHT, ", turned 3-4-5": TURNED, ", turned 5-12-13": STEEP}
 _TWO_TURNS = {"": UPRIGHT, ", turned 3-4-5": TURNED}
+_OFFSETS = (("1e6, gap 1e-6", 1e6, 2.0**-20), ("2^10, gap 1e-9", 2.0**10, 2.0**-30), ("1e8, gap 1e-6", 1e8, 2.0**-20))
+_DEPTHS = {"h/2": 0.5, "2h": 2.0}
 _TINY = 1.2e-5  # The length of the shortest segment in an interface of length 12.
 TINY_MESHES: dict[str, tuple[list[float], list[float]]] = {
     "slave": ([0, 2, 4, 4 + _TINY, 8, 12], [0, 3, 6, 9, 12]),
@@ -136,9 +132,7 @@ def offset_states() -> tuple[Case, ...]:
     slave, master = [0.25, 1.375, 1.625, 3.0], flat_master([-0.5, 0.875, 1.75, 2.5, 3.5])
     cases = []
     for (label, offset, depth), (turn_label, turn), (side, ratio) in product(
-        (("1e6, gap 1e-6", 1e6, 2.0**-20), ("2^10, gap 1e-9", 2.0**10, 2.0**-30), ("1e8, gap 1e-6", 1e8, 2.0**-20)),
-        _TURNS.items(),
-        (("", 1.0), (", below", -0.5)),
+        _OFFSETS, _TURNS.items(), (("", 1.0), (", below", -0.5))
     ):
         depth = depth if turn is UPRIGHT else depth / 4
         name = f"{label}{turn_label}{side}"
@@ -155,7 +149,7 @@ def deep_states() -> tuple[Case, ...]:
     slave, master = [2.0, 3.0, 4.25, 5.0], flat_master([-1.0, 0.0, 1.0, 2.5, 3.0, 4.0, 5.5, 6.0, 7.0, 8.0])
     return tuple(
         flat_state(f"{depth}{label}", slave, master, share, turn=turn)
-        for (depth, share), (label, turn) in product({"h/2": 0.5, "2h": 2.0}.items(), _TURNS.items())
+        for (depth, share), (label, turn) in product(_DEPTHS.items(), _TURNS.items())
     )
 
 
@@ -264,9 +258,6 @@ _PENALTY = 16.0
 # Four pairs of surfaces lie in a row, each within 1° of the direction of the row. So no surface is above or below
 # another pair, and a formulation without a search, which takes all that its slave's normal meets for its master, is
 # asked about touch alone. Angles are those of integer directions, so that nodes on a line are on it to the last bit.
-# Places along a flat surface; one node meets one. Few segments stand for each of the many angles.
-_SLAVE, _MASTER = (0.25, 1.0, 1.375), (1.75, 1.0, 0.5, 0.0)
-_SHORT_SLAVE, _SHORT_MASTER = (0.25, 1.0), (1.75, 1.0, 0.0)
 _SPACING = 4.0  # From one pair of surfaces to the next, more than twice the length of either.
 _FINENESS = 2.0**20
 
@@ -283,22 +274,21 @@ def touching_states() -> tuple[Case, ...]:
     for number in range(_CASES):
         angles = [step * (number * _ANGLES_IN_A_CASE + index) for index in range(_ANGLES_IN_A_CASE)]
         name = f"gap 0, {angles[0]:.2f}° to {angles[-1]:.2f}°"
-        cases.append(_touching(name, angles, 0.0, slave=_SHORT_SLAVE, master=_SHORT_MASTER))
-    for shift, number in ((shift, number) for shift in (1e-16, -1e-16) for number in range(_SINGLE_ANGLES)):
+        cases.append(_touching(name, angles, 0.0, (0.25, 1.0), (1.75, 1.0, 0.0)))
+    for shift, number in product((1e-16, -1e-16), range(_SINGLE_ANGLES)):
         angle = 360 / _SINGLE_ANGLES * number + 1
-        cases.append(_touching(f"gap {shift:g}, {angle:g}°", [angle], shift))
+        name = f"gap {shift:g}, {angle:g}°"
+        cases.append(_touching(name, [angle], shift, (0.25, 1.0, 1.375), (1.75, 1.0, 0.5, 0.0)))
     return tuple(cases)
 
 
 def _touching(
-    name: str,
-    angles: list[float],
-    shift: float,
-    *,
-    slave: tuple[float, ...] = _SLAVE,
-    master: tuple[float, ...] = _MASTER,
+    name: str, angles: list[float], shift: float, slave: tuple[float, ...], master: tuple[float, ...]
 ) -> Case:
-    """Return one pair of surfaces for each angle, in a row along the angle in the middle."""
+    """Return one pair of surfaces for each angle, in a row along the angle in the middle.
+
+    Places of their nodes along a flat surface are given; one node meets one.
+    """
     sides: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     directions: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     middle = len(angles) // 2
@@ -343,20 +333,15 @@ class Sheet:
     @property
     def is_flat(self) -> list[bool]:
         """True for each face in the plane z = 0 that is seen from above."""
-        corners = [[self.points[node] for node in face] for face in self.faces]
-        return [all(z == 0 for _, _, z in face) and _area(face) > 0 for face in corners]
+        corners = np.array(self.points)[np.array(self.faces)]  # (n_faces, 3, 3)
+        (ax, ay), (bx, by) = (corners[:, end, :2].T - corners[:, 0, :2].T for end in (1, 2))
+        flat: list[bool] = ((corners[..., 2] == 0).all(axis=1) & (ax * by - ay * bx > 0)).tolist()
+        return flat
 
     def __add__(self, other: Sheet) -> Sheet:
         """Return both, which have no node in common."""
-        count = len(self.points)
-        moved = [[node + count for node in face] for face in other.faces]
+        moved = [[node + len(self.points) for node in face] for face in other.faces]
         return Sheet([*self.points, *other.points], [*self.faces, *moved])
-
-
-def _area(face: Points) -> float:
-    """Return twice the area of a triangle in the plane, positive if its corners run counter-clockwise."""
-    (ax, ay, _), (bx, by, _), (cx, cy, _) = face
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 def grid(xs: Sequence[float], ys: Sequence[float], height: float = 0.0) -> Sheet:
@@ -403,11 +388,11 @@ def plate(top: Sheet, thickness: float, below: tuple[float, float]) -> Sheet:
 
 def wedge(slope: float) -> Sheet:
     """Return a wedge over [0, 8]² with its edge at x = 0: the upper side is flat, the lower side falls by `slope`."""
-    top, bottom = grid([0.0, 4.0, 8.0], [0.0, 3.0, 8.0]), grid([0.0, 4.0, 8.0], [0.0, 3.0, 8.0])
-    rows = 3  # The nodes on the edge, which come first, belong to both sides.
-    number = [node if node < rows else node + len(top.points) - rows for node in range(len(bottom.points))]
-    points = [*top.points, *((x, y, -slope * x) for x, y, _ in bottom.points[rows:])]
-    return Sheet(points, [*top.faces, *([number[node] for node in face[::-1]] for face in bottom.faces)])
+    top, rows = grid([0.0, 4.0, 8.0], [0.0, 3.0, 8.0]), 3
+    # The nodes on the edge, which come first, belong to both sides.
+    number = [node if node < rows else node + len(top.points) - rows for node in range(len(top.points))]
+    points = [*top.points, *((x, y, -slope * x) for x, y, _ in top.points[rows:])]
+    return Sheet(points, [*top.faces, *([number[node] for node in face[::-1]] for face in top.faces)])
 
 
 def rotation(quaternion: Quaternion) -> tuple[list[list[int]], int]:
@@ -445,7 +430,7 @@ def flat_face_state(
     interface = Interface.from_faces(slave_nodes, below, master_nodes, master.faces)
     nodes, count = np.vstack([current, master_nodes]), len(current)
     flat = [face for face, is_flat in zip(master.faces, master.is_flat, strict=True) if is_flat]
-    frame = read_space_frame(nodes, matrix, size, master_nodes[flat[0][0]])
+    frame = read_frame(nodes, [*zip(*matrix, strict=True)], size, master_nodes[flat[0][0]])
     parameters = {
         "penetration": np.array(float(-frame[0][2])),
         "normal": np.array([row[2] / size for row in matrix]),
@@ -453,13 +438,6 @@ def flat_face_state(
         "weights": _face_weights(below, flat, [place[:2] for place in frame], count),
     }
     return Case(interface, nodes.reshape(-1), _FACE_PENALTY, parameters, name=name)
-
-
-def read_space_frame(nodes: FloatArray, matrix: list[list[int]], size: int, origin: FloatArray) -> list[list[Fraction]]:
-    """Return the exact places x, y and height z of nodes (n, 3) in the frame of a rotation, as lengths from a node."""
-    steps = [[Fraction(a) - Fraction(b) for a, b in zip(node, origin.tolist(), strict=True)] for node in nodes.tolist()]
-    axes = [[Fraction(matrix[k][axis], size) for k in range(3)] for axis in range(3)]
-    return [[sum(map(mul, step, axis), Fraction(0)) for axis in axes] for step in steps]
 
 
 def _face_weights(slave: Faces, flat: Faces, frame: Sequence[Sequence[Fraction]], count: int) -> FloatArray:
@@ -478,8 +456,8 @@ def _face_weights(slave: Faces, flat: Faces, frame: Sequence[Sequence[Fraction]]
     return weights
 
 
-_SLAVE_SHEET = grid([0.25, 1.375, 3.0], [0.5, 1.75, 2.5])
-_MASTER_SHEET = grid([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
+# Slave and master
+_SHEETS = grid([0.25, 1.375, 3.0], [0.5, 1.75, 2.5]), grid([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
 
 
 @cache
@@ -498,11 +476,12 @@ def node_hit_face_states() -> tuple[Case, ...]:
         places.items(), steps.items(), _TWO_SPACE_TURNS.items()
     ):
         rounding = 2.0**-50 if turn is LEVEL else 2.0**-47  # Turned nodes have up to three bits more.
-        master = fan((x + step[0] * rounding, y + step[1] * rounding), -3.0, 9.0, parts)
-        cases.append(flat_face_state(f"{place} {label}{turn_label}", slave, master, 2.0**-4, turn=turn))
+        centre = x + step[0] * rounding, y + step[1] * rounding
+        pairs = {place: (slave, fan(centre, -3.0, 9.0, parts))}
         if place == "node, fan of 32":
-            above = fan((x + step[0] * rounding, y + step[1] * rounding), 0.0, 6.0, parts)
-            cases.append(flat_face_state(f"slave fan of 32 {label}{turn_label}", above, below, 2.0**-4, turn=turn))
+            pairs["slave fan of 32"] = fan(centre, 0.0, 6.0, parts), below
+        for name, pair in pairs.items():
+            cases.append(flat_face_state(f"{name} {label}{turn_label}", *pair, 2.0**-4, turn=turn))
     return tuple(cases)
 
 
@@ -510,19 +489,12 @@ def node_hit_face_states() -> tuple[Case, ...]:
 def offset_face_states() -> tuple[Case, ...]:
     """Return flat states whose distance from the origin is 1e9 to 1e15 times their penetration; lengths are near 1."""
     cases = []
-    for (label, offset, depth), (turn_label, turn) in product(
-        (("1e6, gap 1e-6", 1e6, 2.0**-20), ("2^10, gap 1e-9", 2.0**10, 2.0**-30), ("1e8, gap 1e-6", 1e8, 2.0**-20)),
-        _SPACE_TURNS.items(),
-    ):
+    for (label, offset, depth), (turn_label, turn) in product(_OFFSETS, _SPACE_TURNS.items()):
         place = (offset, -offset / 2, offset / 4)
-        cases.append(
-            flat_face_state(f"{label}{turn_label}", _SLAVE_SHEET, _MASTER_SHEET, depth, turn=turn, offset=place)
-        )
+        cases.append(flat_face_state(f"{label}{turn_label}", *_SHEETS, depth, turn=turn, offset=place))
     # The stored gap is one step of the doubles there, 1.49e-8, and not the 2e-8 that is asked for.
-    cases.append(flat_face_state("1e8, gap of one step", _SLAVE_SHEET, _MASTER_SHEET, 2e-8, offset=(1e8, 1e8, 1e8)))
-    cases.append(
-        flat_face_state("1e6, gap 1e-6 in decimals", _SLAVE_SHEET, _MASTER_SHEET, 1e-6, offset=(1e6, 1e6, 1e6))
-    )
+    cases.append(flat_face_state("1e8, gap of one step", *_SHEETS, 2e-8, offset=(1e8, 1e8, 1e8)))
+    cases.append(flat_face_state("1e6, gap 1e-6 in decimals", *_SHEETS, 1e-6, offset=(1e6, 1e6, 1e6)))
     return tuple(cases)
 
 
@@ -530,8 +502,8 @@ def offset_face_states() -> tuple[Case, ...]:
 def deep_face_states() -> tuple[Case, ...]:
     """Return flat states that penetrate by half a length and by two lengths, where edges have about one."""
     return tuple(
-        flat_face_state(f"{name}{label}", _SLAVE_SHEET, _MASTER_SHEET, depth, turn=turn)
-        for (name, depth), (label, turn) in product({"h/2": 0.5, "2h": 2.0}.items(), _SPACE_TURNS.items())
+        flat_face_state(f"{name}{label}", *_SHEETS, depth, turn=turn)
+        for (name, depth), (label, turn) in product(_DEPTHS.items(), _SPACE_TURNS.items())
     )
 
 
@@ -548,10 +520,9 @@ def equal_area_states() -> tuple[Case, ...]:
         ("25 nodes, soft and shallow", 5, 2.0**-12, 2.0**-4),
         ("144 nodes", 12, 2.0**-4, _FACE_PENALTY),
     ):
-        places = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])]
-        below = [-1.375 + k for k in range(n + 4)]
-        slave, master = shuffle(grid(places, places)), shuffle(grid(below, below))
-        cases.append(replace(flat_face_state(name, slave, master, depth), penalty=penalty))
+        lines = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])], [-1.375 + k for k in range(n + 4)]
+        state = flat_face_state(name, *(shuffle(grid(places, places)) for places in lines), depth)
+        cases.append(replace(state, penalty=penalty))
     return tuple(cases)
 
 

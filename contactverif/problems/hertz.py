@@ -205,12 +205,8 @@ def layer_contact(
     at Gauss' points of the panels. `more_levels` adds panels at each edge to those that E*/(ε̂ a) asks for; they and
     twice as many terms change the pressure by less than 1e-10 of its peak.
     """
-    for name, number in (
-        ("half_width", half_width),
-        ("radius", radius),
-        ("stiffness", stiffness),
-        ("penalty", penalty),
-    ):
+    numbers = {"half_width": half_width, "radius": radius, "stiffness": stiffness, "penalty": penalty}
+    for name, number in numbers.items():
         if not 0 < number < np.inf:
             raise MisuseError(name, f"{number!r}", "a finite number > 0")
     layer = min(1.0, stiffness / (penalty * half_width))
@@ -254,42 +250,37 @@ def logarithm_integrals(x: FloatArray, edges: FloatArray, terms: int) -> FloatAr
     points, weights = gauss_rule(2 * terms)
     rule = weights[:, None] * legendre.legvander(points, terms - 1)
     integrals[~near] = np.log(np.abs(t[~near][:, None] - points)) @ rule
-    integrals[near] = near_integrals(t[near], terms)
+    integrals[near] = _near_integrals(t[near], terms)
     integrals[..., 0] += 2 * np.log(halves)
     integrals *= halves[:, None]
     return integrals
 
 
-def near_integrals(t: FloatArray, terms: int) -> FloatArray:
-    """Return ∫ P_n(τ) ln|t − τ| dτ over [−1, 1] for n = 0 … terms − 1, shape (n_points, terms)."""
-    q, inside = np.empty((len(t), terms + 1)), np.abs(t) < 1
-    q[inside] = _functions_inside(t[inside], terms + 1)
+def _near_integrals(t: FloatArray, terms: int) -> FloatArray:
+    """Return ∫ P_n(τ) ln|t − τ| dτ over [−1, 1] for n = 0 … terms − 1, shape (n_points, terms).
+
+    The functions Q_n follow from a recurrence that is stable: upwards for |t| < 1, downwards for ratios Q_n/Q_{n−1}
+    beyond.
+    """
+    q, inside, count = np.empty((len(t), terms + 1)), np.abs(t) < 1, terms + 1
+    s = t[inside]
+    upwards = [np.arctanh(s), s * np.arctanh(s) - 1]
+    for n in range(1, count - 1):
+        upwards.append(((2 * n + 1) * s * upwards[n] - n * upwards[n - 1]) / (n + 1))
+    q[inside] = np.column_stack(upwards)
     if not inside.all():
-        q[~inside] = _functions_outside(t[~inside], terms + 1)
+        s = t[~inside]
+        ratio, ratios = 1 / s, []
+        for n in range(_RECURRENCE, 0, -1):
+            ratio = n / ((2 * n + 1) * s - (n + 1) * ratio)
+            if n < count:
+                ratios.append(ratio)
+        first = np.log((s + 1) / (s - 1)) / 2
+        q[~inside] = np.multiply.accumulate(np.column_stack([first, *ratios[::-1]]), axis=1)
     n = np.arange(1, terms)
     rest = 2 * (q[:, 2:] - q[:, :-2]) / (2 * n + 1)
     first = (t + 1) * np.log(np.abs(t + 1)) - (t - 1) * np.log(np.abs(t - 1)) - 2
     return np.column_stack([first, rest])
-
-
-def _functions_inside(t: FloatArray, count: int) -> FloatArray:
-    """Return Q_n (n_points, count) for n = 0 … count − 1 and |t| < 1, by the recurrence upwards, stable there."""
-    q = [np.arctanh(t), t * np.arctanh(t) - 1]
-    for n in range(1, count - 1):
-        q.append(((2 * n + 1) * t * q[n] - n * q[n - 1]) / (n + 1))
-    return np.column_stack(q)
-
-
-def _functions_outside(t: FloatArray, count: int) -> FloatArray:
-    """Return Q_n (n_points, count) for |t| > 1, by ratios Q_n/Q_{n−1} from the recurrence downwards, stable there."""
-    ratio = 1 / t
-    ratios = []
-    for n in range(_RECURRENCE, 0, -1):
-        ratio = n / ((2 * n + 1) * t - (n + 1) * ratio)
-        if n < count:
-            ratios.append(ratio)
-    first = np.log((t + 1) / (t - 1)) / 2
-    return np.multiply.accumulate(np.column_stack([first, *ratios[::-1]]), axis=1)
 
 
 def _edges(levels: int) -> FloatArray:
@@ -347,53 +338,46 @@ _POINTS = 8  # Number of Gauss points on each edge of a loaded side.
 _CHUNK = 512  # Number of points that are superposed at once, so that tables stay in the cache.
 
 
-def line_load_stresses(x: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return the stresses σ_xx, σ_ηη and σ_xη (..., 3) of a line load of 1 that presses at x = 0 (Johnson, 2.14)."""
-    factor = -2 * depth / (pi * (x**2 + depth**2) ** 2)
-    return np.stack([factor * x**2, factor * depth**2, factor * x * depth], axis=-1)
-
-
-def line_load_displacements(x: FloatArray, depth: FloatArray, poisson: float) -> FloatArray:
-    """Return E/(1 − ν²) times the displacements (..., 2) of a line load of 1 per thickness at x = 0 (Johnson, 2.19).
-
-    They are along x and into the body, without unit.
-    """
-    contraction, square = poisson / (1 - poisson), x**2 + depth**2
-    along = -(1 - contraction) * np.arctan2(x, depth) + (1 + contraction) * x * depth / square
-    into = -np.log(square) - (1 + contraction) * x**2 / square
-    return np.stack([along, into], axis=-1) / pi
+def _superpose(
+    pressure: LinePressure, kernel: Callable[..., FloatArray], x: FloatArray, depth: FloatArray
+) -> FloatArray:
+    """Return the sums (n, k) of a field of line loads of 1 at x = 0; places are some way from the loaded strip."""
+    places, forces = pressure.line_loads()
+    count = max(1, -(-len(x) // _CHUNK))
+    chunks = zip(np.array_split(x, count), np.array_split(depth, count), strict=True)
+    parts = [np.einsum("psk,s->pk", kernel(along[:, None] - places, down[:, None]), forces) for along, down in chunks]
+    return np.concatenate(parts)
 
 
 def stresses(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
-    """Return the stresses σ_xx, σ_ηη and σ_xη (n, 3) under a pressure, by superposing Flamant's solution.
+    """Return the stresses σ_xx, σ_ηη and σ_xη (n, 3) under a pressure, by superposing Flamant's (Johnson, 2.14).
 
     Places x and depth (n,) are some way from the loaded strip: the error is 1e-11 of the peak at a distance a, 1e-8 at
     a/4.
     """
-    places, forces = pressure.line_loads()
-    parts = [
-        np.einsum("psk,s->pk", line_load_stresses(along[:, None] - places, down[:, None]), forces)
-        for along, down in _chunks(x, depth)
-    ]
-    return np.concatenate(parts)
+
+    def line_load(x: FloatArray, depth: FloatArray) -> FloatArray:
+        factor = -2 * depth / (pi * (x**2 + depth**2) ** 2)
+        return np.stack([factor * x**2, factor * depth**2, factor * x * depth], axis=-1)
+
+    return _superpose(pressure, line_load, x, depth)
 
 
 def displacements(pressure: LinePressure, x: FloatArray, depth: FloatArray, young: float, poisson: float) -> FloatArray:
-    """Return the displacements (n, 2) along x and into the body under a pressure, by superposing Flamant's solution.
+    """Return the displacements (n, 2) along x and into the body under a pressure, superposed (Johnson, 2.19).
 
     Places x and depth (n,) are some way from the loaded strip. Lengths in the logarithm are over the half-width.
     """
-    places, forces = pressure.line_loads()
-    unit = pressure.half_width
-    parts = [
-        np.einsum(
-            "psk,s->pk",
-            line_load_displacements((along[:, None] - places) / unit, down[:, None] / unit, poisson),
-            forces,
-        )
-        for along, down in _chunks(x, depth)
-    ]
-    return np.concatenate(parts) * (1 - poisson**2) / young
+    contraction, unit = poisson / (1 - poisson), pressure.half_width
+
+    def line_load(x: FloatArray, depth: FloatArray) -> FloatArray:
+        x, depth = x / unit, depth / unit
+        square = x**2 + depth**2
+        along = -(1 - contraction) * np.arctan2(x, depth) + (1 + contraction) * x * depth / square
+        into = -np.log(square) - (1 + contraction) * x**2 / square
+        return np.stack([along, into], axis=-1) / pi
+
+    return _superpose(pressure, line_load, x, depth) * (1 - poisson**2) / young
 
 
 def surface_displacements(pressure: LinePressure, x: FloatArray, young: float, poisson: float) -> FloatArray:
@@ -437,8 +421,3 @@ def _edge_forces(lines: FloatArray, traction: Callable[[FloatArray], FloatArray]
     forces[:-1] += np.einsum("p,epk->ek", 1 - share, values)
     forces[1:] += np.einsum("p,epk->ek", share, values)
     return forces
-
-
-def _chunks(x: FloatArray, depth: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    count = max(1, -(-len(x) // _CHUNK))
-    return list(zip(np.array_split(x, count), np.array_split(depth, count), strict=True))

@@ -9,7 +9,7 @@ Rule for the next editor: names and numbers are for good. A stored report refers
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -23,8 +23,6 @@ from contactverif.problems.flat_states import grid, rotation
 FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0
 _DEPTH = 1 / 16  # The mean penetration over the shortest segment.
-
-Curve = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,47 +72,34 @@ def _case_of_faces(name: str, number: int, slave_cells: int, master_cells: int, 
 def long_states() -> tuple[Case, ...]:
     """Return the states."""
     parts = {
-        "wave-110": [_open(_places(2, 80), _places(13, 110), _wave)],
-        "graded-110": [_open(_grade_places(4, 110), _places(5, 60), _flat)],
-        "many-on-few-104": [_open(_places(1, 104), _places(3, 4), _flat)],
-        "few-on-many-200": [_open(_places(3, 4), _places(1, 200), _flat)],
-        "three-chains-108": [_open(_places(6 + k, 36), _places(9 + k, 12), _flat, along=1.5 * k) for k in range(3)],
+        "wave-110": [_open(_places(2, 80), _places(13, 110), wavy=True)],
+        "graded-110": [_open(_places(4, 110, graded=True), _places(5, 60))],
+        "many-on-few-104": [_open(_places(1, 104), _places(3, 4))],
+        "few-on-many-200": [_open(_places(3, 4), _places(1, 200))],
+        "three-chains-108": [_open(_places(6 + k, 36), _places(9 + k, 12), along=1.5 * k) for k in range(3)],
         "ring-104": [_ring(_places(12, 30), _places(13, 104))],
     }
     return tuple(_case(name, group, turn=0.5 + number) for number, (name, group) in enumerate(parts.items()))
 
 
-def _places(seed: int, count: int) -> FloatArray:
-    """Return ascending places (count + 1,) from 0 to 1; segments differ by up to a factor of 2."""
-    steps = np.random.default_rng(seed).uniform(0.7, 1.4, count)
+def _places(seed: int, count: int, *, graded: bool = False) -> FloatArray:
+    """Return ascending places (count + 1,) from 0 to 1; segments differ by up to a factor of 2.
+
+    Graded segments, an even number, are the shorter the nearer to 1/2.
+    """
+    random, half = np.random.default_rng(seed), np.geomspace(1.0, FINEST, count // 2)
+    steps = random.uniform(0.7, 1.4, count)
+    if graded:
+        steps = np.concatenate([half, half[::-1]]) * np.random.default_rng(seed).uniform(0.9, 1.1, count)
     places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
     return places
 
 
-def _grade_places(seed: int, count: int) -> FloatArray:
-    """Return ascending places (count + 1,), 0 to 1, for an even count; segments are the shorter the nearer to 1/2."""
-    half = np.geomspace(1.0, FINEST, count // 2)
-    steps = np.concatenate([half, half[::-1]]) * np.random.default_rng(seed).uniform(0.9, 1.1, count)
-    places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
-    return places
-
-
-def _flat(x: FloatArray) -> FloatArray:
-    return 0 * x
-
-
-def _wave(x: FloatArray) -> FloatArray:
-    return np.cos(7 * x) / 16
-
-
-def _open(slave: FloatArray, master: FloatArray, curve: Curve, along: float = 0.0) -> Part:
-    """Return a slave over the middle of a wider master; both lie on a curve and begin at `along`, a length."""
-    slave_x, master_x = slave, (1.1 * master - 0.05)[::-1]
-    return Part(
-        np.column_stack([slave_x + along, curve(slave_x)]),
-        np.column_stack([master_x + along, curve(master_x)]),
-        np.tile([0.0, -1.0], (len(slave), 1)),
-    )
+def _open(slave: FloatArray, master: FloatArray, *, along: float = 0.0, wavy: bool = False) -> Part:
+    """Return a slave over the middle of a wider master; both lie on a line or a wave and begin at `along`, a length."""
+    lines = [(x + along, np.cos(7 * x) / 16 if wavy else 0 * x) for x in (slave, (1.1 * master - 0.05)[::-1])]
+    upper, lower = map(np.column_stack, lines)
+    return Part(upper, lower, np.tile([0.0, -1.0], (len(slave), 1)))
 
 
 def _ring(slave: FloatArray, master: FloatArray) -> Part:

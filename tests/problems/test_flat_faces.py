@@ -13,7 +13,7 @@ from contactverif.problems.flat_states import (
     node_hit_face_states,
     offset_face_states,
     plate,
-    read_space_frame,
+    read_frame,
     rotation,
     search_face_states,
     touching_face_states,
@@ -57,7 +57,7 @@ def test_nodes_lie_where_the_names_say() -> None:
     for case, quaternion in zip(states, [(1, 0, 0, 0), (1, 1, 1, 0)] * 4, strict=True):
         matrix, size = rotation(quaternion)
         x = case.positions
-        frame = read_space_frame(x, matrix, size, x[4])  # The slave's node in the middle.
+        frame = read_frame(x, [*zip(*matrix, strict=True)], size, x[4])  # The slave's node in the middle.
         (x_there, y_there, height) = frame[case.interface.n_slave_nodes]
         assert height == Fraction(case.parameter("penetration"))
         assert max(abs(x_there), abs(y_there)) < Fraction(1, 2**45)
