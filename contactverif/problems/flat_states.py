@@ -520,8 +520,8 @@ def equal_area_states() -> tuple[Case, ...]:
         ("25 nodes, soft and shallow", 5, 2.0**-12, 2.0**-4),
         ("144 nodes", 12, 2.0**-4, _FACE_PENALTY),
     ):
-        lines = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])], [-1.375 + k for k in range(n + 4)]
-        state = flat_face_state(name, *(shuffle(grid(places, places)) for places in lines), depth)
+        places, below = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])], [-1.375 + k for k in range(n + 4)]
+        state = flat_face_state(name, shuffle(grid(places, places)), shuffle(grid(below, below)), depth)
         cases.append(replace(state, penalty=penalty))
     return tuple(cases)
 

@@ -277,8 +277,7 @@ def _near_integrals(t: FloatArray, terms: int) -> FloatArray:
                 ratios.append(ratio)
         first = np.log((s + 1) / (s - 1)) / 2
         q[~inside] = np.multiply.accumulate(np.column_stack([first, *ratios[::-1]]), axis=1)
-    n = np.arange(1, terms)
-    rest = 2 * (q[:, 2:] - q[:, :-2]) / (2 * n + 1)
+    rest = 2 * (q[:, 2:] - q[:, :-2]) / (2 * np.arange(1, terms) + 1)
     first = (t + 1) * np.log(np.abs(t + 1)) - (t - 1) * np.log(np.abs(t - 1)) - 2
     return np.column_stack([first, rest])
 
