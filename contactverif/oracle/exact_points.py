@@ -54,12 +54,8 @@ class ExactPoints:
     def at(cls, lattice: Lattice, slave_segment: IntArray, c: FloatArray) -> ExactPoints:
         """Return the points at c (n_points,), from −1 at the first to +1 at the second node of a slave segment."""
         ratios = [value.as_integer_ratio() for value in c.tolist()]
-        return cls.at_ratios(
-            lattice,
-            slave_segment,
-            as_integers([above for above, _ in ratios]),
-            as_integers([below for _, below in ratios]),
-        )
+        above, below = (as_integers([ratio[end] for ratio in ratios]) for end in (0, 1))
+        return cls.at_ratios(lattice, slave_segment, above, below)
 
     @classmethod
     def at_ratios(cls, lattice: Lattice, slave_segment: IntArray, above: Integers, below: Integers) -> ExactPoints:
@@ -121,14 +117,13 @@ def closest_view(lattice: Lattice, points: ExactPoints, segments: IntArray) -> V
     arm, along = _arm_and_along(lattice, points, segments)
     squared = dot(along, along)
     length = roots(squared)
-    return View(
+    return _view(
+        lattice,
+        points,
+        (arm, along),
         xi=Ratios(dot(arm, along), points.weight * squared),
         gap=Ratios(_cross(arm, along) << ROOT_SHIFT, points.weight * length * lattice.scale),
         normal=Ratios(np.stack([along[:, 1], -along[:, 0]], axis=1) << ROOT_SHIFT, length[:, None]),
-        lengths=_lengths(lattice, points, arm, along),
-        slave_length=_sizes(points.along, lattice.scale),
-        master_length=_sizes(along, lattice.scale),
-        cosine=np.ones(len(segments)),
     )
 
 
@@ -141,18 +136,36 @@ def slave_normal_view(lattice: Lattice, points: ExactPoints, segments: IntArray)
     advance = -dot(along, points.along)  # It is positive where the segments face each other.
     sign = np.where(advance < 0, -1, 1).astype(object)
     size = abs(advance) + (advance == 0)
-    slave_length = roots(dot(points.along, points.along))
-    master_length, slave_float = _sizes(along, lattice.scale), _sizes(points.along, lattice.scale)
-    cosine = Ratios(advance, np.full(len(segments), lattice.scale**2, dtype=object)).floats()
-    return View(
+    length = roots(dot(points.along, points.along))
+    return _view(
+        lattice,
+        points,
+        (arm, along),
         xi=Ratios(-sign * dot(arm, points.along), points.weight * size),
-        gap=Ratios(sign * slave_length * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
-        normal=Ratios(np.stack([-points.along[:, 1], points.along[:, 0]], axis=1) << ROOT_SHIFT, slave_length[:, None]),
-        lengths=_lengths(lattice, points, arm, along),
-        slave_length=slave_float,
-        master_length=master_length,
-        cosine=cosine / (master_length * slave_float),
+        gap=Ratios(sign * length * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
+        normal=Ratios(np.stack([-points.along[:, 1], points.along[:, 0]], axis=1) << ROOT_SHIFT, length[:, None]),
+        advance=advance,
     )
+
+
+def _view(
+    lattice: Lattice,
+    points: ExactPoints,
+    vectors: tuple[Integers, Integers],
+    *,
+    xi: Ratios,
+    gap: Ratios,
+    normal: Ratios,
+    advance: Integers | None = None,
+) -> View:
+    """Return the view with its lengths, and with its cosine, if segments do not look along their own normals."""
+    arm, along = vectors
+    distance = _sizes(arm, points.weight * lattice.scale)
+    master, slave, cosine = _sizes(along, lattice.scale), _sizes(points.along, lattice.scale), np.ones(len(arm))
+    if advance is not None:
+        above = Ratios(advance, np.full(len(arm), lattice.scale**2, dtype=object)).floats()
+        cosine = above / (master * slave)
+    return View(xi, gap, normal, distance + master + slave, slave, master, cosine)
 
 
 def run_against(lattice: Lattice, points: ExactPoints, segments: IntArray) -> BoolArray:
@@ -170,11 +183,6 @@ def _arm_and_along(lattice: Lattice, points: ExactPoints, segments: IntArray) ->
     """Return W (P − x_1) and x_2 − x_1 for points P and master segments 1 → 2."""
     first, second = (lattice.nodes[lattice.master[segments, end]] for end in (0, 1))
     return points.place - points.weight[:, None] * first, second - first
-
-
-def _lengths(lattice: Lattice, points: ExactPoints, arm: Integers, along: Integers) -> FloatArray:
-    distance = _sizes(arm, points.weight * lattice.scale)
-    return distance + _sizes(along, lattice.scale) + _sizes(points.along, lattice.scale)
 
 
 def _sizes(vectors: Integers, scale: Any) -> FloatArray:
@@ -223,10 +231,9 @@ def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) ->
     for number, segment in zip(point.tolist(), candidate.tolist(), strict=True):
         first, second = master[segment]
         reaches[number][segment] = reach(segment, nodes[first], nodes[second], places[number], weights[number])
-    excess, ties = np.empty(len(segments)), np.empty(len(segments), dtype=np.int64)
+    excess, ties = np.zeros(len(segments)), np.empty(len(segments), dtype=np.int64)
     for number, (choice, others) in enumerate(zip(segments.tolist(), reaches, strict=True)):
         near = nearest_of(others.values())
-        excess[number] = 0.0
         ties[number] = len(near)
         a, b, c, d = others[choice].above, others[choice].squared, near[0].above, near[0].squared
         if a * d > c * b:  # Squared distances still carry unit².

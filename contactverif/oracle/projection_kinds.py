@@ -78,24 +78,22 @@ class _Probe:
         return [foot for foot in self.feet if foot.squared == self.home.squared]
 
     def feet_of(self, point: Vector) -> list[_Foot]:
-        """Return the feet of a point, ordered as `feet`."""
         ranked = []
         for segment in range(len(self.master)):
             first, second = self.ends(segment)
             along, away = _minus(second, first), _minus(point, first)
             xi = _dot(away, along) / _dot(along, along)
             inside = min(max(xi, Fraction(0)), Fraction(1))
-            squared = _square(_minus(point, _interpolate(first, second, inside)))
+            distance = _minus(point, _interpolate(first, second, inside))
+            squared = _dot(distance, distance)
             overshoot = (xi - inside) ** 2 * _dot(along, along)
             ranked.append((squared, overshoot, segment, _Foot(segment, xi, squared)))
         return [foot for *_, foot in sorted(ranked, key=lambda entry: entry[:3])]
 
     def ends(self, segment: int) -> tuple[Vector, Vector]:
-        """Return the end points of a master segment."""
         return self.nodes[self.master[segment][0]], self.nodes[self.master[segment][1]]
 
     def direction(self, segment: int) -> Vector:
-        """Return the vector from the first to the second node of a master segment."""
         return _minus(*reversed(self.ends(segment)))
 
     def chain(self, segment: int) -> list[int]:
@@ -107,14 +105,6 @@ class _Probe:
         while (following := self.neighbours[chain[-1]][1]) >= 0 and following != start:
             chain.append(following)
         return chain
-
-    def slave_chain(self) -> set[int]:
-        """Return the nodes of the slave's chain that carries the point."""
-        nodes, size = set(self.carrier), 0
-        while len(nodes) > size:
-            size = len(nodes)
-            nodes.update(node for ends in self.slave if nodes.intersection(ends) for node in ends)
-        return nodes
 
     def turn(self) -> tuple[Fraction, Fraction] | None:
         """Return cross and dot product of the two nearest segments, in chain order; None if they share no node."""
@@ -160,8 +150,11 @@ def _at_node(probe: _Probe, *, free: bool) -> bool:
 
 def _coincident(probe: _Probe) -> bool:
     """Return whether the foot of every node of the slave's chain is a master node, and the point is a slave node."""
-    slave_nodes = probe.slave_chain()
-    feet = [probe.feet_of(probe.nodes[node])[0] for node in slave_nodes]
+    nodes, size = set(probe.carrier), 0
+    while len(nodes) > size:
+        size = len(nodes)
+        nodes.update(node for ends in probe.slave if nodes.intersection(ends) for node in ends)
+    feet = [probe.feet_of(probe.nodes[node])[0] for node in nodes]
     return abs(probe.c) == 1 and all(foot.xi in (0, 1) for foot in feet)
 
 
@@ -200,7 +193,7 @@ def _angle(probe: _Probe, degrees: float) -> bool:
         return facing == 0
     if degrees == 180:
         return facing < 0 and slave[0] * master[1] == slave[1] * master[0]
-    cosine = float(facing) / sqrt(_square(slave) * _square(master))
+    cosine = float(facing) / sqrt(_dot(slave, slave) * _dot(master, master))
     return isclose(cosine, cos(radians(degrees)), rel_tol=1e-4)
 
 
@@ -224,19 +217,18 @@ def _closing(probe: _Probe) -> bool:
 
 def _other_node(probe: _Probe) -> bool:
     """Return whether some node is nearer than both ends of the nearest segment."""
-    distances = {node: _square(_minus(probe.nodes[node], probe.point)) for ends in probe.master for node in ends}
+    arms = {node: _minus(probe.nodes[node], probe.point) for ends in probe.master for node in ends}
+    distances = {node: _dot(arm, arm) for node, arm in arms.items()}
     least = min(distances[node] for node in probe.master[probe.home.segment])
     return _inside(probe) and min(distances.values()) < least
-
-
-def _three_nodes(probe: _Probe) -> bool:
-    return len({probe.master[foot.segment][int(foot.xi >= 1)] for foot in probe.tied if not foot.is_inside}) >= 3
 
 
 # The most special kind first: a coincidence is more special than a direction, and a direction more than a place.
 KIND_TESTS: dict[str, Callable[[_Probe], bool]] = {
     "equidistant from three segments": lambda probe: sum(foot.is_inside for foot in probe.tied) >= 3,
-    "equidistant from three nodes": _three_nodes,
+    "equidistant from three nodes": lambda probe: (
+        len({probe.master[foot.segment][int(foot.xi >= 1)] for foot in probe.tied if not foot.is_inside}) >= 3
+    ),
     "coincident nodes": _coincident,
     "node hit exactly": lambda probe: _at_node(probe, free=False),
     "free end hit exactly": lambda probe: _at_node(probe, free=True),
@@ -265,10 +257,6 @@ def _minus(a: Vector, b: Vector) -> Vector:
 
 def _dot(a: Vector, b: Vector) -> Fraction:
     return a[0] * b[0] + a[1] * b[1]
-
-
-def _square(a: Vector) -> Fraction:
-    return _dot(a, a)
 
 
 def _interpolate(first: Vector, second: Vector, share: Fraction) -> Vector:

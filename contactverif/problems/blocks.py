@@ -122,25 +122,13 @@ def two_blocks(
     whole_slave_touches = left >= 0 and right >= 0 if rigid_master else left == right == 0
     if tilt == 0 and not free_sides and (pressure is not None or whole_slave_touches):
         heights = (float(np.ptp(slave_y)), 0.0 if rigid_master else float(np.ptp(master_y)))
-        facts |= _uniform_facts((upper, lower), heights, pressure, approach, placing.scale)
+        compliances = [height / body.oedometric_modulus for height, body in zip(heights, (upper, lower), strict=True)]
+        facts["compliance"] = np.array(compliances) * placing.scale
+        if approach is not None:
+            facts["approach"] = np.array(approach * placing.scale)
+        else:
+            facts["pressure"] = np.array(pressure)
     return Scene((upper, lower), penalty=penalty, facts=facts, name=name)
-
-
-def _uniform_facts(
-    bodies: tuple[Body, Body],
-    heights: tuple[float, float],
-    pressure: float | None,
-    approach: float | None,
-    scale: float,
-) -> dict[str, FloatArray]:
-    """Return the exact facts of a scene under uniform pressure: compliances, and the pressure or the approach."""
-    compliances = [height / body.oedometric_modulus for height, body in zip(heights, bodies, strict=True)]
-    facts: dict[str, FloatArray] = {"compliance": np.array(compliances) * scale}
-    if approach is not None:
-        facts["approach"] = np.array(approach * scale)
-    else:
-        facts["pressure"] = np.array(pressure)
-    return facts
 
 
 def is_uniform(case: Case) -> bool:

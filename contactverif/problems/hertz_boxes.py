@@ -226,20 +226,14 @@ def _exact_displacements(box: HertzBox, penalty: float | None, number: int, plac
     return freeze(moves, np.float64)
 
 
-def body_number(side: str, parabola_is_slave: bool) -> int:
-    """Return the number of the body, parabola (0) or flat (1), that is the slave or the master."""
-    return 0 if (side == "slave") == parabola_is_slave else 1
-
-
 def exact_forces(
     box: HertzBox, penalty: float | None, interface: Interface, parabola_is_slave: bool, positions: FloatArray
 ) -> FloatArray:
     """Return the exact forces ∫ N_i p ds (n_nodes, 2) that push the nodes at positions (n_nodes, 2)."""
     pressure, forces = box.pressure(penalty), np.zeros(positions.shape)
-    for side, nodes in _sides(interface):
+    for number, nodes in _sides(interface, parabola_is_slave):
         order = nodes[np.argsort(positions[nodes, 0])]
-        up = 1.0 if body_number(side, parabola_is_slave) == 0 else -1.0
-        forces[order, 1] = up * pressure.nodal_forces(positions[order, 0])
+        forces[order, 1] = (1.0 if number == 0 else -1.0) * pressure.nodal_forces(positions[order, 0])
     return forces
 
 
@@ -247,16 +241,15 @@ def exact_moves(box: HertzBox, penalty: float | None, scene: Scene, parabola_is_
     """Return the exact displacements (n_nodes, 2) of the nodes of a scene of `hertz_box`, along x and upwards."""
     places = scene.interface.nodes
     moves = np.zeros(places.shape)
-    for side, nodes in _sides(scene.interface):
-        number = body_number(side, parabola_is_slave)
+    for number, nodes in _sides(scene.interface, parabola_is_slave):
         moves[nodes] = exact_displacements(box, penalty, number, places[nodes, 0], across)
     return moves
 
 
-def _sides(interface: Interface) -> tuple[tuple[str, IntArray], tuple[str, IntArray]]:
-    """Return the numbers of the slave's nodes and of the master's."""
-    numbers, n_slave = np.arange(interface.n_nodes), interface.n_slave_nodes
-    return ("slave", numbers[:n_slave]), ("master", numbers[n_slave:])
+def _sides(interface: Interface, parabola_is_slave: bool) -> list[tuple[int, IntArray]]:
+    """Return the number of the body, parabola (0) or flat (1), and its nodes, of the slave and of the master."""
+    slave, master = np.split(np.arange(interface.n_nodes), [interface.n_slave_nodes])
+    return [(0, slave), (1, master)] if parabola_is_slave else [(1, slave), (0, master)]
 
 
 BOX = HertzBox()
@@ -300,7 +293,7 @@ class HertzStudy:
             start = scene.transformation.T @ exact_moves(self.box, law, scene, role, across).reshape(-1)
 
         def motion(places: FloatArray) -> FloatArray:
-            return exact_displacements(self.box, law, body_number("slave", role), places[:, 0], across)
+            return exact_displacements(self.box, law, 0 if role else 1, places[:, 0], across)
 
         forces = partial(exact_forces, self.box, law, scene.interface, role)
         return ProblemInstance(
@@ -321,8 +314,8 @@ class HertzStudy:
         Segments of the parabola are chords, whose distances from it have the root mean square h²/(√180 · 2R). They add
         ε̂ times that to pressures; multipliers are as stiff as can be.
         """
-        sides = (mesh_lines(body_number(side, self.parabola_is_slave), across)[2] for side in ("slave", "master"))
-        slave, master = (self.box.half_width * nodes for nodes in sides)
+        numbers = (0, 1) if self.parabola_is_slave else (1, 0)
+        slave, master = (self.box.half_width * mesh_lines(number, across)[2] for number in numbers)
         penalty = HertzStudy(self.parabola_is_slave, *PENALTIES["stiff"]).penalty(across) if multipliers else None
         chord = (2 * self.box.half_width * self.size(across)) ** 2 / (sqrt(180) * 2 * self.box.radius)
         facets = (penalty or self.penalty(across)) * chord

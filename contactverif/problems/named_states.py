@@ -37,7 +37,7 @@ def _cross_diagonals() -> Case:
         "domain": _SQUARE[:, :2],
         "normal": np.array([0.0, 0.0, 1.0]),
     }
-    z = _state(_SQUARE - [0, 0, _PENETRATION], _SQUARE)
+    z = np.vstack([_SQUARE - [0, 0, _PENETRATION], _SQUARE]).reshape(-1)
     return Case(interface, z, 1 / _PENETRATION, parameters, name="crossed-diagonals")
 
 
@@ -48,17 +48,7 @@ def _tilt_faces() -> Case:
     """
     slave = _SQUARE + np.column_stack([np.zeros((4, 2)), _SQUARE[:, :2] @ [0.25, 0.125] - 0.5])
     interface = Interface.from_faces(_SQUARE, _FROM_BELOW, _SQUARE, _SECOND_DIAGONAL)
-    return Case(interface, _state(slave, _SQUARE), 16.0, name="tilted-faces")
-
-
-def _state(slave: FloatArray, master: FloatArray) -> FloatArray:
-    return np.vstack([slave, master]).reshape(-1)
-
-
-SURFACE_STATES: dict[str, Callable[[], Case]] = {
-    "crossed-diagonals": _cross_diagonals,
-    "tilted-faces": _tilt_faces,
-}
+    return Case(interface, np.vstack([slave, _SQUARE]).reshape(-1), 16.0, name="tilted-faces")
 
 
 _LENGTHS: dict[str, tuple[Sequence[float], Sequence[float]]] = {
@@ -111,9 +101,7 @@ def _flat(name: str, slave: Sequence[float], master: Sequence[float]) -> Case:
 
 
 def _tilt_segment() -> Case:
-    """Return one slave segment of length 25/8 at cos θ = 24/25.
-
-    The area of either quarter point covers two master segments.
+    """Return one slave segment of length 25/8 at cos θ = 24/25; the areas of both quarter points cover two segments.
 
     What VTS-PPT as printed transmits lacks 1 − cos θ = 0.04 of the slave force.
     """
@@ -164,7 +152,8 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "offset-c": _offset_case_c,
     "moved": _moved_case_c,
     "sliding": _slide_over_vertices,
-    **SURFACE_STATES,
+    "crossed-diagonals": _cross_diagonals,
+    "tilted-faces": _tilt_faces,
 }
 FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)
 NAMED: tuple[str, ...] = (*FLAT_NAMES, *_OTHERS)

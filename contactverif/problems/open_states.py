@@ -44,29 +44,27 @@ def fit_to_traits(case: Case, traits: Traits) -> tuple[Case, str]:
         return case, CLOSED_CHAIN
     if traits.rules.enforcement != "barrier" or ACTIVATION in case.parameters:
         return case, ""
-    lifted = lift_flat(case, traits) if "direction" in case.parameters else lift(case, traits)
+    lifted = _lift_flat(case, traits) if "direction" in case.parameters else _lift(case, traits)
     return (lifted, "") if lifted is not None else (case, NOT_LIFTED)
 
 
-def lift_flat(case: Case, traits: Traits) -> Case | None:
+def _lift_flat(case: Case, traits: Traits) -> Case | None:
     """Return a flat case of uniform penetration with a uniform gap; "penetration" is the gap then.
 
     None if rounding the positions would make the gap another one.
     """
     activation = activation_distance(case.interface, traits)
     gap = activation * np.random.default_rng([case.seed, 4]).uniform(LEAST, FLAT_LARGEST)
-    along = case.parameters["direction"]
-    positions = case.positions.copy()
-    height = (case.parameter("penetration") + gap) * np.array([-along[1], along[0]])
-    positions[: case.interface.n_slave_nodes] += height
     if case.largest_coordinate * UNIT_ROUNDOFF > 2.0**-20 * gap:
         return None
-    return _place_apart(
-        replace(case, parameters={**case.parameters, "penetration": np.array(gap)}), positions, gap, activation
-    )
+    along, positions = case.parameters["direction"], case.positions.copy()
+    height = (case.parameter("penetration") + gap) * np.array([-along[1], along[0]])
+    positions[: case.interface.n_slave_nodes] += height
+    flat = replace(case, parameters={**case.parameters, "penetration": np.array(gap)})
+    return _place_apart(flat, positions, gap, activation)
 
 
-def lift(case: Case, traits: Traits) -> Case | None:
+def _lift(case: Case, traits: Traits) -> Case | None:
     """Return a case with its surfaces apart, the least gap within the activation distance; None if there is none."""
     slave, activation = case.interface.slave, activation_distance(case.interface, traits)
     away = -_node_normals(slave, case.positions)[: case.interface.n_slave_nodes]
@@ -109,11 +107,10 @@ def least_distance(interface: Interface, positions: FloatArray) -> float:
 
     It is 0 where they cross, and negative where one has passed the other: the nearest point lies behind.
     """
-    slave, master = (positions[side.segments] for side in (interface.slave, interface.master))
+    (nodes, master), (other_nodes, slave) = _facing(interface, positions)
     if _cross(slave, master):
         return 0.0
-    nodes = positions[interface.slave.nodes], positions[interface.master.nodes]
-    return min(_node_distance(nodes[0], master), _node_distance(nodes[1], slave), key=abs)
+    return min(_node_distance(nodes, master), _node_distance(other_nodes, slave), key=abs)
 
 
 def activation_margin(case: Case) -> float:
@@ -121,11 +118,15 @@ def activation_margin(case: Case) -> float:
 
     There the forces of a barrier begin, with a jump in the rate at which their slope changes.
     """
-    interface, positions, activation = case.interface, case.positions, case.parameter(ACTIVATION)
-    slave, master = (positions[side.segments] for side in (interface.slave, interface.master))
-    nodes = positions[interface.slave.nodes], positions[interface.master.nodes]
-    pairs = ((nodes[0], master), (nodes[1], slave))
+    activation = case.parameter(ACTIVATION)
+    pairs = _facing(case.interface, case.positions)
     return min(float(np.abs(_distances(*pair)[0] - activation).min()) for pair in pairs)
+
+
+def _facing(interface: Interface, positions: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """Return the nodes (n, 2) of each side with the segments (m, 2, 2) of the other one."""
+    sides = interface.slave, interface.master
+    return [(positions[here.nodes], positions[other.segments]) for here, other in (sides, sides[::-1])]
 
 
 def _node_distance(points: FloatArray, segments: FloatArray) -> float:

@@ -37,7 +37,10 @@ PENALTY = 10.0  # The scale of the contact decision of multipliers.
 @cache
 def refined_blocks(n_slave: int, n_master: int) -> Scene:
     """Return two blocks that touch, with equal segments on each side; the fact "columns" (2,) has their numbers."""
-    scene = two_blocks(_rectangle(n_slave, upper=True), _rectangle(n_master, upper=False), penalty=PENALTY, approach=0)
+    columns = [(np.linspace(0, LENGTH, n + 1), _row_lines(LENGTH / n)) for n in (n_slave, n_master)]
+    (slave_x, up), (master_x, down) = columns
+    slave, master = Rectangle(slave_x, up, poisson=POISSON), Rectangle(master_x, -down[::-1], poisson=POISSON)
+    scene = two_blocks(slave, master, penalty=PENALTY, approach=0)
     return replace(scene, facts={"columns": np.array([n_slave, n_master], dtype=np.float64)})
 
 
@@ -51,11 +54,6 @@ def refinements(case: Case) -> tuple[Scene, ...]:
     """Return the scenes of a family from coarse to fine, each with twice the segments of the one before."""
     n_slave, n_master = case.parameters["columns"].astype(int).tolist()
     return tuple(refined_blocks(n_slave * 2**level, n_master * 2**level) for level in range(N_MESHES))
-
-
-def _rectangle(n_columns: int, *, upper: bool) -> Rectangle:
-    lines = _row_lines(LENGTH / n_columns)
-    return Rectangle(np.linspace(0, LENGTH, n_columns + 1), lines if upper else -lines[::-1], poisson=POISSON)
 
 
 def _row_lines(first: float) -> FloatArray:

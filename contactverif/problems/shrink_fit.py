@@ -110,6 +110,12 @@ class ShrinkFit:
         inner, outer = (self.interference * part / sum(self.compliances) for part in self.compliances)
         return self.radius + inner, self.radius - outer
 
+    @property
+    def _flexibilities(self) -> list[float]:
+        """By how much a force of 1 for each unit of angle moves each ring at its contact radius."""
+        radii = enumerate(self.contact_radii)
+        return [replace(self, radius=radius).compliances[ring] / radius for ring, radius in radii]
+
     def finite(self, slave: Role, penalty: float = inf, area: Literal["current", "reference"] = "current") -> FiniteFit:
         """Return the fit with contact measured after it.
 
@@ -117,8 +123,7 @@ class ShrinkFit:
         Lamé's compliance C. The springs ε̂ stand on the slave ring. They give way by p/ε̂ with p = f/r and r the radius
         of the slave, after the fit ("current") or before it ("reference"). All that adds up to δ.
         """
-        radii, index = self.contact_radii, int(slave == "outer")
-        flexibilities = [replace(self, radius=radius).compliances[ring] / radius for ring, radius in enumerate(radii)]
+        radii, flexibilities, index = self.contact_radii, self._flexibilities, int(slave == "outer")
         outwards = (-flexibilities[0], flexibilities[1])[index] if area == "current" else 0.0
 
         def excess(force: float) -> float:
@@ -140,8 +145,7 @@ class ShrinkFit:
         outer one, or p R for lengths of the reference. By how much the rings give way, and the penetration p/ε̂, add up
         to δ. After the fit the radii differ by p/ε̂, and so the forces by p²/ε̂.
         """
-        radii = self.contact_radii
-        flexibilities = [replace(self, radius=radius).compliances[ring] / radius for ring, radius in enumerate(radii)]
+        radii, flexibilities = self.contact_radii, self._flexibilities
         inwards = (1.0, -1.0) if area == "current" else (0.0, 0.0)
 
         def forces(pressure: float) -> list[float]:
@@ -303,12 +307,9 @@ class RingStudy:
         The ends of a quarter are held across their line of symmetry, and bear what contact does there.
         """
         fit, ring = self.fit(traits), int(self.slave == "outer")
-        scene = replace(
-            shrink_fit(self.problem, slave=self.slave, refine=refine, grading=grading, quarters=quarters),
-            penalty=self.penalty,
-        )
-        radius = self.problem.contact_radii[ring]
-        outwards = (1 if ring else -1) * replace(self.problem, radius=radius).compliances[ring] / radius * fit.force
+        scene = shrink_fit(self.problem, slave=self.slave, refine=refine, grading=grading, quarters=quarters)
+        scene = replace(scene, penalty=self.penalty)
+        outwards = (1 if ring else -1) * self.problem._flexibilities[ring] * fit.force
 
         def motion(places: FloatArray) -> FloatArray:
             moves: FloatArray = outwards * places / np.linalg.norm(places, axis=1)[:, None]

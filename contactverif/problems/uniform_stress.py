@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.accuracy import Solution, shape_integrals
@@ -32,36 +31,36 @@ STRESS_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂ + M U/ℓ)/p"
 PRESSURE_TOLERANCE = f"{CONDITION_TOLERANCE} + 64 u (X ε̂/r + M U/ℓ)/p"
 
 
-def exact_stress(body: Body, pressure: float) -> FloatArray:
-    """Return the stress (3,) of an elastic body on rollers under a uniform pressure, in the body's axes.
-
-    It is −p ν/(1−ν) along the interface, −p across it, and the shear 0.
-    """
-    return np.array([-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0])
-
-
 def stress_error(scene: Scene, stresses: Sequence[FloatArray], pressure: float | None = None) -> float:
     """Return the largest error of a stress component at a Gauss point over the exact pressure, dimensionless.
 
     Each body has stresses (n_cells, n_points, 3). Rigid bodies have none, and bodies that touch nothing carry no
-    pressure; both are left out. The exact pressure is that of the scene at its own penalty by default.
+    pressure; both are left out. The exact pressure is that of the scene at its own penalty by default. The exact stress
+    on rollers is −p ν/(1−ν) along the interface, −p across it, and the shear 0.
     """
     if pressure is None:
         pressure = pressure_of(scene.case(), scene.penalty)
     largest = 0.0
     for index in scene.bodies_in_reach:
-        if not scene.bodies[index].rigid:
-            errors = np.abs(stresses[index] - exact_stress(scene.bodies[index], pressure))
-            largest = max(largest, float(errors.max(initial=0.0)))
+        body = scene.bodies[index]
+        if not body.rigid:
+            exact = np.array([-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0])
+            largest = max(largest, float(np.abs(stresses[index] - exact).max(initial=0.0)))
     return largest / pressure
+
+
+def _segment_lengths(scene: Scene) -> tuple[float, float]:
+    """Return the shortest reference length of all segments, and its ratio to the longest."""
+    interface = scene.interface
+    lengths = np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
+    return float(lengths.min()), float(lengths.min() / lengths.max())
 
 
 def condition_tolerance(scene: Scene, penalty: float) -> float:
     """Return what the solution of the linear system may add to a stress over p: CONDITION_TOLERANCE as a number."""
-    lengths = _segment_lengths(scene)
     young = [body.young for body in scene.bodies if not body.rigid]
     h = float(scene.interface.slave.lengths(scene.interface.nodes).mean())
-    return 1e-11 + 1e-13 * max(penalty * h, *young) / min(young) + 5e-15 / _ratio(lengths)
+    return 1e-11 + 1e-13 * max(penalty * h, *young) / min(young) + 5e-15 / _segment_lengths(scene)[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,24 +73,13 @@ class UniformTolerances:
 
 def uniform_tolerances(case: Case, scene: Scene, pressure: float) -> UniformTolerances:
     """Return the tolerances of a solved scene in the state of the case."""
-    lengths = _segment_lengths(scene)
+    shortest, ratio = _segment_lengths(scene)
     modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
     displacement = float(np.abs(case.positions - scene.interface.nodes).max())
     solution = condition_tolerance(scene, case.penalty)
-    solution += 64 * UNIT_ROUNDOFF * modulus * displacement / float(lengths.min()) / pressure
+    solution += 64 * UNIT_ROUNDOFF * modulus * displacement / shortest / pressure
     gap = 64 * UNIT_ROUNDOFF * case.largest_coordinate * case.penalty / pressure
-    return UniformTolerances(stress=solution + gap, pressure=solution + gap / _ratio(lengths))
-
-
-def _segment_lengths(scene: Scene) -> FloatArray:
-    """Return the reference lengths of all segments (n_segments,), slave first."""
-    interface = scene.interface
-    return np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
-
-
-def _ratio(lengths: FloatArray) -> float:
-    """Return the shortest length over the longest."""
-    return float(lengths.min() / lengths.max())
+    return UniformTolerances(stress=solution + gap, pressure=solution + gap / ratio)
 
 
 def uniform_forces(interface: Interface, pressure: float) -> FloatArray:

@@ -24,21 +24,7 @@ from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
 from contactverif.oracle.flat_answers import is_of_class
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
-from contactverif.strategies import given_interface
-from contactverif.strategies.panel_chains import Panel, assemble_panels, shortest
-from contactverif.strategies.samples import (
-    OFFSETS,
-    SEVENTHS,
-    depth_units,
-    ends_of,
-    lengths,
-    motions,
-    on_own_meshes,
-    penalties,
-    repeat_cyclically,
-    seeds,
-    shuffles,
-)
+from contactverif.strategies import given_interface, samples
 from contactverif.strategies.translations import FINENESS, exact_shifts
 
 Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
@@ -74,12 +60,12 @@ def flat_cases(interface: Interface | None = None) -> SearchStrategy[Case] | Non
 @st.composite
 def _uniform_penetrations(draw: DrawFn, sides: SearchStrategy[list[Sides]]) -> Case:
     lines = draw(sides)
-    quarters, unit = draw(_DEPTHS), draw(depth_units())
-    motion, penalty, seed = draw(motions()), draw(penalties()), draw(seeds())
-    slide, shuffle = draw(_SLIDES), draw(shuffles())
-    penetration = quarters / 4 * unit * min(shortest(_line(x)) for line in lines for x in line)
-    panels = [Panel(_line(x, -penetration), _line(below[::-1]), _line(x + slide)) for x, below in lines]
-    interface, z, along = assemble_panels(panels, motion, shuffle)
+    quarters, unit = draw(_DEPTHS), draw(samples.depth_units())
+    motion, penalty, seed = draw(samples.motions()), draw(samples.PENALTIES), draw(samples.SEEDS)
+    slide, shuffle = draw(_SLIDES), draw(samples.SHUFFLES)
+    penetration = quarters / 4 * unit * min(samples.shortest(_line(x)) for line in lines for x in line)
+    panels = [samples.Panel(_line(x, -penetration), _line(below[::-1]), _line(x + slide)) for x, below in lines]
+    interface, z, along = samples.assemble_panels(panels, motion, shuffle)
     parameters = {"penetration": np.array(penetration * motion.scale), "along": along, "direction": motion.direction}
     return Case(interface, z, penalty, parameters, seed)
 
@@ -87,8 +73,8 @@ def _uniform_penetrations(draw: DrawFn, sides: SearchStrategy[list[Sides]]) -> C
 @cache
 def _panels() -> SearchStrategy[list[Sides]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
-    overhang = st.integers(0, 3)
-    side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths(), lengths(), overhang, overhang, SEVENTHS)
+    overhang, lengths = st.integers(0, 3), samples.lengths()
+    side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths, lengths, overhang, overhang, samples.SEVENTHS)
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
 
@@ -100,7 +86,7 @@ def _places(
     What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
     as long as needed. The slave moves into the left overhang by some sevenths of it.
     """
-    slave_x = ends_of([*slave] * repeats)
+    slave_x = samples.ends_of([*slave] * repeats)
     end = slave_x[-1] + right
     master_x = [-float(left)]
     for length in cycle(master) if refinement else master:
@@ -156,7 +142,7 @@ def _cases(interface: Interface | None, *, midpoints: bool, least: int = 0) -> S
 def _class_panels(midpoints: bool, least: int) -> SearchStrategy[list[Sides]]:
     middles, overhang = _CARRIES if midpoints else st.just([0]), st.integers(least, _FURTHEST)
     inner = st.just(least > 0)
-    side = st.builds(_class_places, _CLASS_REPEATS, lengths(), _CARRIES, middles, overhang, overhang, inner)
+    side = st.builds(_class_places, _CLASS_REPEATS, samples.lengths(), _CARRIES, middles, overhang, overhang, inner)
     return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
 
 
@@ -175,8 +161,8 @@ def _class_places(
     on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
     """
     segments = np.array([*slave] * repeats)
-    slave_x = ends_of([*slave] * repeats)
-    deal = partial(repeat_cyclically, count=len(slave_x))
+    slave_x = samples.ends_of([*slave] * repeats)
+    deal = partial(samples.repeat_cyclically, count=len(slave_x))
     nodes = slave_x[deal(at_nodes) == 1]
     nodes = nodes[(nodes > slave_x[0]) & (nodes < slave_x[-1])] if inner else nodes
     middles = (slave_x[:-1] + segments / 2)[deal(at_middles)[:-1] == 1]
@@ -195,7 +181,7 @@ _SHIFTS = st.one_of(st.just(np.zeros(2)), exact_shifts())
 _LENGTHS = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 
 
-@on_own_meshes
+@samples.on_own_meshes
 def exact_flat_cases(draw: DrawFn) -> Case:
     """Return states of uniform penetration, near the origin, whose exact forces are rationals.
 
@@ -205,19 +191,21 @@ def exact_flat_cases(draw: DrawFn) -> Case:
     """
     turn, slave_lengths, master_lengths = draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
     depth = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS)
-    penalty, seed, shift, offsets = draw(penalties()), draw(seeds()), draw(_SHIFTS), draw(OFFSETS)
+    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
+    shift, offsets = draw(_SHIFTS), draw(samples.OFFSETS)
     fineness = FINENESS if shift.any() else _FINENESS_AT_REST
     slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, fineness, fineness)
     case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
     return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
 
 
-@on_own_meshes
+@samples.on_own_meshes
 def linear_flat_cases(draw: DrawFn) -> Case:
     """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
     turn, slave_lengths, master_lengths = draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
     depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
-    penalty, seed, shift, offsets = draw(penalties()), draw(seeds()), draw(_SHIFTS), draw(OFFSETS)
+    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
+    shift, offsets = draw(_SHIFTS), draw(samples.OFFSETS)
     # Heights are places times a power of two, so that they need some bits more than places.
     slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, _COARSE, FINENESS)
     case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
@@ -236,9 +224,9 @@ def _slave_and_master(
     """Return places along the line, moved by up to 1/16 and rounded; the master goes beyond the slave by 1."""
 
     def place(x: FloatArray, over: int, bits: int) -> FloatArray:
-        moved = x + repeat_cyclically(offsets, len(x)) / over / 16
+        moved = x + samples.repeat_cyclically(offsets, len(x)) / over / 16
         return np.round(moved * 2.0**bits) * 2.0**-bits
 
-    slave, master = ends_of(slave_lengths), ends_of(master_lengths)
+    slave, master = samples.ends_of(slave_lengths), samples.ends_of(master_lengths)
     end = slave[-1] + 1
     return place(slave, 7, slave_bits), place(np.array([-1.0, *master[master < end], end]), 13, master_bits)

@@ -21,21 +21,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
-from contactverif.strategies import given_interface
-from contactverif.strategies.panel_chains import Panel, assemble_panels, on_lattice, shortest
-from contactverif.strategies.samples import (
-    OFFSETS,
-    depth_units,
-    depths,
-    draw_others,
-    ends_of,
-    lengths,
-    motions,
-    penalties,
-    repeat_cyclically,
-    seeds,
-    shifts,
-)
+from contactverif.strategies import given_interface, samples
 
 STEEPEST = 1e-3  # An edge seen at a smaller slope than this from a point counts as seen at this slope.
 SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the largest.
@@ -46,7 +32,7 @@ def _covered_start(start: float, slave: Sequence[float], width: float) -> float:
 
     Half of its first or last segment fits into the width.
     """
-    if _covered_halves(start + ends_of(slave), 0.0, width):
+    if _covered_halves(start + samples.ends_of(slave), 0.0, width):
         return start
     if start >= 0:
         return min(start, width - slave[0] / 2)
@@ -63,7 +49,7 @@ def _sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray
     lift = min(heights, default=-depth) + depth
     if lift <= 0:
         return slave
-    return slave - [0.0, float(on_lattice(np.array(lift + 2.0**-20)))]
+    return slave - [0.0, float(samples.on_lattice(np.array(lift + 2.0**-20)))]
 
 
 def _radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outside: bool, closed: bool) -> float:
@@ -111,31 +97,31 @@ class Ring:
     quarters: Sequence[int]
     unit: float
 
-    def __call__(self, offsets: Sequence[int]) -> Panel:
+    def __call__(self, offsets: Sequence[int]) -> samples.Panel:
         """Return the panel, its slave nodes moved off the lattice by these numerators, 0 for none."""
         warp = 1 + offsets[0] / 13 / 8  # no two segments at right angles, so that nothing is seen exactly edge-on
         master = self._points(self.master, not self.inner_slave, warp)
         reference = self._points(self.slave, self.inner_slave, 1.0)
-        length = min(shortest(master), shortest(reference))
-        depth = on_lattice(repeat_cyclically(self.quarters, len(reference)) / 4 * self.unit * length)
+        length = min(samples.shortest(master), samples.shortest(reference))
+        depth = samples.on_lattice(samples.repeat_cyclically(self.quarters, len(reference)) / 4 * self.unit * length)
         depth = np.clip(depth, -RADIUS / 2, RADIUS / 2)  # neither a hole nor a disc shrinks to a point
         outward = reference / RADIUS if self.inner_slave else -reference / RADIUS
-        shift = shifts(offsets, len(reference)) * length
-        slave = on_lattice(reference + outward * depth[:, None]) + shift
+        shift = samples.shifts(offsets, len(reference)) * length
+        slave = samples.on_lattice(reference + outward * depth[:, None]) + shift
         least, closed = min(self.unit * length / 4, RADIUS / 16), self.degrees == 360
         edges = master[::-1] if self.inner_slave else master
         factor = _radial_factor(slave, edges, least, outside=self.inner_slave, closed=closed)
-        return Panel(slave * factor, master, reference, closed=closed)
+        return samples.Panel(slave * factor, master, reference, closed=closed)
 
     def _points(self, weights: Sequence[int], inner: bool, warp: float) -> FloatArray:
         """Return points (n, 2), the body on the left: counter-clockwise around a disc, clockwise around a hole."""
-        shares = ends_of(weights) / sum(weights)
+        shares = samples.ends_of(weights) / sum(weights)
         angles = np.deg2rad(self.degrees * (shares[:-1] if self.degrees == 360 else shares) ** warp)
-        points = on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
+        points = samples.on_lattice(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
         return points if inner else points[::-1]
 
 
-_DEPTH = st.one_of(depths(), depths(lowest=-6))
+_DEPTH = st.one_of(samples.depths(), samples.depths(lowest=-6))
 
 
 def _rings() -> SearchStrategy[Ring]:
@@ -145,7 +131,7 @@ def _rings() -> SearchStrategy[Ring]:
     """
     weights = st.lists(st.integers(1, 3), min_size=3, max_size=10)
     degrees = st.sampled_from([60, 150, 360, 180, 360, 360])
-    return st.builds(Ring, weights, weights, degrees, st.booleans(), _DEPTH, depth_units())
+    return st.builds(Ring, weights, weights, degrees, st.booleans(), _DEPTH, samples.depth_units())
 
 
 _RINGS = _rings()
@@ -155,8 +141,8 @@ _RINGS = _rings()
 def closed_cases(draw: DrawFn) -> Case:
     """Return a closed ring in a hole, off the lattice; its seam is where the numbering, on the walk or not, begins."""
     ring = replace(draw(_RINGS), degrees=360)
-    motion, penalty, seed, shuffle = draw_others(draw)
-    interface, z, _ = assemble_panels([ring(draw(OFFSETS))], motion, shuffle)
+    motion, penalty, seed, shuffle = samples.draw_others(draw)
+    interface, z, _ = samples.assemble_panels([ring(draw(samples.OFFSETS))], motion, shuffle)
     return Case(interface, z, penalty, {}, seed)
 
 
@@ -180,14 +166,14 @@ def smooth_cases(interface: Interface | None = None) -> SearchStrategy[Case]:
 @st.composite
 def _general_cases(draw: DrawFn, smooth: bool) -> Case:
     makers: list[Broken | Ring] = draw(_panels(smooth))
-    motion, penalty, seed, shuffle = draw_others(draw)
+    motion, penalty, seed, shuffle = samples.draw_others(draw)
     # Drawn last, so that the offset shrinks last.
     offset_on = smooth or draw(_ON) > 0
-    offsets = draw(OFFSETS) if offset_on else [0]
+    offsets = draw(samples.OFFSETS) if offset_on else [0]
     if not offset_on or any(isinstance(maker, Broken) and maker.upright for maker in makers):
         # A quarter turn keeps a tie a tie, and a wall upright.
         motion = replace(motion, degrees=motion.degrees // 90 * 90)
-    interface, z, _ = assemble_panels([maker(offsets) for maker in makers], motion, shuffle)
+    interface, z, _ = samples.assemble_panels([maker(offsets) for maker in makers], motion, shuffle)
     return Case(interface, z, penalty, {}, seed)
 
 
@@ -207,26 +193,26 @@ class Broken:
     unit: float
     upright: bool = False  # Walls do not lean, and the slave stays where it starts.
 
-    def __call__(self, offsets: Sequence[int]) -> Panel:
+    def __call__(self, offsets: Sequence[int]) -> samples.Panel:
         """Return the panel, its nodes moved off the lattice by these numerators, 0 for none."""
         line = self._master(offsets)
-        length = min(shortest(line), min(self.slave))
+        length = min(samples.shortest(line), min(self.slave))
         start = float(self.start)
         if not self.upright:
             needed = max(self.slave[0], self.slave[-1]) / 2 + 2 * (length / 8)
             if line[-1, 0] < needed:
                 line = np.vstack([line, [needed + length / 8, line[-1, 1]]])
             start = _covered_start(start, self.slave, line[-1, 0] - length / 8)
-        x = start + ends_of(self.slave)
-        reference = np.column_stack([x, on_lattice(np.interp(x, *line.T))])
+        x = start + samples.ends_of(self.slave)
+        reference = np.column_stack([x, samples.on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
         rise = self.tilt * flatter * (x - (x[0] + x[-1]) / 2)
-        shift = shifts(offsets, len(x))
-        depth = (repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
+        shift = samples.shifts(offsets, len(x))
+        depth = (samples.repeat_cyclically(self.quarters, len(x)) / 4 + shift[:, 1]) * self.unit * length
         x = x + shift[:, 0] * length
         # The line is met again at the moved nodes, or a steep line would make the penetration another one.
-        slave = np.column_stack([x, on_lattice(np.interp(x, *line.T)) + rise - depth])
-        return Panel(_sink_below(slave, line, self.unit * length / 4), line[::-1], reference)
+        slave = np.column_stack([x, samples.on_lattice(np.interp(x, *line.T)) + rise - depth])
+        return samples.Panel(_sink_below(slave, line, self.unit * length / 4), line[::-1], reference)
 
     def _master(self, offsets: Sequence[int]) -> FloatArray:
         """Return points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.
@@ -248,14 +234,15 @@ class Broken:
 @cache
 def _broken_lines() -> SearchStrategy[Broken]:
     """Return flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
-    flat = lengths().map(lambda along: [(length, 0, 0) for length in along])
+    flat = samples.lengths().map(lambda along: [(length, 0, 0) for length in along])
     bent = st.lists(
         st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
     )
-    plain = lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
-    others = st.integers(-2, 2), _TILTS, _DEPTH, depth_units()
+    plain = samples.lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
+    others = st.integers(-2, 2), _TILTS, _DEPTH, samples.depth_units()
     return st.one_of(
-        st.builds(Broken, flat, st.just(0.0), lengths(), *others), st.builds(Broken, bent, _BENDS, plain, *others)
+        st.builds(Broken, flat, st.just(0.0), samples.lengths(), *others),
+        st.builds(Broken, bent, _BENDS, plain, *others),
     )
 
 
@@ -273,8 +260,10 @@ def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
     """Return one or two panels; ledges, which are kinks, only if not smooth."""
     shapes: list[SearchStrategy[Broken | Ring]] = [*[_broken_lines()] * 3, _rings(), _rings()]
     if not smooth:
-        plain = lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
-        shapes.append(st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), depths(), depth_units()))
+        plain = samples.lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
+        shapes.append(
+            st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), samples.depths(), samples.depth_units())
+        )
     panel = st.one_of(*shapes)
     return st.one_of(st.lists(panel, min_size=1, max_size=1), st.lists(panel, min_size=1, max_size=2))
 
@@ -294,14 +283,14 @@ def tie_cases(draw: DrawFn) -> Case:
     gaps of exactly zero. Motions are quarter turns and whole numbers, so that a tie stays one bit for bit.
     """
     panel = draw(_PANELS)
-    motion, penalty, seed = draw(motions(exact=True)), draw(penalties()), draw(seeds())
-    interface, z, _ = assemble_panels([panel], motion)
+    motion, penalty, seed = draw(samples.motions(exact=True)), draw(samples.PENALTIES), draw(samples.SEEDS)
+    interface, z, _ = samples.assemble_panels([panel], motion)
     return Case(interface, z, penalty, {}, seed)
 
 
 def _facing(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
-) -> Panel:
+) -> samples.Panel:
     """Return a panel with master nodes under all slave nodes.
 
     Under some slave segments one quarter point or the middle has a master node too (0: none).
@@ -312,33 +301,33 @@ def _facing(
             master_x.append(slave_x[-1] + length * quarter / 4)
         slave_x.append(slave_x[-1] + length)
         master_x.append(slave_x[-1])
-    x, line = np.array(slave_x), np.column_stack([master_x, repeat_cyclically(rises, len(master_x)) / 4])
+    x, line = np.array(slave_x), np.column_stack([master_x, samples.repeat_cyclically(rises, len(master_x)) / 4])
     heights = np.interp(x, *line.T)
-    slave = np.column_stack([x, heights - repeat_cyclically(quarters, len(x)) / 4 * (unit / 4)])
+    slave = np.column_stack([x, heights - samples.repeat_cyclically(quarters, len(x)) / 4 * (unit / 4)])
     # A gap of zero may stay if a node and a quarter point beside it are below the line.
     beside = np.concatenate([0.75 * x[:-1] + 0.25 * x[1:], 0.25 * x[:-1] + 0.75 * x[1:]])
     here, there = (np.interp(places, *slave.T) < np.interp(places, *line.T) for places in (x, beside))
     if not here[np.r_[: len(x) - 1, 1 : len(x)]][there].any():
         slave = _sink_below(slave, line, unit / 4 / 4)
-    return Panel(slave, line[::-1], np.column_stack([x, heights]))
+    return samples.Panel(slave, line[::-1], np.column_stack([x, heights]))
 
 
 def _on_bisector(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
-) -> Panel:
+) -> samples.Panel:
     """Return a symmetric roof or valley, with a node or quarter point of a level slave on its upright bisector."""
-    x = ends_of(length for length, _ in segments)
+    x = samples.ends_of(length for length, _ in segments)
     x -= segments[0][0] * segments[0][1] / 4
     reach = 4 * x[-1]
     line = np.array([[-reach, -reach * rises[0]], [0.0, 0.0], [reach, -reach * rises[0]]])
     slave = _sink_below(np.column_stack([x, np.full(len(x), -quarters[0] / 4 * unit)]), line, unit / 4)
-    return Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
+    return samples.Panel(slave, line[::-1], np.column_stack([x, np.zeros(len(x))]))
 
 
 _ARGUMENTS = (
     st.lists(_SEGMENT, min_size=1, max_size=5),
     st.lists(_RISES, min_size=1, max_size=4),
     _QUARTERS,
-    depth_units(),
+    samples.depth_units(),
 )
 _PANELS = st.one_of(st.builds(_facing, *_ARGUMENTS), st.builds(_on_bisector, *_ARGUMENTS))

@@ -19,7 +19,7 @@ from contactverif.contract.interface import (
     turns_of,
     ways_to_master,
 )
-from contactverif.strategies.samples import OFFSETS, depth_units, depths, penalties, repeat_cyclically, seeds, shifts
+from contactverif.strategies.samples import OFFSETS, PENALTIES, SEEDS, depth_units, depths, repeat_cyclically, shifts
 
 # A slave segment or face that is bent onto the master keeps this share of its size, seen along itself or its normal.
 LEAST_SHARE = 0.25
@@ -65,7 +65,7 @@ def _flat_states(
     draw: DrawFn, interface: Interface, along: FloatArray, direction: FloatArray, normal: FloatArray, opening: float
 ) -> Case:
     quarters, unit = draw(_QUARTERS), draw(depth_units(finest=6))
-    penalty, seed = draw(penalties()), draw(seeds())
+    penalty, seed = draw(PENALTIES), draw(SEEDS)
     penetration = quarters / 16 * unit * _shortest_segment(interface)
     positions = interface.nodes.copy()
     positions[: interface.n_slave_nodes] -= (opening + penetration) * normal
@@ -99,7 +99,7 @@ def states(interface: Interface, smooth: bool) -> SearchStrategy[Case]:
 def _states(draw: DrawFn, interface: Interface, closed: FloatArray, smooth: bool) -> Case:
     quarters, unit = draw(depths()), draw(depth_units())
     slave_waves, master_waves = draw(_MODES), draw(_MODES)
-    penalty, seed = draw(penalties()), draw(seeds())
+    penalty, seed = draw(PENALTIES), draw(SEEDS)
     offset_on = smooth or draw(_ON) > 0
     offsets = draw(OFFSETS) if offset_on else [0]
     n_slave, shortest = interface.n_slave_nodes, _shortest_segment(interface)
@@ -209,7 +209,7 @@ def given_surface_states(interface: Interface, *, smooth: bool) -> SearchStrateg
 def _face_states(draw: DrawFn, interface: Interface, closed: FloatArray, directions: FloatArray, smooth: bool) -> Case:
     quarters, unit = draw(_FACE_QUARTERS), draw(depth_units())
     slave_warps, master_warps = draw(_WARPS), draw(_WARPS)
-    penalty, seed = draw(penalties()), draw(seeds())
+    penalty, seed = draw(PENALTIES), draw(SEEDS)
     offsets = draw(OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
     n_slave, positions = interface.n_slave_nodes, closed.copy()
     least = float(min(side.heights(closed).min() for side in (interface.slave, interface.master)))

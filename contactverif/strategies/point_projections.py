@@ -112,7 +112,8 @@ class Projection:
                 return f"segment {segment}, which is {farther:.3g} farther than segment {self.tied[0]}"
         else:
             gaps = [self._exact.signed_squared_gap_at(near)]
-            if xi is not None and not _length(self.nodes, self.segments[segment]) * _error(xi, near.xi) <= room:
+            error = 0.0 if xi is None else abs(float(Fraction(xi) - near.xi)) if math.isfinite(xi) else math.inf
+            if not self._length(segment) * error <= room:
                 return f"ξ = {xi!r}, which is {float(near.xi)!r} but for roundoff"
             if distance is not None and not _root_error(distance, self.squared_distance) <= room:
                 return f"distance {distance!r}, which is {math.sqrt(self.squared_distance)!r} but for roundoff"
@@ -123,7 +124,11 @@ class Projection:
     def _room(self, segment: int) -> float:
         """Return the length that roundoff explains at a segment."""
         reach = math.hypot(*(np.array(self.point) - self.nodes[self.segments[segment, 0]]).tolist())
-        return _TOLERANCE * UNIT_ROUNDOFF * (_length(self.nodes, self.segments[segment]) + reach)
+        return _TOLERANCE * UNIT_ROUNDOFF * (self._length(segment) + reach)
+
+    def _length(self, segment: int) -> float:
+        first, second = self.nodes[self.segments[segment]]
+        return math.hypot(*(second - first).tolist())
 
 
 def projections(*, kinds: Collection[str] | None = None) -> SearchStrategy[Projection]:
@@ -245,11 +250,8 @@ def _normal(first: complex, second: complex) -> complex:
 def _rough_chain(draw: DrawFn, least: int, most: int, steepest: float = 0.3) -> Chain:
     """Draw a chain that runs to the left over its body, no segment steeper than 2 atan(steepest)."""
     count = draw(st.integers(least, most))
-    return [
-        *accumulate(
-            (-_real(draw, 0.25, 1.5) * _turn(_real(draw, -steepest, steepest)) for _ in range(count)), initial=0j
-        )
-    ]
+    steps = [-_real(draw, 0.25, 1.5) * _turn(_real(draw, -steepest, steepest)) for _ in range(count)]
+    return [*accumulate(steps, initial=0j)]
 
 
 def _lattice_chain(draw: DrawFn, spacing: int = 1) -> Chain:
@@ -351,10 +353,6 @@ def _one_ulp_off(draw: DrawFn, scene: _Scene) -> _Scene:
     x, y, way = scene.point.real, scene.point.imag, draw(_SIGNS)
     moved_x, moved_y = (math.nextafter(value, way * math.inf) if value else way * 2.0**-53 for value in (x, y))
     return _Scene(scene.chains, draw(st.sampled_from([complex(x, moved_y), complex(moved_x, y)])))
-
-
-def _near_tie(draw: DrawFn) -> _Scene:
-    return _one_ulp_off(draw, _bisector(draw))
 
 
 def _three_feet(draw: DrawFn) -> _Scene:
@@ -486,11 +484,6 @@ def _is_past_free_end(projection: Projection) -> bool:
     return len(projection.tied) == 1 and not 0 <= projection.xi <= 1 and bool(neighbours[int(projection.xi > 1)] < 0)
 
 
-def _almost_hits_node(projection: Projection) -> bool:
-    feet = [near.xi for near in projection._exact.segments]
-    return any(0 < min(abs(xi), abs(xi - 1)) < 1e-12 for xi in feet)
-
-
 def _is_nearer_to_another_node(projection: Projection) -> bool:
     squares = ((projection.nodes - np.array(projection.point)) ** 2).sum(axis=1)
     ends = projection.segments[projection.tied[0]]
@@ -511,8 +504,11 @@ KINDS: dict[str, tuple[Callable[[DrawFn], _Scene], Callable[[Projection], bool]]
     "valley": (_valley, _has_inner_foot),
     "bisector": (_bisector, _is_tie),
     "node-hit": (_node_hit, lambda case: case.side != 0 and any(near.xi in (0, 1) for near in case._exact.segments)),
-    "node-almost-hit": (_node_almost_hit, _almost_hits_node),
-    "near-tie": (_near_tie, _has_inner_foot),
+    "node-almost-hit": (
+        _node_almost_hit,
+        lambda case: any(0 < min(abs(near.xi), abs(near.xi - 1)) < 1e-12 for near in case._exact.segments),
+    ),
+    "near-tie": (lambda draw: _one_ulp_off(draw, _bisector(draw)), _has_inner_foot),
     "three-feet": (_three_feet, lambda case: len(case.tied) >= 3),
     "touching": (_touching, lambda case: case.squared_distance == 0),
     "tiny-gap": (_tiny_gap, lambda case: _has_inner_foot(case) and 0 < case.squared_distance <= 1e-30),
@@ -532,15 +528,6 @@ KINDS: dict[str, tuple[Callable[[DrawFn], _Scene], Callable[[Projection], bool]]
 
 def _sign(value: Fraction) -> int:
     return (value > 0) - (value < 0)
-
-
-def _length(nodes: FloatArray, ends: IntArray) -> float:
-    return math.hypot(*(nodes[ends[1]] - nodes[ends[0]]).tolist())
-
-
-def _error(value: float, exact: Fraction) -> float:
-    """Return |value − exact|, infinite for a value that is not finite."""
-    return abs(float(Fraction(value) - exact)) if math.isfinite(value) else math.inf
 
 
 def _root_difference(a: Fraction, b: Fraction) -> float:

@@ -28,8 +28,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.oracle.projection_kinds import TAU, kind_of
 from contactverif.strategies.given_interface import touches
-from contactverif.strategies.panel_chains import Chain, assemble_chains
-from contactverif.strategies.samples import Motion, motions, penalties, seeds, shuffles
+from contactverif.strategies.samples import PENALTIES, SEEDS, SHUFFLES, Chain, Motion, assemble_chains, motions
 
 Point = tuple[float, float]
 Steps = tuple[list[Point], int]  # Vectors of slave segments from left to right, and which of them carries the point.
@@ -137,8 +136,8 @@ def _sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
     if sketch.mirrored and draw(st.booleans()):
         sketch = sketch.mirror()
     motion = draw(exact_turns() if sketch.exact else _ANY_MOTIONS)
-    penalty, seed = draw(penalties()), draw(seeds())
-    stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(shuffles())
+    penalty, seed = draw(PENALTIES), draw(SEEDS)
+    stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(SHUFFLES)
     reference = replace(sketch.slave, points=sketch.slave.points * stretch)
     slaves, masters, references = [sketch.slave], list(sketch.masters), [reference]
     if draw(_COMPANY):  # Drawn last, so that it goes first.
@@ -469,7 +468,7 @@ def _states(draw: DrawFn, interface: Interface) -> Case:
     c, xi, gap, degrees = draw(_ROUND_C), draw(_FEET), draw(_GAPS), draw(_DEGREES)
     if draw(st.booleans()):
         xi = 1 - xi
-    penalty, seed = draw(penalties()), draw(seeds())
+    penalty, seed = draw(PENALTIES), draw(SEEDS)
     positions = _set_point(interface, (slave_segment, c), (home, xi), gap, degrees)
     if not touches(interface, positions):
         c = -1.0

@@ -1,4 +1,4 @@
-"""The small samples that all cases are made of: lengths, depths of penetration, rigid motions, penalties, seeds.
+"""What all cases are made of: lengths, depths of penetration, rigid motions, penalties, seeds, and chains of points.
 
 Lengths are small integers × 2^k, so that coordinates are exact in binary. Each strategy shrinks to the simplest thing:
 length 1, a quarter of a segment of penetration, no motion, scale 1. Strategies are cached because hypothesis validates
@@ -10,18 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
-from itertools import accumulate, cycle, islice
-from math import ldexp
+from itertools import accumulate, cycle, islice, pairwise
+from math import ceil, ldexp, log2
 
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from contactverif.contract.arrays import FloatArray
+from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import Interface, Surface
 
+PENALTIES = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-8, 24))  # A small integer × 2^k.
+SEEDS = st.integers(0, 2**16)  # The seed of what a property draws at random for a case.
+SHUFFLES = st.one_of(st.just(0), st.integers(0, 255))  # Every other mesh is numbered in walking order, 0.
 SEVENTHS = st.integers(0, 6)
 # Numerators of offsets from the lattice, dealt out in turn and never 0: over 7 along the slave, over 11 across it,
 # over 13 for the master. All are coprime to the powers of two, and to each other, so that none undoes another.
@@ -70,18 +73,6 @@ def depth_units(*, finest: int = 8) -> SearchStrategy[float]:
     return st.integers(0, finest).map(lambda e: 2.0**-e)
 
 
-@cache
-def penalties() -> SearchStrategy[float]:
-    """Return penalties, distributed stiffnesses: a small integer × 2^k."""
-    return st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-8, 24))
-
-
-@cache
-def seeds() -> SearchStrategy[int]:
-    """Return seeds of what a property draws at random for a case."""
-    return st.integers(0, 2**16)
-
-
 @dataclass(frozen=True, slots=True)
 class Motion:
     """A rigid motion after a scaling: x → 2^k (Q x + shift)."""
@@ -98,11 +89,9 @@ class Motion:
     @property
     def cos_sin(self) -> tuple[np.longdouble, np.longdouble]:
         """Cosine and sine of the angle, in extended precision if the machine has it."""
-        if self.degrees in _QUARTER_TURNS:
-            cos, sin = _QUARTER_TURNS[self.degrees]
-            return np.longdouble(cos), np.longdouble(sin)
         angle = np.longdouble(self.degrees) * np.arccos(np.longdouble(-1)) / 180
-        return np.cos(angle), np.sin(angle)
+        cos, sin = _QUARTER_TURNS.get(self.degrees, (np.cos(angle), np.sin(angle)))
+        return np.longdouble(cos), np.longdouble(sin)
 
     @property
     def direction(self) -> FloatArray:
@@ -147,12 +136,86 @@ def ends_of(lengths: Iterable[float]) -> FloatArray:
     return np.array([*accumulate(lengths, initial=0.0)])
 
 
-@cache
-def shuffles() -> SearchStrategy[int]:
-    """Return shuffles: every other mesh is numbered in walking order, 0; the others at random."""
-    return st.one_of(st.just(0), st.integers(0, 255))
-
-
 def draw_others(draw: DrawFn) -> tuple[Motion, float, int, int]:
     """Draw what a case needs besides its meshes: the motion, the penalty, the seed, and the shuffle of the numbers."""
-    return draw(motions()), draw(penalties()), draw(seeds()), draw(shuffles())
+    return draw(motions()), draw(PENALTIES), draw(SEEDS), draw(SHUFFLES)
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Points that segments join one after the other."""
+
+    points: FloatArray  # (n, 2) The points in walking order, the body on the left.
+    closed: bool = False  # The last point is joined to the first.
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One slave chain and one master chain, at rest on the lattice."""
+
+    # (n, 2) Current positions in walking order, the body on the left: in +x and in −x if they are open and the slave
+    # is on top.
+    slave: FloatArray
+    master: FloatArray
+    reference: FloatArray  # (n, 2) Reference positions of the slave; the master is where it was.
+    closed: bool = False  # Each chain's last point is joined to its first.
+
+
+def on_lattice(values: FloatArray) -> FloatArray:
+    """Return the nearest multiples of 2^-20."""
+    return np.round(values * 2.0**20) * 2.0**-20
+
+
+def shortest(points: FloatArray) -> float:
+    """Return the length of the shortest of the segments between consecutive points (n, 2)."""
+    return float(np.hypot(*(points[1:] - points[:-1]).T).min())
+
+
+def assemble_panels(
+    panels: Sequence[Panel], motion: Motion, shuffle: int = 0
+) -> tuple[Interface, FloatArray, FloatArray]:
+    """Assemble panels in a row, far apart: the interface, scaled; its state z, scaled and moved; and x before that.
+
+    The shuffle 0 numbers nodes and segments as one walks along them; any other number is a shuffle of its own.
+    """
+    offsets, reached = [np.zeros(2)], 0.0  # Panels are apart by four widths or more, powers of two.
+    for before, panel in pairwise(panels):
+        width = max(np.ptp(np.vstack([side.slave, side.master])[:, 0]) for side in (before, panel))
+        reached += 8 * 2.0 ** ceil(log2(width))
+        offsets.append(np.array([reached, 0.0]))
+    slaves, masters, references = (
+        [Chain(getattr(panel, side) + offset, panel.closed) for panel, offset in zip(panels, offsets, strict=True)]
+        for side in ("slave", "master", "reference")
+    )
+    interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
+    current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
+    return interface, motion(current).reshape(-1), current[:, 0] * motion.scale
+
+
+def assemble_chains(
+    slaves: Sequence[Chain], masters: Sequence[Chain], references: Sequence[Chain], scale: float, shuffle: int = 0
+) -> tuple[Interface, IntArray]:
+    """Return the scaled interface of these chains, and the place (n_nodes,) of each node on the walk along them.
+
+    The walk goes along the slave's chains, then the master's. The master is where it was.
+    """
+    n_slave, n_master = (sum(len(chain.points) for chain in side) for side in (slaves, masters))
+    slave, master = _segments(slaves, 0), _segments(masters, n_slave)
+    order: IntArray = np.arange(n_slave + n_master)
+    if shuffle:
+        random = np.random.default_rng(shuffle)
+        order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(n_master)])
+        number = np.argsort(order)  # the number of each node on the walk
+        slave, master = (random.permutation(number[side]) for side in (slave, master))
+    nodes = np.vstack([chain.points for chain in (*references, *masters)])[order]
+    return Interface(nodes * scale, Surface(slave), Surface(master)), order
+
+
+def _segments(chains: Sequence[Chain], start: int) -> IntArray:
+    """Return the segments (n, 2) of chains whose nodes are numbered on the walk, from `start`."""
+    segments: list[tuple[int, int]] = []
+    for chain in chains:
+        numbers = [*range(start, start + len(chain.points))]
+        segments += pairwise([*numbers, start] if chain.closed else numbers)
+        start += len(numbers)
+    return np.array(segments)

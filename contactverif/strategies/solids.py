@@ -23,7 +23,7 @@ from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.problems.blocks import is_uniform, two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.problems.flat_states import overhangs
-from contactverif.strategies.samples import Motion, ends_of, lengths, motions, repeat_cyclically, seeds
+from contactverif.strategies.samples import SEEDS, Motion, ends_of, lengths, motions, repeat_cyclically
 
 UNIFORM = "a known uniform pressure"
 VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
@@ -114,7 +114,7 @@ def _two_blocks(draw: DrawFn) -> Case:
     slave, master = draw(_widths()), draw(_widths())
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
+    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
     x = ends_of(slave)
     return _scene(x, _cut(master, x[-1]), layers, young, poisson, motion, strain=strain).case(seed=seed)
 
@@ -124,7 +124,7 @@ def _variants(draw: DrawFn) -> Case:
     variant = draw(_VARIANTS)
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
-    strain, poisson, seed = draw(_STRAINS), (draw(_POISSON), draw(_POISSON)), draw(seeds())
+    strain, poisson, seed = draw(_STRAINS), (draw(_POISSON), draw(_POISSON)), draw(SEEDS)
     ratio = 10.0 ** draw(st.integers(-6, 6)) if VARIANTS[variant] == "unequal materials" else 1.0
     degrees = draw(st.sampled_from(INCLINATIONS)) if VARIANTS[variant] == "inclined" else 0.0
     position = draw(st.integers(0, POSITIONS - 1)) if VARIANTS[variant] == "sliding" else 0
@@ -161,7 +161,7 @@ def _dead_zones(draw: DrawFn) -> Case:
     unit = float(x[-1]) / 4  # a thin body bends at nearly no force, and its stress would be roundoff
     layers = tuple([unit * height for height in draw(_LAYERS)] for _ in range(2))
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(seeds())
+    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
     stiff = draw(_DEAD_STIFF)
     master_x = begin + _cut(master, float(end - begin))
     pressure = strain * min(young)
@@ -173,7 +173,7 @@ def _tilted_blocks(draw: DrawFn, tilts: SearchStrategy[int]) -> Case:
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    exponent, motion, seed = draw(_TILTED_STRAINS), draw(motions(furthest=16)), draw(seeds())
+    exponent, motion, seed = draw(_TILTED_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
     tilt, sevenths = draw(tilts), draw(_SEVENTHS)
     stiff = draw(_STIFF)
     strain = 2.0 ** -min(exponent, _SMALLEST_STRAIN.get(stiff, exponent))

@@ -18,18 +18,8 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
-from contactverif.strategies.panel_chains import Chain, assemble_chains, on_lattice
+from contactverif.strategies import samples
 from contactverif.strategies.projection_situations import exact_turns
-from contactverif.strategies.samples import (
-    SEVENTHS,
-    depth_units,
-    ends_of,
-    lengths,
-    on_own_meshes,
-    penalties,
-    seeds,
-    shuffles,
-)
 from contactverif.strategies.surfaces import SpaceMotion, surface_pairs
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
@@ -44,7 +34,7 @@ _DISTANCES = st.integers(1, 4)  # Distances of the body behind, in lengths that 
 
 
 @random_source("contactverif.strategies.straight.tilted_cases")
-@on_own_meshes
+@samples.on_own_meshes
 def tilted_cases(draw: DrawFn) -> Case:
     """Return straight slaves, tilted by 0.06 to 0.6 rad, wholly in contact with a flat master; None for a given mesh.
 
@@ -56,27 +46,27 @@ def tilted_cases(draw: DrawFn) -> Case:
 
 
 @random_source("contactverif.strategies.straight.steep_cases")
-@on_own_meshes
+@samples.on_own_meshes
 def steep_cases(draw: DrawFn) -> Case:
     """Return slaves as `tilted_cases` does, tilted by 35° to 89°; None for a given mesh.
 
     Coordinates along the slave are integers over a power of two, and so are those across it. No rounding bends it.
     """
     slope = draw(_STEEP_SIXTEENTHS) / 16
-    x = ends_of(draw(_SLAVE)) * 2.0 ** -ceil(3 + log2(max(slope, 1.0)))  # So the slave is less than 1 high.
-    shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) / 8
+    x = samples.ends_of(draw(_SLAVE)) * 2.0 ** -ceil(3 + log2(max(slope, 1.0)))  # So the slave is less than 1 high.
+    shallow = draw(_QUARTERS) / 4 * draw(samples.depth_units(finest=6)) / 8
     depth = shallow + slope * (x if draw(_SIGNS) > 0 else x[-1] - x)
     # A line along the slave's normal meets the master depth × slope aside. Each master segment is longer than that, so
     # no gap is longer than two segments, and a search that looks no farther than that finds all.
     reach = float(ceil(depth.max() * slope) + 1)
-    first, second = (float(on_lattice(np.array(draw(SEVENTHS) / 7))) for _ in range(2))
+    first, second = (float(samples.on_lattice(np.array(draw(samples.SEVENTHS) / 7))) for _ in range(2))
     x, master_x = x + first, reach * (np.arange(3.0, -2.0, -1.0) - second)
     level = np.column_stack([x, np.zeros(len(x))])
     return _place(draw, np.column_stack([x, -depth]), np.column_stack([master_x, np.zeros(5)]), level)
 
 
 @random_source("contactverif.strategies.straight.bent_end_cases")
-@on_own_meshes
+@samples.on_own_meshes
 def bent_end_cases(draw: DrawFn) -> Case:
     """Return slaves, straight and tilted or not, between the bent ends of a master; None for a given mesh.
 
@@ -88,13 +78,13 @@ def bent_end_cases(draw: DrawFn) -> Case:
     ends = []
     for corner, side in ((master[0], 1.0), (master[-1], -1.0)):
         bend = draw(_BENDS)
-        ends.append(on_lattice(corner + reach * np.array([side * np.cos(bend), -np.sin(bend)])))
+        ends.append(samples.on_lattice(corner + reach * np.array([side * np.cos(bend), -np.sin(bend)])))
     straight = np.vstack([master[0] + [reach, 0.0], master, master[-1] - [reach, 0.0]])
     bent = np.vstack([ends[0], master, ends[1]])
     return _place(draw, slave, straight, reference, bent=np.vstack([slave, bent]))
 
 
-@on_own_meshes
+@samples.on_own_meshes
 def cases_over_a_body(draw: DrawFn) -> Case:
     """Return slaves as `bent_end_cases` does on a straight master, with a place for a second body; None for a mesh.
 
@@ -105,18 +95,18 @@ def cases_over_a_body(draw: DrawFn) -> Case:
     slave, master, reference, reach = _layout(draw, slope)
     depth = reach * draw(_DISTANCES)
     behind = np.column_stack([np.linspace(master[0, 0] + reach, master[-1, 0] - reach, 4), np.full(4, -2 * depth)])
-    return _place(draw, slave, master, reference, behind=on_lattice(behind))
+    return _place(draw, slave, master, reference, behind=samples.on_lattice(behind))
 
 
 def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return slave, flat master and slave reference in walking order, and a length larger than all depths."""
-    x = ends_of(draw(_SLAVE))
-    shallow = draw(_QUARTERS) / 4 * draw(depth_units(finest=6)) * float((x[1:] - x[:-1]).min())
+    x = samples.ends_of(draw(_SLAVE))
+    shallow = draw(_QUARTERS) / 4 * draw(samples.depth_units(finest=6)) * float((x[1:] - x[:-1]).min())
     depth = shallow + (slope * (x - x[0]) if slope > 0 else slope * (x - x[-1]))
     # Lines along the slave's normal meet the master less than one depth aside; two depths keep off the corners.
     reach = float(ceil(2 * depth.max()) + 1)
-    x = x + float(on_lattice(np.array(draw(SEVENTHS) / 7)))
-    master_x = _cover(draw(lengths(graded=False)), -reach, float(ceil(x[-1])) + reach)
+    x = x + float(samples.on_lattice(np.array(draw(samples.SEVENTHS) / 7)))
+    master_x = _cover(draw(samples.lengths(graded=False)), -reach, float(ceil(x[-1])) + reach)
     slave = np.column_stack([x, -depth])
     master = np.column_stack([master_x[::-1], np.zeros(len(master_x))])
     return slave, master, np.column_stack([x, np.zeros(len(x))]), reach
@@ -134,8 +124,10 @@ def _cover(steps: Sequence[float], start: float, end: float) -> FloatArray:
 
 def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, reference: FloatArray, **others: FloatArray) -> Case:
     """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
-    motion, penalty, seed, shuffle = draw(exact_turns()), draw(penalties()), draw(seeds()), draw(shuffles())
-    interface, order = assemble_chains([Chain(slave)], [Chain(master)], [Chain(reference)], motion.scale, shuffle)
+    motion, penalty = draw(exact_turns()), draw(samples.PENALTIES)
+    seed, shuffle = draw(samples.SEEDS), draw(samples.SHUFFLES)
+    sides = ([samples.Chain(points)] for points in (slave, master, reference))
+    interface, order = samples.assemble_chains(*sides, motion.scale, shuffle)
     parameters = {name: motion(points) for name, points in others.items()}
     if "bent" in parameters:  # The positions of all nodes
         parameters["bent"] = parameters["bent"][order].reshape(-1)
@@ -161,13 +153,13 @@ def _exact_space_turns() -> SearchStrategy[SpaceMotion]:
 
 
 @random_source("contactverif.strategies.surfaces.plane_slaves.tilted_plane_cases")
-@on_own_meshes
+@samples.on_own_meshes
 def tilted_plane_cases(draw: DrawFn) -> Case:
     """Return states of a plane slave that is tilted by up to 19° against a flat master, and wholly in contact."""
     return _tilted_plane(draw)[0]
 
 
-@on_own_meshes
+@samples.on_own_meshes
 def plane_cases_by_a_plate(draw: DrawFn) -> Case:
     """Return states as `tilted_plane_cases` does, with a place for a plate behind the master or at the slave's back.
 
@@ -184,7 +176,7 @@ def _tilted_plane(draw: DrawFn) -> tuple[Case, SpaceMotion]:
     """Return a case, and the similarity that took it where it is."""
     pair = draw(surface_pairs(same_domain=False, stretched=False, most=4))
     slopes, quarters = (draw(_SLOPES), draw(_SLOPES)), draw(_SIXTEENTHS_OF_DEPTH)
-    turn, penalty, seed = draw(_exact_space_turns()), draw(penalties()), draw(seeds())
+    turn, penalty, seed = draw(_exact_space_turns()), draw(samples.PENALTIES), draw(samples.SEEDS)
     interface, plane, domain = pair.lay_out()
     n_slave, current = interface.n_slave_nodes, interface.nodes.copy()
     depth = (abs(slopes[0]) + abs(slopes[1])) / 2 + quarters / 16

@@ -20,9 +20,8 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.problems.flat_states import rotation
+from contactverif.strategies import samples
 from contactverif.strategies.given_interface import given_surface_states
-from contactverif.strategies.panel_chains import on_lattice
-from contactverif.strategies.samples import OFFSETS, depth_units, penalties, repeat_cyclically, seeds, shuffles
 from contactverif.strategies.translations import FINENESS, FURTHEST
 
 
@@ -85,17 +84,17 @@ class SurfaceGrid:
     def points(self) -> FloatArray:
         """Return the nodes (n, 2); those on the border stay on it."""
         shape = (self.columns + 1, self.rows + 1)
-        move = repeat_cyclically(self.moves, 2 * shape[0] * shape[1]).reshape(*shape, 2) / 64
+        move = samples.repeat_cyclically(self.moves, 2 * shape[0] * shape[1]).reshape(*shape, 2) / 64
         if self.straight:
             move[..., 0], move[..., 1] = move[:, :1, 0], move[:1, :, 1]
         move[[0, -1], :, 0] = move[:, [0, -1], 1] = 0.0
         place = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) + move
-        return on_lattice((place / [self.columns, self.rows]).reshape(-1, 2))
+        return samples.on_lattice((place / [self.columns, self.rows]).reshape(-1, 2))
 
     @property
     def choices(self) -> IntArray:
         """The diagonal of each cell (n_cells,)."""
-        return repeat_cyclically(self.diagonals, self.columns * self.rows).astype(np.int64)
+        return samples.repeat_cyclically(self.diagonals, self.columns * self.rows).astype(np.int64)
 
     def with_ring(self) -> SurfaceGrid:
         """Return a grid with one more cell on each side, in which the cells of this grid keep their diagonals."""
@@ -189,7 +188,7 @@ class SurfacePair:
             return points
         angle = np.deg2rad(self.degrees)
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        return on_lattice((2 * points - 1) @ turn + 0.5)
+        return samples.on_lattice((2 * points - 1) @ turn + 0.5)
 
 
 @cache
@@ -215,7 +214,7 @@ def surface_pairs(
     ) -> SurfacePair:
         return SurfacePair(slave, master, same or master.straight, degrees, stretch, shuffle)
 
-    return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, shuffles())
+    return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, samples.SHUFFLES)
 
 
 @cache
@@ -223,7 +222,7 @@ def _matched_pairs() -> SearchStrategy[SurfacePair]:
     def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
         return SurfacePair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number, matched=True)
 
-    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, shuffles())
+    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, samples.SHUFFLES)
 
 
 _QUARTERS = st.integers(1, 8)  # The penetration, in quarters of a unit of the least height of a face.
@@ -266,8 +265,8 @@ def overhung_surface_cases(interface: Interface | None = None) -> SearchStrategy
 @st.composite
 def _flat_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
     pair = draw(pairs)
-    quarters, unit = draw(_QUARTERS), draw(depth_units())
-    motion, penalty, seed = draw(space_motions()), draw(penalties()), draw(seeds())
+    quarters, unit = draw(_QUARTERS), draw(samples.depth_units())
+    motion, penalty, seed = draw(space_motions()), draw(samples.PENALTIES), draw(samples.SEEDS)
     interface, plane, domain = pair.lay_out()
     heights = [side.heights(interface.nodes).min() for side in (interface.slave, interface.master)]
     penetration = quarters / 4 * unit * 2.0 ** np.floor(np.log2(min(heights)))
@@ -344,17 +343,18 @@ def _tilted_states(
     motions: SearchStrategy[SpaceMotion] | None = None,
 ) -> Case:
     pair = draw(pairs)
-    quarters, unit = draw(_MIDDLE_QUARTERS), draw(depth_units())
+    quarters, unit = draw(_MIDDLE_QUARTERS), draw(samples.depth_units())
     slopes, warps = (draw(_SLOPES), draw(_SLOPES)), (draw(_WARPS), draw(_WARPS))
-    motion, penalty, seed = draw(space_motions() if motions is None else motions), draw(penalties()), draw(seeds())
-    offsets = draw(OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
+    motion = draw(space_motions() if motions is None else motions)
+    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
+    offsets = draw(samples.OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
     interface, _, domain = pair.lay_out()
     least = float(min(side.heights(interface.nodes).min() for side in (interface.slave, interface.master)))
     n_slave, current = interface.n_slave_nodes, interface.nodes.copy()
     # Offsets of 0 to 1/16, on lattices that are coprime to the powers of two.
-    current[:n_slave] += repeat_cyclically(offsets, 3 * n_slave).reshape(-1, 3) / [7.0, 11.0, 13.0] / 16 * least
+    current[:n_slave] += samples.repeat_cyclically(offsets, 3 * n_slave).reshape(-1, 3) / [7.0, 11.0, 13.0] / 16 * least
     current[:n_slave, 2] += (current[:n_slave, :2] - domain.mean(axis=0)) @ slopes - quarters / 4 * unit * least
     for part, warp in zip((slice(n_slave), slice(n_slave, None)), warps, strict=True):
-        current[part, 2] += repeat_cyclically(warp, len(current[part])) / 16 * unit * least
+        current[part, 2] += samples.repeat_cyclically(warp, len(current[part])) / 16 * unit * least
     scaled = interface.at(interface.nodes * motion.scale)
     return Case(scaled, motion(current).reshape(-1), penalty, {}, seed)

@@ -23,19 +23,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
-from contactverif.strategies import given_interface
-from contactverif.strategies.panel_chains import Chain, assemble_chains, on_lattice
-from contactverif.strategies.samples import (
-    OFFSETS,
-    Motion,
-    draw_others,
-    ends_of,
-    on_own_meshes,
-    penalties,
-    repeat_cyclically,
-    seeds,
-    shifts,
-)
+from contactverif.strategies import given_interface, samples
 
 FINENESS = 32  # Coordinates are multiples of 2^-32.
 FURTHEST = 20  # Translations reach 2^20.
@@ -71,18 +59,18 @@ def _translated_cases(draw: DrawFn) -> Case:
     tilt = draw(_TILTS) if kind == "slave tilted" else 0.0
     angles = _ANY_ANGLE if kind == "turned" else _LEVEL_OR_ANY
     degrees = 0 if kind == "plain" else draw(angles)
-    penalty, seed, shift = draw(penalties()), draw(seeds()), draw(exact_shifts())
-    offsets = draw(OFFSETS)
+    penalty, seed, shift = draw(samples.PENALTIES), draw(samples.SEEDS), draw(exact_shifts())
+    offsets = draw(samples.OFFSETS)
     covers, several = kind != "overhang", len(slave_lengths) > 1
     line = _master_line(master_lengths, sum(slave_lengths), rises, offsets, covers=covers, several=several)
-    x = ends_of(slave_lengths)
-    x = x + shifts(offsets, len(x))[:, 0]
+    x = samples.ends_of(slave_lengths)
+    x = x + samples.shifts(offsets, len(x))[:, 0]
     slave = np.column_stack([x, np.interp(x, *line.T)])  # On the line, or on the continuation of its end.
     # A tilt leaves one end in its place, so that tilt × way ≥ 0.
-    moves = repeat_cyclically(quarters, len(slave)) / 4 * depth + tilt * (x - (x[0] if tilt >= 0 else x[-1]))
+    moves = samples.repeat_cyclically(quarters, len(slave)) / 4 * depth + tilt * (x - (x[0] if tilt >= 0 else x[-1]))
     current = slave - moves[:, None] * [0.0, 1.0]
     reference, positions, master = (
-        _onto_lattice(Motion(degrees)(points), -FINENESS) for points in (slave, current, line[::-1])
+        _onto_lattice(samples.Motion(degrees)(points), -FINENESS) for points in (slave, current, line[::-1])
     )
     interface = Interface.from_chains(reference, master)
     return Case(interface, np.vstack([positions, master]).reshape(-1), penalty, {"shift": shift}, seed, kind=kind)
@@ -105,8 +93,8 @@ def _master_line(
     """
     begin, end = (-1.0, width + 1.0) if covers else (0.5 if several else -1.0, width - 0.375)
     x = [begin, *(place for place in accumulate(lengths, initial=0) if begin < place < end), end]
-    shift = repeat_cyclically(offsets, len(x)) / 13 / 16
-    heights = ends_of(repeat_cyclically(rises, len(x) - 1)) / 8
+    shift = samples.repeat_cyclically(offsets, len(x)) / 13 / 16
+    heights = samples.ends_of(samples.repeat_cyclically(rises, len(x) - 1)) / 8
     return np.column_stack([x + shift, heights])
 
 
@@ -135,7 +123,7 @@ _MARGIN = 3.0  # The length of master on both sides of what the slave passes.
 
 
 @random_source("contactverif.strategies.sliding.sliding_cases")
-@on_own_meshes
+@samples.on_own_meshes
 def sliding_cases(draw: DrawFn) -> Case:
     """Return slaves that slide along a bent master by the length of a segment; None for a given mesh.
 
@@ -144,14 +132,14 @@ def sliding_cases(draw: DrawFn) -> Case:
     """
     steps = draw(_SLAVE)
     way = max(steps)
-    x = ends_of(steps)
+    x = samples.ends_of(steps)
     line = _bent_line(draw(_MASTER), draw(_SLOPES), -_MARGIN - draw(_PLACES) / 13, x[-1] + way + _MARGIN)
-    depth = repeat_cyclically(draw(_SLIDING_DEPTHS), len(x)) / 32
+    depth = samples.repeat_cyclically(draw(_SLIDING_DEPTHS), len(x)) / 32
     # The slave follows the master as it lies in the middle of the way.
-    slave = np.column_stack([x, on_lattice(np.interp(x + way / 2, *line.T)) - depth])
-    motion, penalty, seed, shuffle = draw_others(draw)
-    chains = [Chain(slave)], [Chain(line[::-1])], [Chain(slave)]
-    interface, order = assemble_chains(*chains, motion.scale, shuffle)
+    slave = np.column_stack([x, samples.on_lattice(np.interp(x + way / 2, *line.T)) - depth])
+    motion, penalty, seed, shuffle = samples.draw_others(draw)
+    chains = [samples.Chain(slave)], [samples.Chain(line[::-1])], [samples.Chain(slave)]
+    interface, order = samples.assemble_chains(*chains, motion.scale, shuffle)
     nodes = np.vstack([slave, line[::-1]])
     moved = nodes + np.where(np.arange(len(nodes)) < len(slave), way, 0.0)[:, None] * [1.0, 0.0]
     z, end = motion(nodes[order]).reshape(-1), motion(moved[order]).reshape(-1)
@@ -183,4 +171,4 @@ def _bent_line(lengths: list[float], slopes: list[int], start: float, end: float
         length = lengths[number % len(lengths)]
         slope = slopes[number % len(slopes)] / 16 * (1 if number % 2 else -1)
         points.append((points[-1][0] + length, points[-1][1] + length * slope))
-    return on_lattice(np.array(points))
+    return samples.on_lattice(np.array(points))
