@@ -67,27 +67,16 @@ class Arcs:
             slave = slave[::-1]
         interface = Interface.from_chains(self.radius * slave, self.radius * master)
         z = np.concatenate([self.slave_radius * slave, self.radius * master]).reshape(-1)
-        facts = {
-            "radius": np.array(self.radius),
-            "depth": np.array(self.depth),
-            "convex_slave": np.array(float(self.convex_slave)),
-            "slave": np.array(self.slave),
-            "master": np.array(self.master),
-        }
+        names = "radius", "depth", "convex_slave", "slave", "master"
+        facts = {name: np.array(getattr(self, name), dtype=np.float64) for name in names}
         return Case(interface, z, self.penalty, facts, name=name)
 
     @classmethod
     def from_case(cls, case: Case) -> Arcs:
         """Return the arcs that a case was made of by `case`, on whatever mesh."""
-        (slave, master) = (tuple(case.parameters[side].tolist()) for side in ("slave", "master"))
-        return cls(
-            case.parameter("radius"),
-            case.parameter("depth"),
-            bool(case.parameter("convex_slave")),
-            slave,
-            master,
-            case.penalty,
-        )
+        slave, master = (tuple(case.parameters[side].tolist()) for side in ("slave", "master"))
+        radius, depth, convex = map(case.parameter, ("radius", "depth", "convex_slave"))
+        return cls(radius, depth, bool(convex), slave, master, case.penalty)
 
 
 def _directions(degrees: tuple[float, float], shares: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ _BESIDE = 0.5  # The length by which the master goes beyond the slave on either 
 _STRAIN = 2.0**-6  # The pressure over the softer body's E.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class _ClassMesh:
     """Two blocks under a uniform pressure; all lengths are those of segments from left to right."""
 
@@ -42,22 +42,16 @@ class _ClassMesh:
 
 
 _NORMAL = {
-    "one segment on one": _ClassMesh(slave=[1], master=[2]),
-    "node on node, E ratio 1000": _ClassMesh(slave=[1, 2, 4, 1], master=[1.5, 2, 4, 1.5], ratio=1e3),
-    "some nodes on nodes, inclined by 17.3°": _ClassMesh(
-        slave=[1, 3, 0.5, 2, 1.5, 4], master=[4.5, 2.5, 6.5], ratio=3.0, degrees=17.3
-    ),
-    "nine segments on two": _ClassMesh(
-        slave=[1, 1, 2, 1, 0.25, 0.25, 0.5, 3, 3], master=[4.5, 8.5], ratio=1 / 8, scale=2e-3
-    ),
+    "one segment on one": _ClassMesh([1], [2]),
+    "node on node, E ratio 1000": _ClassMesh([1, 2, 4, 1], [1.5, 2, 4, 1.5], 1e3),
+    "some nodes on nodes, inclined by 17.3°": _ClassMesh([1, 3, 0.5, 2, 1.5, 4], [4.5, 2.5, 6.5], 3.0, 17.3),
+    "nine segments on two": _ClassMesh([1, 1, 2, 1, 0.25, 0.25, 0.5, 3, 3], [4.5, 8.5], 1 / 8, scale=2e-3),
 }
 _SINGLE = {
-    "one segment on two": _ClassMesh(slave=[2], master=[1.5, 1.5]),
-    "each midpoint, E ratio 1000": _ClassMesh(slave=[2, 4, 1], master=[1.5, 3, 2.5, 1], ratio=1e3),
-    "nodes and midpoints, inclined by 17.3°": _ClassMesh(
-        slave=[1, 3, 0.5, 2, 1.5, 4], master=[3, 1.5, 1.5, 2.5, 2, 2.5], ratio=3.0, degrees=17.3
-    ),
-    "two of four parts": _ClassMesh(slave=[4, 0.5, 3, 4.5], master=[4.75, 0.25, 8], ratio=1 / 8, scale=2e-3),
+    "one segment on two": _ClassMesh([2], [1.5, 1.5]),
+    "each midpoint, E ratio 1000": _ClassMesh([2, 4, 1], [1.5, 3, 2.5, 1], 1e3),
+    "nodes and midpoints, inclined by 17.3°": _ClassMesh([1, 3, 0.5, 2, 1.5, 4], [3, 1.5, 1.5, 2.5, 2, 2.5], 3.0, 17.3),
+    "two of four parts": _ClassMesh([4, 0.5, 3, 4.5], [4.75, 0.25, 8], 1 / 8, scale=2e-3),
 }
 
 
@@ -93,8 +87,6 @@ def _class_cases(drawings: dict[str, _ClassMesh]) -> list[Case]:
     return cases
 
 
-_HEIGHT = 6.0
-_POISSON = (0.3, 0.2)
 _UNITS = ("1e-6", "1", "1e6")  # E of the master over E of the slave.
 
 
@@ -192,8 +184,8 @@ def _hard_case(
 ) -> Case:
     """Return two blocks under a uniform pressure; the slave has E = 1, the master `ratio` times that."""
     scene = two_blocks(
-        Rectangle(slave, [0.0, _HEIGHT / 2, _HEIGHT], young=1.0, poisson=_POISSON[0]),
-        Rectangle(master, [-_HEIGHT, -_HEIGHT / 2, 0.0], young=ratio, poisson=_POISSON[1]),
+        Rectangle(slave, [0.0, 3.0, 6.0], young=1.0, poisson=0.3),
+        Rectangle(master, [-6.0, -3.0, 0.0], young=ratio, poisson=0.2),
         penalty=penalty,
         pressure=_STRAIN * min(1.0, ratio),
         placing=placing,

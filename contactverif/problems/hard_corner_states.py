@@ -46,11 +46,12 @@ def convex_kink_states() -> tuple[Case, ...]:
     cases = []
     for angle, move in product((0.1, 0.5, 1.5), moves):
         a, depth = angle / 2, _DEPTH
+        side = f"{abs(move):.0e} {'right' if move > 0 else 'left'} of" if move else "on"
         master = [(place * cos(a), -abs(place) * sin(a)) for place in (2.0, 1.0, 0.0, -1.0, -2.0)]
         slave = [(place * cos(a) + move, -abs(place) * sin(a) - depth) for place in (-1.6, -0.7, 0.0, 0.8, 1.6)]
         gap, change = depth * cos(a), abs(move) * sin(a)
         case = _bounded_case(
-            f"kink of {angle}, {_describe_move(move)} the bisector",
+            f"kink of {angle}, {side} the bisector",
             slave,
             master,
             edges=((sin(a), cos(a)), (-sin(a), cos(a))),
@@ -61,11 +62,6 @@ def convex_kink_states() -> tuple[Case, ...]:
         )
         cases.append(case)
     return tuple(cases)
-
-
-def _describe_move(move: float) -> str:
-    side = "right" if move > 0 else "left"
-    return f"{abs(move):.0e} {side} of" if move else "on"
 
 
 @cache
@@ -107,8 +103,7 @@ def free_end_states() -> tuple[Case, ...]:
     Whether a point at the end, or a little past it, is in contact is a choice (a tolerance τ, a cut, or neither). It
     concerns the first slave segment alone, so that the total is that of the others at least.
     """
-    depth, master = _DEPTH, [(4.0, 0.0), (2.5, 0.0), (1.0, 0.0), (0.0, 0.0)]
-    up = (0.0, 1.0)
+    depth, master, up = _DEPTH, [(4.0, 0.0), (2.5, 0.0), (1.0, 0.0), (0.0, 0.0)], (0.0, 1.0)
     places = {
         "first node at the end": 0.0,
         "first node a rounding inside": 2.0**-53,
@@ -133,7 +128,7 @@ def steep_slave_states() -> tuple[Case, ...]:
 
     A formulation may see it or not; one that looks along the slave's normal may see a gap as long as the interface.
     """
-    depth, master = _DEPTH, [(4.0, 0.0), (2.5, 0.0), (1.0, 0.0), (0.0, 0.0)]
+    depth, master, up = _DEPTH, [(4.0, 0.0), (2.5, 0.0), (1.0, 0.0), (0.0, 0.0)], (0.0, 1.0)
     cases = []
     for degrees, (label, turn) in product((89.9, 90.0, 180.0), {"": 1, ", on its other side": -1}.items()):
         angle = radians(degrees)
@@ -141,15 +136,10 @@ def steep_slave_states() -> tuple[Case, ...]:
         if turn < 0 and degrees == 180.0:
             continue  # The segment seen from its front is no hard case.
         first, second = (1.75, -depth), (1.75 + along[0], -depth + along[1])
-        inward = (-along[1], along[0])  # Into the slave's body.
+        inward = (turn * -along[1], turn * along[0])  # Into the slave's body.
         chain = [first, second] if turn > 0 else [second, first]
-        inward = (turn * inward[0], turn * inward[1])
-        up = (0.0, 1.0)
         edges = (up, up) if degrees == 180.0 else (up, inward) if turn > 0 else (inward, up)
-        case = _bounded_case(
-            f"{degrees:g}°{label}", chain, master, edges=edges, axis=up, bounds=(0.0, 4.0), segment_bounds=(0.0, 4.0)
-        )
-        cases.append(case)
+        cases.append(_bounded_case(f"{degrees:g}°{label}", chain, master, edges=edges, axis=up, bounds=(0.0, 4.0)))
     return tuple(cases)
 
 

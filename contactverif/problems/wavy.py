@@ -73,14 +73,14 @@ class WavyProblem:
     @property
     def approach(self) -> float:
         """The distance Δ = p̄ (H/M + H/M + 1/ε̂) by which the far edges approach, besides the wave."""
-        moduli = (self.oedometric_modulus(body) for body in (UPPER, LOWER))
-        return self.mean * (sum(self.height / modulus for modulus in moduli) + 1 / self.penalty)
+        compliances = (self.height / self.oedometric_modulus(body) for body in (UPPER, LOWER))
+        return self.mean * (sum(compliances) + 1 / self.penalty)
 
     @property
     def wave_approach(self) -> float:
         """The amplitude p1 (2/kE' + 2/kE' + 1/ε̂) of the gap that the wave of the pressure closes."""
-        moduli = (self.plane_modulus(body) for body in (UPPER, LOWER))
-        return self.wave * (sum(2 / (self.wave_number * modulus) for modulus in moduli) + 1 / self.penalty)
+        compliances = (2 / (self.wave_number * self.plane_modulus(body)) for body in (UPPER, LOWER))
+        return self.wave * (sum(compliances) + 1 / self.penalty)
 
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure p̄ + p1 cos kx, force per length, in the shape of x."""

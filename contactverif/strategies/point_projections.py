@@ -282,6 +282,10 @@ def _moved_anyhow(draw: DrawFn, scene: _Scene, reach: float = 8.0, scale: float 
     return scene.move(lambda place: (place * turn + way) * scale)
 
 
+def _moved_chain(draw: DrawFn, least: int, most: int, steepest: float = 0.3) -> Chain:
+    return _moved_anyhow(draw, _Scene([_rough_chain(draw, least, most, steepest)], 0j)).chains[0]
+
+
 def _beside(draw: DrawFn, first: complex, second: complex, low: int = -30, high: int = -2) -> complex:
     """Draw a point over or under the inside of a segment, at a distance between two powers of 2 of its length."""
     share, gap = _real(draw, 0.05, 0.95), draw(_SIGNS) * _power(draw, low, high)
@@ -289,7 +293,6 @@ def _beside(draw: DrawFn, first: complex, second: complex, low: int = -30, high:
 
 
 def _home(draw: DrawFn, chain: Chain) -> tuple[complex, complex]:
-    """Draw a segment of a chain."""
     number = draw(st.integers(0, len(chain) - 2))
     return chain[number], chain[number + 1]
 
@@ -342,7 +345,7 @@ def _node_hit(draw: DrawFn) -> _Scene:
 
 
 def _node_almost_hit(draw: DrawFn) -> _Scene:
-    chain = _moved_anyhow(draw, _Scene([_rough_chain(draw, 2, 8, steepest=0.9)], 0j)).chains[0]
+    chain = _moved_chain(draw, 2, 8, steepest=0.9)
     first, second = _home(draw, chain)
     off = draw(_SIGNS) * _power(draw, -20, -3)
     return _Scene([chain], draw(st.sampled_from([first, second])) + off * _normal(first, second))
@@ -436,7 +439,7 @@ def _seam(draw: DrawFn) -> _Scene:
 def _offset(draw: DrawFn, offset: float) -> _Scene:
     """Draw a chain far from the origin; half of the gaps are a few units in the last place there."""
     way = offset * _direction(draw)
-    chain = [node + way for node in _moved_anyhow(draw, _Scene([_rough_chain(draw, 2, 12)], 0j)).chains[0]]
+    chain = [node + way for node in _moved_chain(draw, 2, 12)]
     last = math.frexp(offset)[1] - 53
     powers = draw(st.sampled_from([(last, last + 4), (-30, -2)]))
     return _Scene([chain], _beside(draw, *_home(draw, chain), *powers))
@@ -451,7 +454,7 @@ def _tiny_segment(draw: DrawFn) -> _Scene:
 
 
 def _far_away(draw: DrawFn) -> _Scene:
-    chain = _moved_anyhow(draw, _Scene([_rough_chain(draw, 2, 12)], 0j)).chains[0]
+    chain = _moved_chain(draw, 2, 12)
     return _Scene([chain], draw(st.sampled_from(chain)) + _power(draw, 10, 29) * _direction(draw))
 
 

@@ -77,9 +77,7 @@ def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
 def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
     """Return a random block that overhangs its master inside a slave segment, on one side or both.
 
-    The pressure is uniform.
-
-    Given a scene, that scene alone; None if its pressure is not known, or nothing overhangs.
+    The pressure is uniform. Given a scene, that scene alone; None if its pressure is not known, or nothing overhangs.
     """
     return _dead_zones() if scene is None else _uniform(scene, overhang=True)
 
@@ -199,17 +197,12 @@ def _scene(
     stiff: float = MODERATE_PENALTY,
     rigid_master: bool = False,
 ) -> Scene:
-    """Return the scene of the two blocks.
-
-    `strain` and `tilt` make an imposed approach of the slave's top, unless a pressure is given.
-    """
+    """Return the two blocks; `strain` and `tilt` impose an approach of the slave's top, unless a pressure is given."""
     if isinstance(placing, Motion):
-        place = Placing(tuple(placing.direction.tolist()), placing.shift, placing.scale)
-    else:
-        place = placing
+        placing = Placing(tuple(placing.direction.tolist()), placing.shift, placing.scale)
     slave_y, master_y = ends_of(layers[0]), ends_of(layers[1])
     approach = None if pressure is not None else strain * (slave_y[-1] + master_y[-1])
-    segment = float(slave_x[-1] - slave_x[0]) / (len(slave_x) - 1) * place.scale
+    segment = float(slave_x[-1] - slave_x[0]) / (len(slave_x) - 1) * placing.scale
     return two_blocks(
         Rectangle(slave_x, slave_y, young=young[0], poisson=poisson[0]),
         Rectangle(master_x, master_y - master_y[-1], young=young[1], poisson=poisson[1]),
@@ -218,7 +211,7 @@ def _scene(
         approach=approach,
         tilt=tilt * (approach or 0.0),
         rigid_master=rigid_master,
-        placing=place,
+        placing=placing,
     )
 
 
