@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import Interface
 
 _PAIRS_AT_ONCE = 2**18  # The number of pairs of points and master segments in memory at once.
 _SNAP = 1e-2  # Formulations may still see contact past a free end by this share of the segment.
@@ -58,7 +58,9 @@ def kink_margin(
     nodes = np.asarray(z, dtype=np.float64)[: interface.n_unknowns].reshape(-1, 2)
     valid = (np.asarray(slave_segment) >= 0) & np.isfinite(c)
     carriers = nodes[interface.slave.segments[np.asarray(slave_segment)[valid]]]  # (n_points, 2 ends, dim)
-    line = _Line.from_surface(interface.master, nodes)
+    first, second = (nodes[interface.master.segments[:, end]] for end in (0, 1))
+    length = np.hypot(*(second - first).T)
+    line = _Line(first, second, length, (second - first) / length[:, None], interface.master.neighbours)
     margin = float(line.length.min()) / 8
     points = _interpolate(carriers, np.asarray(c, dtype=np.float64)[valid])
     rows = max(1, _PAIRS_AT_ONCE // len(interface.master))
@@ -83,13 +85,6 @@ class _Line:
     length: FloatArray  # (n_segments,)
     tangent: FloatArray
     neighbours: IntArray
-
-    @classmethod
-    def from_surface(cls, master: Surface, nodes: FloatArray) -> _Line:
-        first, second = nodes[master.segments[:, 0]], nodes[master.segments[:, 1]]
-        length = np.hypot(*(second - first).T)
-        tangent = (second - first) / length[:, None]
-        return cls(first, second, length, tangent, master.neighbours)
 
 
 def _interpolate(carriers: FloatArray, c: FloatArray) -> FloatArray:

@@ -130,7 +130,19 @@ def nearest_segments(nodes: FloatArray, segments: IntArray, point: tuple[float, 
     )
     area = scale * scale
     distance = Fraction(near[0].above, near[0].squared * area)
-    return Nearest(distance, tuple([_describe(each, segments[each.segment].tolist(), area) for each in near]))
+    return Nearest(
+        distance,
+        tuple(
+            NearSegment(
+                segment=each.segment,
+                xi=Fraction(each.along, each.squared),
+                squared_overshoot=Fraction(each.past * each.past, each.squared * area),
+                signed_squared_gap=Fraction(each.across * abs(each.across), each.squared * area),
+                foot=("segment", each.segment) if each.end < 0 else ("node", int(segments[each.segment, each.end])),
+            )
+            for each in near
+        ),
+    )
 
 
 def _candidates(nodes: FloatArray, segments: IntArray, point: FloatArray) -> IntArray:
@@ -143,14 +155,3 @@ def _candidates(nodes: FloatArray, segments: IntArray, point: FloatArray) -> Int
     distance = np.hypot(off[:, 0], off[:, 1])
     doubt = _DOUBT * (np.hypot(towards[:, 0], towards[:, 1]) + np.sqrt(squared))
     return np.flatnonzero(distance - doubt <= (distance + doubt).min())
-
-
-def _describe(near: Reach, nodes: list[int], area: int) -> NearSegment:
-    """Return what is said of a segment at the smallest distance; `area` is the square of the lattice's scale."""
-    return NearSegment(
-        segment=near.segment,
-        xi=Fraction(near.along, near.squared),
-        squared_overshoot=Fraction(near.past * near.past, near.squared * area),
-        signed_squared_gap=Fraction(near.across * abs(near.across), near.squared * area),
-        foot=("segment", near.segment) if near.end < 0 else ("node", nodes[near.end]),
-    )

@@ -266,18 +266,14 @@ class WavyStudy:
 
     def group(self, traits: Traits) -> str:
         """Return which slave is finer or coarser, if the meshes differ by a factor of four."""
-        return f"{self._words[self.slave]} slave" if self.contrast else ""
-
-    @property
-    def _words(self) -> tuple[str, str]:
-        return ("finer", "coarser") if self.contrast else ("upper", "lower")
+        return ("finer slave", "coarser slave")[self.slave] if self.contrast else ""
 
     @property
     def case(self) -> Case:
         """The coarsest scene, with the attributes as parameters."""
         facts = {name: np.array(float(getattr(self, name))) for name in ("slave", "stiffness", "amplitude", "contrast")}
         scene = self.pose(self.meshes[0], Traits()).scene
-        name = f"{self._words[self.slave]} slave, {self.stiffness:g} E/h"
+        name = f"{self.group(Traits()) or ('upper slave', 'lower slave')[self.slave]}, {self.stiffness:g} E/h"
         return replace(replace(scene, facts=facts).case(), name=name)
 
     @classmethod
@@ -291,8 +287,7 @@ class WavyStudy:
 def flat_cases() -> tuple[Case, ...]:
     """Return both choices of the slave at two penalties, then a slave four times finer, and one four times coarser."""
     alike = [WavyStudy(slave, stiffness) for slave, stiffness in product((UPPER, LOWER), (10.0, 1e3))]
-    contrast = [WavyStudy(slave, 10.0, contrast=True) for slave in (UPPER, LOWER)]
-    return tuple(study.case for study in (*alike, *contrast))
+    return tuple(study.case for study in (*alike, *(WavyStudy(slave, 10.0, contrast=True) for slave in (UPPER, LOWER))))
 
 
 # Facets of the two meshes are up to this amplitude, a length, × k²h²/8 apart: 1 to 10 times p/ε̂ at 100 E/h.

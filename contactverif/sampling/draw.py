@@ -216,9 +216,9 @@ def _draw_block(
     """
     if find_difference():
         return None
-    strategies = _strategies_in_turn(source)
     streams = [
-        draw_different(strategy, seed=f"{seed}/{kind}/{number}", simplest=number == 0) for kind, strategy in strategies
+        draw_different(strategy, seed=f"{seed}/{kind}/{number}", simplest=number == 0)
+        for kind, strategy in _strategies_in_turn(source)
     ]
     draws: list[Draw] = []
     with reproducible():

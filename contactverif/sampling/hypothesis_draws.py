@@ -210,7 +210,6 @@ class _RandomChoices(ConjectureData):
         return _NO_LABELS
 
     def draw_boolean(self, p: float = 0.5, *, forced: bool | None = None, observe: bool = True) -> bool:
-        """Return True with probability p."""
         if forced is not None:
             value = forced
         elif self._p_simple and p < 1 and self._between_0_and_1() < self._p_simple:
@@ -231,7 +230,6 @@ class _RandomChoices(ConjectureData):
         forced: int | None = None,
         observe: bool = True,
     ) -> int:
-        """Return an integer of a range."""
         if forced is not None:
             value = forced
         elif min_value is None or max_value is None or max_value - min_value >= _NARROW or weights is not None:
@@ -338,15 +336,14 @@ class _OneFailure(ExampleDatabase):
         self._failure = failure
 
     def fetch(self, key: bytes) -> Iterable[bytes]:
-        """Yield the failure if the key is that of unshrunk ones."""
         if key.endswith(b".secondary"):
             yield self._failure
 
     def save(self, key: bytes, value: bytes) -> None:
-        """Store nothing."""
+        pass
 
     def delete(self, key: bytes, value: bytes) -> None:
-        """Delete nothing."""
+        pass
 
 
 class _Failed(Exception):

@@ -224,8 +224,7 @@ def _slave_and_master(
     """Return places along the line, moved by up to 1/16 and rounded; the master goes beyond the slave by 1."""
 
     def place(x: FloatArray, over: int, bits: int) -> FloatArray:
-        moved = x + samples.repeat_cyclically(offsets, len(x)) / over / 16
-        return np.round(moved * 2.0**bits) * 2.0**-bits
+        return samples.on_lattice(x + samples.repeat_cyclically(offsets, len(x)) / over / 16, bits)
 
     slave, master = samples.ends_of(slave_lengths), samples.ends_of(master_lengths)
     end = slave[-1] + 1

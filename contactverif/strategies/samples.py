@@ -161,9 +161,9 @@ class Panel:
     closed: bool = False  # Each chain's last point is joined to its first.
 
 
-def on_lattice(values: FloatArray) -> FloatArray:
-    """Return the nearest multiples of 2^-20."""
-    return np.round(values * 2.0**20) * 2.0**-20
+def on_lattice(values: FloatArray, bits: int = 20) -> FloatArray:
+    """Return the nearest multiples of 2^-bits."""
+    return np.round(values * 2.0**bits) * 2.0**-bits
 
 
 def shortest(points: FloatArray) -> float:

@@ -99,7 +99,7 @@ def cases_over_a_body(draw: DrawFn) -> Case:
 
 
 def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return slave, flat master and slave reference in walking order, and a length larger than all depths."""
+    """Draw slave, flat master and slave reference in walking order, and a length larger than all depths."""
     x = samples.ends_of(draw(_SLAVE))
     shallow = draw(_QUARTERS) / 4 * draw(samples.depth_units(finest=6)) * float((x[1:] - x[:-1]).min())
     depth = shallow + (slope * (x - x[0]) if slope > 0 else slope * (x - x[-1]))
@@ -126,8 +126,8 @@ def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, reference: Float
     """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
     motion, penalty = draw(exact_turns()), draw(samples.PENALTIES)
     seed, shuffle = draw(samples.SEEDS), draw(samples.SHUFFLES)
-    sides = ([samples.Chain(points)] for points in (slave, master, reference))
-    interface, order = samples.assemble_chains(*sides, motion.scale, shuffle)
+    slaves, masters, references = ([samples.Chain(points)] for points in (slave, master, reference))
+    interface, order = samples.assemble_chains(slaves, masters, references, motion.scale, shuffle)
     parameters = {name: motion(points) for name, points in others.items()}
     if "bent" in parameters:  # The positions of all nodes
         parameters["bent"] = parameters["bent"][order].reshape(-1)

@@ -329,9 +329,7 @@ def translated_surface_cases(
 def _translated_states(draw: DrawFn, pair: SearchStrategy[SurfacePair]) -> Case:
     case = draw(_tilted_states(pair, smooth=True, motions=space_motions(furthest=0, exponents=0)))
     shift = np.array([draw(_PLACES), draw(_PLACES), draw(_PLACES)], dtype=np.float64)
-    nodes, z = (
-        np.ldexp(np.round(np.ldexp(values, _FINENESS)), -_FINENESS) for values in (case.interface.nodes, case.z)
-    )
+    nodes, z = (samples.on_lattice(values, _FINENESS) for values in (case.interface.nodes, case.z))
     return replace(case, interface=case.interface.at(nodes), z=z, parameters={"shift": shift})
 
 

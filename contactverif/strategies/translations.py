@@ -70,7 +70,7 @@ def _translated_cases(draw: DrawFn) -> Case:
     moves = samples.repeat_cyclically(quarters, len(slave)) / 4 * depth + tilt * (x - (x[0] if tilt >= 0 else x[-1]))
     current = slave - moves[:, None] * [0.0, 1.0]
     reference, positions, master = (
-        _onto_lattice(samples.Motion(degrees)(points), -FINENESS) for points in (slave, current, line[::-1])
+        samples.on_lattice(samples.Motion(degrees)(points), FINENESS) for points in (slave, current, line[::-1])
     )
     interface = Interface.from_chains(reference, master)
     return Case(interface, np.vstack([positions, master]).reshape(-1), penalty, {"shift": shift}, seed, kind=kind)
@@ -98,17 +98,12 @@ def _master_line(
     return np.column_stack([x + shift, heights])
 
 
-def _onto_lattice(points: FloatArray, exponent: int) -> FloatArray:
-    """Return the points, each coordinate rounded to a multiple of 2^exponent."""
-    return np.round(points * 2.0**-exponent) * 2.0**exponent
-
-
 def _centre(case: Case, shift: FloatArray) -> Case:
     """Return a state with its centre moved to the origin, on a lattice fine for its size."""
     nodes, positions = case.interface.nodes, case.positions
     centre = positions.mean(axis=0)
     size = ceil(log2(max(np.abs(nodes - centre).max(), np.abs(positions - centre).max())))
-    reference, positions = (_onto_lattice(points - centre, size - FINENESS) for points in (nodes, positions))
+    reference, positions = (samples.on_lattice(points - centre, FINENESS - size) for points in (nodes, positions))
     moved = replace(case, interface=case.interface.at(reference), z=positions.reshape(-1))
     return replace(moved, parameters={"shift": np.ldexp(shift, size)})
 

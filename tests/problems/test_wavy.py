@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from subjects import load_subject
 
 from contactverif.contract.arrays import FloatArray
+from contactverif.contract.errors import MisuseError
 from contactverif.mechanics.accuracy import Solution, solve_for_accuracy
 from contactverif.mechanics.bulk import elasticity
 from contactverif.problems.problem import Variation
@@ -119,3 +121,21 @@ def test_displacements_of_another_code_have_the_errors_of_the_solution_that_they
     errors = instance.errors(ours)
     del errors["pressure"]  # Displacements say nothing of reported pressures.
     assert instance.errors(theirs) == {kind: pytest.approx(error, rel=1e-2) for kind, error in errors.items()}
+
+
+@pytest.mark.parametrize(
+    ("field", "wrong", "message"),
+    [
+        ("pressure", lambda places: 1.0, r"pressure: found shape \(\); needed \(\d+,\), a number for each place"),
+        ("pressure", lambda places: np.ones((len(places), 1)), r"pressure: found shape \(\d+, 1\); needed \(\d+,\)"),
+        ("motions", lambda places: places.T, r"motions: found shape \(2, \d+\); needed \(\d+, 2\), a vector for each"),
+    ],
+)
+def test_an_exact_field_of_a_wrong_shape_is_named(field: str, wrong: Any, message: str) -> None:
+    """Numpy would broadcast it, or speak of its own axes."""
+    subject = load_subject("vts-ppt")
+    instance = WAVY.pose(WAVY.meshes[0], 10.0, subject.traits, Variation())
+    solution = solve_for_accuracy(instance.scene, subject, instance.start, instance.step)
+    assert 0 < max(instance.errors(solution).values()) < 1
+    with pytest.raises(MisuseError, match=rf"ProblemInstance\.{message}"):
+        replace(instance, **{field: (wrong, wrong) if field == "motions" else wrong}).errors(solution)
