@@ -59,28 +59,26 @@ class NamedBlocks(NamedScene):
     rigid_master: bool = False  # True if the master is a rigid floor.
 
 
+_ON_A_FLOOR = partial(
+    NamedBlocks,
+    assumptions=f"the lengths of the segments; {_MATERIAL}",
+    master=[10],
+    slave_from=-5.0,
+    master_from=-5.0,
+    rigid_master=True,
+)
+_PUNCH = partial(
+    NamedBlocks,
+    assumptions=f"the meshes; {_MATERIAL}",
+    slave=[2, 2, 2],
+    slave_from=-3.0,
+    master_from=-6.0,
+    pressure=1.0,
+)
 BLOCKS: Mapping[str, NamedBlocks] = {
     "a1": NamedBlocks("two slave segments over one master segment", "case test A1, Fig. 8", _MATERIAL, [2, 2], [4]),
-    "a2-uniform": NamedBlocks(
-        "a uniform mesh on a rigid floor",
-        "case test A2, Fig. 11(a)",
-        f"the lengths of the segments; {_MATERIAL}",
-        [2, 2, 2, 2, 2],
-        [10],
-        slave_from=-5.0,
-        master_from=-5.0,
-        rigid_master=True,
-    ),
-    "a2-graded": NamedBlocks(
-        "a graded mesh on a rigid floor",
-        "case test A2, Fig. 11(c)",
-        f"the lengths of the segments; {_MATERIAL}",
-        [1, 2, 3, 4],
-        [10],
-        slave_from=-5.0,
-        master_from=-5.0,
-        rigid_master=True,
-    ),
+    "a2-uniform": _ON_A_FLOOR("a uniform mesh on a rigid floor", "case test A2, Fig. 11(a)", slave=[2, 2, 2, 2, 2]),
+    "a2-graded": _ON_A_FLOOR("a graded mesh on a rigid floor", "case test A2, Fig. 11(c)", slave=[1, 2, 3, 4]),
     "b": NamedBlocks(
         "non-matching; each area of competence lies over one master segment",
         "case test B, Fig. 16",
@@ -102,25 +100,15 @@ BLOCKS: Mapping[str, NamedBlocks] = {
         [2, 2, 4, 4],
         [3, 3, 3.2, 2.8],
     ),
-    "example-1": NamedBlocks(
+    "example-1": _PUNCH(
         "Taylor and Papadopoulos' punch; each area of competence lies over one master segment",
         "Example 1, Fig. 31",
-        f"the meshes; {_MATERIAL}",
-        [2, 2, 2],
-        [3, 1, 4, 1, 3],
-        slave_from=-3.0,
-        master_from=-6.0,
-        pressure=1.0,
+        master=[3, 1, 4, 1, 3],
     ),
-    "example-1bis": NamedBlocks(
+    "example-1bis": _PUNCH(
         "the same punch; areas of competence cross master nodes",
         "Example 1bis, Fig. 34",
-        f"the meshes; {_MATERIAL}",
-        [2, 2, 2],
-        [1.625, 1.75, 1.75, 1.75, 1.75, 1.75, 1.625],
-        slave_from=-3.0,
-        master_from=-6.0,
-        pressure=1.0,
+        master=[1.625, 1.75, 1.75, 1.75, 1.75, 1.75, 1.625],
     ),
     "dead-zone": NamedBlocks(
         "the slave overhangs the master on either side, inside a slave segment",

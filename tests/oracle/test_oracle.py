@@ -50,19 +50,9 @@ def test_an_overhanging_master_is_loaded_where_it_is_covered() -> None:
 
 def test_an_overhanging_slave_is_loaded_where_it_is_covered() -> None:
     """The other way round the same numbers, whichever surface is the slave; and both sides may overhang."""
-    interface, _ = chains([(0, 0), (4, 0)], [(2, 0), (1, 0)])
-    half = Fraction(1, 2)
-    assert uniform_pressure_weights_exact(interface, interface.nodes[:, 0]) == [
-        *(Fraction(5, 8), Fraction(3, 8)),
-        *(half, half),
-    ]
-    crossed, _ = chains([(0, 0), (4, 0)], [(8, 0), (3, 0)])  # over [3, 4]
-    assert uniform_pressure_weights_exact(crossed, crossed.nodes[:, 0]) == [
-        *(Fraction(1, 8), Fraction(7, 8)),
-        *(Fraction(1, 10), Fraction(9, 10)),
-    ]
-    apart, _ = chains([(0, 0), (4, 0)], [(8, 0), (5, 0)])
-    assert uniform_pressure_weights_exact(apart, apart.nodes[:, 0]) == [0] * 4
+    for last, first, weights in ((2, 1, "5/8 3/8 1/2 1/2"), (8, 3, "1/8 7/8 1/10 9/10"), (8, 5, "0 0 0 0")):
+        interface, _ = chains([(0, 0), (4, 0)], [(last, 0), (first, 0)])
+        assert uniform_pressure_weights_exact(interface, interface.nodes[:, 0]) == [*map(Fraction, weights.split())]
 
 
 @CHECKED

@@ -12,7 +12,6 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import parse_name, unknown_name_error
 from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
-from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, is_uniform, pressure_of
 from contactverif.problems.catalogue import BLOCKS, OPTIONS, SCENES, load_scene, make_scene, options_of
 from contactverif.problems.disk import disk_on_foundation
@@ -201,10 +200,8 @@ def test_options_from_text_are_those_of_python() -> None:
     }
     assert {option for options in texts.values() for option in options} == set(OPTIONS)
     for text, options in texts.items():
-        arrays, other = (
-            load_scene(text).case().to_arrays(),
-            make_scene(text.partition(":")[0], **options).case().to_arrays(),
-        )
+        scenes = load_scene(text), make_scene(text.partition(":")[0], **options)
+        arrays, other = (scene.case().to_arrays() for scene in scenes)
         assert all(np.array_equal(arrays[key], other[key]) for key in arrays), text
 
 
@@ -340,16 +337,8 @@ def test_names_with_options(text: str, name: str, options: dict[str, Any]) -> No
 
 def test_an_unknown_name_suggests_the_nearest_or_lists_all() -> None:
     names = ["vts-ppt", "vts-me", "nts"]
-    assert str(unknown_name_error("formulation", "vts-pt", names)).startswith(
-        "formulation: found 'vts-pt'; needed a name that exists; the nearest: vts-ppt"
-    )
-    assert (
-        str(unknown_name_error("formulation", "xyz", names))
-        == "formulation: found 'xyz'; needed one of nts, vts-me, vts-ppt"
-    )
-    assert (
-        str(unknown_name_error("formulation", "xyz", []))
-        == "formulation: found 'xyz'; needed a name, but there is none"
-    )
+    nearest = "found 'vts-pt'; needed a name that exists; the nearest: vts-ppt"
+    assert str(unknown_name_error("formulation", "vts-pt", names)).startswith(f"formulation: {nearest}")
+    for known, words in ((names, "one of nts, vts-me, vts-ppt"), ([], "a name, but there is none")):
+        assert str(unknown_name_error("formulation", "xyz", known)) == f"formulation: found 'xyz'; needed {words}"
     assert unknown_name_error("formulation", "nts", ["nts-ar", "nts"]).found == "'nts'"
-    assert catalogue.MODERATE_PENALTY == 10
