@@ -1,4 +1,4 @@
-"""What all cases are made of: lengths, depths of penetration, rigid motions, penalties, seeds, and chains of points.
+"""The pieces of all cases: lengths, depths of penetration, rigid motions, penalties, seeds, and chains of points.
 
 Lengths are small integers × 2^k, so that coordinates are exact in binary. Each strategy shrinks to the simplest thing:
 length 1, a quarter of a segment of penetration, no motion, scale 1. Strategies are cached because hypothesis validates

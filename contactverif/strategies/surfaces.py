@@ -297,8 +297,8 @@ def surface_cases(
 
     On an interface of the user they are states of this.
     """
-    own = _tilted_states(surface_pairs(faces=faces), smooth=False)
-    return own if interface is None else given_surface_states(interface, smooth=False)
+    states = _tilted_states(surface_pairs(faces=faces), smooth=False)
+    return states if interface is None else given_surface_states(interface, smooth=False)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
@@ -309,8 +309,8 @@ def smooth_surface_cases(
 
     On an interface of the user they are states of this.
     """
-    own = _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
-    return own if interface is None else given_surface_states(interface, smooth=True)
+    states = _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
+    return states if interface is None else given_surface_states(interface, smooth=True)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
