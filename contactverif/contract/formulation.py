@@ -395,14 +395,7 @@ class Formulation(ResidualOnly, Protocol):
         ...
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing | Mapping[str, NDArray[Any]]:
-        """Decide who touches whom. Optional.
-
-        Parameters
-        ----------
-        interface : Interface
-            The meshes in their reference configuration.
-        z : FloatArray, shape (n_unknowns,)
-            One state: current positions, then multipliers.
+        """Decide who touches whom at one state z (n_unknowns,): current positions, then multipliers. Optional.
 
         Returns
         -------
@@ -412,12 +405,7 @@ class Formulation(ResidualOnly, Protocol):
         ...
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
-        """Return the derivative of the residual on a frozen pairing. Optional.
-
-        Parameters
-        ----------
-        interface, pairing, z : Interface, Pairing, FloatArray of shape (n_unknowns,)
-            As for ``residual``; z is one state.
+        """Return the derivative of the residual at one state z (n_unknowns,), on a frozen pairing. Optional.
 
         Returns
         -------
@@ -433,11 +421,6 @@ class Formulation(ResidualOnly, Protocol):
         ``tangent`` too. The answers may differ from those of the two methods by roundoff; the property ``purity``
         compares them.
 
-        Parameters
-        ----------
-        interface, pairing, z : Interface, Pairing, FloatArray of shape (n_unknowns,)
-            As for ``residual``; z is one state, never a batch.
-
         Returns
         -------
         residual : FloatArray, shape (n_unknowns,)
@@ -448,12 +431,7 @@ class Formulation(ResidualOnly, Protocol):
         ...
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """Return where the formulation looks for contact, and what it finds there. Optional.
-
-        Parameters
-        ----------
-        interface, pairing, z : Interface, Pairing, FloatArray of shape (n_unknowns,)
-            As for ``residual``; z is one state.
+        """Return where the formulation looks for contact at one state, and what it finds there. Optional.
 
         Returns
         -------
