@@ -2,20 +2,18 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import cos, inf, radians, sin
+from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
 import pytest
-import skfem
 from subjects import Changed, load_subject
 
-from contactverif import Body, Case, Interface, MisuseError, Subject, Surface, body_from_mesh, oracle
+from contactverif import Body, Case, Interface, MisuseError, Subject, Surface, oracle
 from contactverif.compiler import python_function
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.geometry import projection
 from contactverif.mechanics import newton
-from contactverif.mechanics import scene as scene_module
 from contactverif.mechanics.bodies import Placing, Rectangle, block, rigid_surface
 from contactverif.mechanics.bulk import assemble_stiffness
 from contactverif.mechanics.scene import Scene, WholeScene, has_bodies, scene_of
@@ -177,22 +175,6 @@ def test_the_first_guess() -> None:
     assert np.array_equal(scene.case().z, scene.positions(scene.start))
 
 
-def test_sparse_matrices_where_there_is_much(monkeypatch: pytest.MonkeyPatch) -> None:
-    dense = press_blocks()
-    q = at_random(dense)
-    positions, forces = dense.positions(q), dense.bulk_forces(q)
-    monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
-    monkeypatch.setattr(scene_module, "DENSE_SHARE", inf)
-    large = replace(dense)
-    assert not isinstance(large.stiffness, np.ndarray)
-    assert not isinstance(large.transformation, np.ndarray)
-    assert np.array_equal(large.stiffness.toarray(), dense.stiffness)
-    assert np.array_equal(large.transformation.toarray(), dense.transformation)
-    assert np.abs(large.positions(q) - positions).max() <= 2 * UNIT_ROUNDOFF * np.abs(positions).max()
-    terms = np.abs(dense.stiffness) @ np.abs(q) + np.abs(dense.load)
-    assert (np.abs(large.bulk_forces(q) - forces) <= 2 * len(q) * UNIT_ROUNDOFF * terms).all()
-
-
 # --- forces against exact ones ----------------------------------------------------------------------------------
 
 
@@ -284,23 +266,6 @@ def test_wrong_scenes(bodies: tuple[Body, ...], slave: Any, master: Any, message
         Scene(bodies, slave, master)
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
-
-
-def test_supports_are_asked_of_a_body_from_a_mesh() -> None:
-    mesh = skfem.MeshQuad.init_tensor(np.arange(5.0), np.arange(3.0)).with_defaults()
-    for supports, description in (
-        ({}, "no supports"),
-        ({"top": "across"}, "supports"),
-        ({"left": "across"}, "supports"),
-    ):
-        loose = body_from_mesh(mesh, contact="bottom", supports=supports, name="punch")
-        with pytest.raises(MisuseError) as error:
-            Scene((loose, MASTER))
-        assert (
-            str(error.value) == f"supports of punch: found {description}: it can move along its first axis{PREVENTION}"
-        )
-    for supports in ({"left": "along"}, {"top": "along"}, {"top": "both"}):
-        Scene((body_from_mesh(mesh, contact="bottom", supports=supports), MASTER))  # contact holds the rest
 
 
 def test_bodies_that_cannot_meet() -> None:
