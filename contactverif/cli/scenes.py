@@ -66,10 +66,10 @@ def draw(
         for option, value in (("--case", case), ("REPORT", report)):
             if value is not None:
                 raise MisuseError("--scene", f"{scene} and {option} {value}", "one of the two")
-        posed = load_scene(scene).case()
+        case_of_scene = load_scene(scene).case()
         if not names:
             raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
-        complete = _draw_solved(posed, names, scene, files, limits)
+        complete = _draw_solved(case_of_scene, names, scene, files, limits)
     else:
         stored = _read_stored(report, case)
         if has_bodies(stored.case):

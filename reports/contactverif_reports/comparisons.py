@@ -189,7 +189,7 @@ class Differing:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """Whether one passes and the other does not, and how many powers of ten they are apart."""
+        """True if one passes and the other does not; and the powers of ten between them."""
         far = abs(float(self.pair.decades[self.number]))
         return bool(self.pair.apart[self.number]), inf if isnan(far) else far
 

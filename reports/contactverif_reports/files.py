@@ -28,7 +28,7 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
     name = os.fspath(path)
     target = Path(os.path.realpath(path))  # `resolve` raises an error for links that form a loop.
     file = f"the name of a file, {form}"
-    for wrong, found, needed in (
+    for wrong, words, needed in (
         (not name or name.endswith(os.sep), f"{name!r}, which names no file", file),
         (target.is_dir(), f"{name}, a folder", file),
         (target.exists() and not target.is_file(), f"{name}, which is no ordinary file", file),
@@ -40,7 +40,7 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
         ),
     ):
         if wrong:
-            raise MisuseError(argument, found, needed)
+            raise MisuseError(argument, words, needed)
     part = _part(target)
     try:
         part.touch()
@@ -68,10 +68,10 @@ def made_folder(folder: Path, argument: str) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        found = (
+        words = (
             f"{folder}, which is no folder" if isinstance(error, FileExistsError) else f"{folder} ({error.strerror})"
         )
-        raise MisuseError(argument, found, "a folder that can be written") from None
+        raise MisuseError(argument, words, "a folder that can be written") from None
 
 
 @contextmanager

@@ -102,8 +102,8 @@ class Changes:
     @property
     def regressions(self) -> tuple[str, ...]:
         """The regressions: a line for each row, and for each plugin that does not load any more."""
-        lost = (f"{name}: not loaded any more: {reason}" for name, reason in self.no_longer_loaded.items())
-        return (*self._lines("regressions"), *lost)
+        plugins = (f"{name}: not loaded any more: {reason}" for name, reason in self.no_longer_loaded.items())
+        return (*self._lines("regressions"), *plugins)
 
     @property
     def noteworthy(self) -> tuple[str, ...]:
@@ -128,7 +128,7 @@ class Changes:
     def between(cls, old: NamedRun, new: NamedRun) -> Changes:
         """Compare the rows that both runs have; none if they have nothing in common."""
         same = {key: old.run.provenance.get(key) == new.run.provenance.get(key) for key in ("seed", "examples")}
-        asked = (*old.run.formulations, *old.run.properties)
+        names = (*old.run.formulations, *old.run.properties)
         lost_before = {item.formulation for item in old.run.not_loaded}
         return cls(
             old=old,
@@ -143,7 +143,7 @@ class Changes:
             no_longer_loaded={
                 item.formulation: item.reason
                 for item in new.run.not_loaded
-                if item.formulation in asked and item.formulation not in lost_before
+                if item.formulation in names and item.formulation not in lost_before
             },
         )
 
@@ -207,8 +207,8 @@ def _fewer(pair: Pair) -> list[str]:
             converged = (both & (ends == CONVERGED) for ends in (before, after))
             comparisons.append((*converged, wandering(n_both), words))
     lines = []
-    for held, holds, allowed, words in comparisons:
-        worse, better = int((held & ~holds).sum()), int((~held & holds).sum())
+    for old_mask, new_mask, allowed, words in comparisons:
+        worse, better = int((old_mask & ~new_mask).sum()), int((~old_mask & new_mask).sum())
         if worse - better > allowed:
             lines.append(f"{worse} of the same {words}{f', {better} the other way round' if better else ''}")
     return lines

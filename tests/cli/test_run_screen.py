@@ -107,8 +107,8 @@ def test_what_is_left_out_has_one_line_that_says_why_and_how_to_ask_it(ask: Ask)
 def test_what_could_not_be_judged_is_not_called_wrong() -> None:
     question = load_property("purity")
     row = Row("mine", question.info, Verdict.NOT_JUDGED, True, reason="stopped: 3 of 100 cases judged", planned=100)
-    shown = "\n".join(map(str, run_screen(Run((row,)), COLUMNS)))
-    assert "mine: 1 not judged\nnot judged:\n  purity  stopped: 3 of 100 cases judged\n" in shown
+    screen = "\n".join(map(str, run_screen(Run((row,)), COLUMNS)))
+    assert "mine: 1 not judged\nnot judged:\n  purity  stopped: 3 of 100 cases judged\n" in screen
 
 
 def test_a_wrong_force_beside_an_exact_one_is_shown_before_two_answers_that_differ() -> None:
@@ -133,8 +133,8 @@ def test_a_failure_in_words_is_not_shown_by_a_number_that_keeps_its_tolerance() 
     outcomes = (Outcome(case, Verdict.FAIL, measured.broken, measured),)
     other = Row("mine", load_property("purity").info, Verdict.FAIL, True, reason="it remembers")
     row = Row("mine", question.info, Verdict.FAIL, True, reason=measured.broken, planned=1, outcomes=outcomes)
-    shown = "\n".join(map(str, run_screen(Run((other, row)), COLUMNS)))
-    assert "hard.free-end  a force of 2 on a slave that faces no master\n" in shown
+    screen = "\n".join(map(str, run_screen(Run((other, row)), COLUMNS)))
+    assert "hard.free-end  a force of 2 on a slave that faces no master\n" in screen
 
 
 def test_a_run_that_judges_nothing_does_not_say_that_all_was_judged() -> None:

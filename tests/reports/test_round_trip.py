@@ -109,7 +109,7 @@ def everything_shown(run: Run) -> dict[str, str]:
     texts = {"page": report_page(run, "report.nc"), "last line": text_of(summary(run))}
     for width in (80, 140):
         texts |= {
-            f"{shown.__name__}, {width}": text_of(Group(*shown(run, width)), width) for shown in (run_screen, run_table)
+            f"{view.__name__}, {width}": text_of(Group(*view(run, width)), width) for view in (run_screen, run_table)
         }
     texts |= {example.id: text_of(counterexample_text(example, Path("r.nc"))) for example in failing_examples(run)}
     for reference in run.formulations[:1] if run.rows else ():

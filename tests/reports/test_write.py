@@ -282,14 +282,14 @@ def test_what_cannot_be_written_is_said_at_once(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()
     os.mkfifo(tmp_path / "pipe")
-    for path, found in {
+    for path, reason in {
         tmp_path / "no" / "report.nc": "which is no folder",
         file / "report.nc": "which is no folder",
         tmp_path: "a folder",
         tmp_path / "pipe": "no ordinary file",
         tmp_path / ("long" * 62): "too long",
     }.items():
-        with pytest.raises(MisuseError, match=found) as error:
+        with pytest.raises(MisuseError, match=reason) as error:
             check_writable(path)
         assert error.value.argument == "--out"
     for path_ in ("", "folder/"):
