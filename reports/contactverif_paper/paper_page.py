@@ -116,10 +116,10 @@ def page(paper: Paper, figures: Mapping[str, Markup]) -> str:
 def summary(paper: Paper) -> str:
     """Return every statement that does not merely note a silence, a line each."""
     return "\n".join(
-        f"  {LOOKS[one.agreement][0]:3} {one.agreement.words:17} {one.place}: {one.result}"
-        + (f". It holds if: {one.condition}" if one.condition else "")
-        for one in paper.statements
-        if one.agreement is not Agreement.SILENT
+        f"  {LOOKS[statement.agreement][0]:3} {statement.agreement.words:17} {statement.place}: {statement.result}"
+        + (f". It holds if: {statement.condition}" if statement.condition else "")
+        for statement in paper.statements
+        if statement.agreement is not Agreement.SILENT
     )
 
 
