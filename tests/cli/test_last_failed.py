@@ -10,6 +10,7 @@ from subjects import ResidualAlone
 
 import contactverif_nts
 from contactverif.cli import progress
+from contactverif.run.scheduler import Progress
 
 ID = "patch.flat.transmission"
 OPTIONS = ("-p", ID, "-p", "balance.force", "--examples", "5", "--isolation", "inline")
@@ -37,7 +38,12 @@ def test_what_fails_is_kept_and_asked_first_until_it_passes(
     ask: Ask, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines: list[str] = []
-    monkeypatch.setattr(progress.Bar, "_show_row", lambda _, row: lines.append(f"{row.property_id} {row.planned}"))
+
+    def show_progress(bar: progress.Bar, step: Progress) -> None:
+        if step.row is not None:
+            lines.append(f"{step.row.property_id} {step.row.planned}")
+
+    monkeypatch.setattr(progress.Bar, "show_progress", show_progress)
     assert ask("verify", "mine", *OPTIONS, "--seed", "1").status == 1
     assert [file.name for file in folder.iterdir()] == [f"mine.{ID}.npz"]
     assert lines == ["balance.force 5", f"{ID} 5"]
