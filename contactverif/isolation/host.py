@@ -241,13 +241,13 @@ class Host:
             self._forgotten = []
         process = self._process
         is_answered = process is None and not questions
-        lost = PluginError(f"{questions[0].verb if questions else ''}: its process has ended", "channel")
+        failure = PluginError(f"{questions[0].verb if questions else ''}: its process has ended", "channel")
         try:
             if process is not None:
                 self._exchange(process, waiting)
                 is_answered = True
         except PluginError as error:
-            lost = error
+            failure = error
             self.n_ended += 1
             if error.cause == "hang":
                 verb = next((question.verb for question in questions if question.answer is None), "")
@@ -256,12 +256,12 @@ class Host:
             self.read_last_words()
             self._process = None
         except BaseException:  # The process is ended, see `PluginProcess.ask`, and nobody is to blame.
-            lost = PluginError("the question was interrupted", "not asked")
+            failure = PluginError("the question was interrupted", "not asked")
             self._process = None
             raise
         finally:
             for question in questions:
-                question.answer = question.answer or lost
+                question.answer = question.answer or failure
         return is_answered
 
     def _exchange(self, process: PluginProcess, waiting: list[tuple[Request | Solve, Question | None]]) -> None:

@@ -57,7 +57,7 @@ class Wrapper:
 
 @dataclass(frozen=True)
 class _Remote(Generic[_Traits]):
-    """What a program, `command`, has loaded by its name, in a process within limits. It can be pickled."""
+    """A plugin that a program, `command`, has loaded by its name, in a process within limits. It can be pickled."""
 
     command: tuple[str, ...]
     name: str

@@ -17,12 +17,12 @@ def _end_processes() -> Iterator[None]:
 @pytest.fixture
 def messages(monkeypatch: pytest.MonkeyPatch) -> list[list[tuple[str, float | None]]]:
     """Return the messages to processes: of each question its method, and the seconds that the message has."""
-    seen: list[list[tuple[str, float | None]]] = []
+    log: list[list[tuple[str, float | None]]] = []
     real = PluginProcess.ask
 
     def note(self: PluginProcess, frame: bytes, questions: Sequence[Question], seconds: float | None = None) -> None:
-        seen.append([(question.verb, seconds) for question in questions])
+        log.append([(question.verb, seconds) for question in questions])
         real(self, frame, questions, seconds)
 
     monkeypatch.setattr(PluginProcess, "ask", note)
-    return seen
+    return log

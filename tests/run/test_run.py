@@ -47,7 +47,7 @@ def measure_residual(case: Case, subject: Subject) -> Measurement:
     return Measurement([ERROR.check(float(np.abs(forces).max()), 1e-6)])
 
 
-def listed(*numbers: int) -> Property:
+def list_sizes(*numbers: int) -> Property:
     """Return the property on a finite list of cases of these sizes."""
     return replace(ZERO, cases=lambda _: tuple(a_case(size, f"size {size}") for size in numbers))
 
@@ -129,7 +129,7 @@ def test_where_there_are_fewer_cases_all_are_judged() -> None:
 
 def test_all_cases_of_a_finite_list_are_judged_whatever_the_number_of_examples() -> None:
     for examples in (1, 100):
-        row = one_row(subject(), listed(3, 1, 2), examples=examples)
+        row = one_row(subject(), list_sizes(3, 1, 2), examples=examples)
         assert (row.verdict, row.planned, row.judged) == (Verdict.PASS, 3, 3)
         assert [outcome.case.name for outcome in row.outcomes] == ["size 3", "size 1", "size 2"]
 
@@ -158,7 +158,7 @@ def test_a_case_of_a_kind_shrinks_to_one_of_its_kind() -> None:
 
 
 def test_the_case_of_a_finite_list_that_fails_is_called_by_its_name_and_not_shrunk() -> None:
-    row = one_row(subject(from_size(2)), listed(3, 1, 2))
+    row = one_row(subject(from_size(2)), list_sizes(3, 1, 2))
     assert (row.verdict, row.failing_names) == (Verdict.FAIL, ("size 3", "size 2"))
     assert row.reason == "size 3: error 1, at most 1e-06"
     assert (row.shrunk, row.first) == (None, row.outcomes[0])
@@ -333,7 +333,7 @@ def test_a_promise_to_fail_is_broken_when_nothing_fails(least: int, verdict: Ver
 
 
 def test_a_case_of_a_finite_list_is_a_witness_by_its_name_and_is_judged_once() -> None:
-    row = one_row(subject(from_size(2), flat=False, witnesses={"patch.zero": "size 2"}), listed(1, 2, 3))
+    row = one_row(subject(from_size(2), flat=False, witnesses={"patch.zero": "size 2"}), list_sizes(1, 2, 3))
     assert (row.verdict, row.unexpected) == (Verdict.FAIL, "")
     assert row.witness is row.outcomes[1]
 
@@ -470,7 +470,7 @@ def test_a_known_failure_is_expected_and_a_known_pass_is_not() -> None:
         ({"seed": -1}, "seed: found -1"),
         ({"shrink": "some"}, "shrink: found 'some'; needed one, new, all or none"),
         ({"known": {"patch.zeros": "issue 12"}}, r"known failure: found 'patch.zeros'; .* nearest: patch.zero"),
-        ({"question": listed(1, 1)}, "cases: found 2 times 'size 1'"),
+        ({"question": list_sizes(1, 1)}, "cases: found 2 times 'size 1'"),
         ({"question": replace(ZERO, cases=lambda _: (a_case(1),))}, "cases: found a case without a name"),
     ],
 )
