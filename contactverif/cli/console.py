@@ -40,9 +40,9 @@ def columns() -> int:
 
 
 def show(*contents: RenderableType) -> None:
-    """Print to standard output, as wide as the terminal, or wide enough where there is none."""
+    """Print to standard output, as wide as the terminal, or wide enough where there is none. A command is never cut."""
     console = _console()
-    console.print(_clean(console, Group(*contents)))
+    console.print(_clean(console, Group(*contents)), crop=False)
 
 
 def _console() -> QuietConsole:
