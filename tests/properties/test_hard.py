@@ -49,7 +49,8 @@ def turn_of(case: Case) -> tuple[int, int, int]:
 def test_a_flat_state_is_flat_to_the_last_bit(case: Case) -> None:
     n_slave = case.interface.n_slave_nodes
     loaded = np.flatnonzero(case.parameters["weights"][n_slave:]) + n_slave
-    _, heights = read_frame(case.positions, turn_of(case), case.positions[loaded[0]])
+    p, q, r = turn_of(case)
+    heights = [height for (height,) in read_frame(case.positions, [(-q, p)], r, case.positions[loaded[0]])]
     assert len(set(heights[:n_slave])) == 1
     assert {heights[node] for node in loaded} == {0}
     assert -heights[0] == Fraction(case.parameter("penetration"))
