@@ -1,8 +1,9 @@
 """The declaration of what a report holds about outcomes, rows and runs: name, unit, meaning and place of each number.
 
 netCDF, JSON and data frames are made from these tables, and a report is checked and read by them. To add a column, add
-a line here, and its attribute to the class. A change of the meaning of a file that exists already raises `SCHEMA`.
-The prose is in `reports/README.md`, and a test compares it with a file.
+a line here, the attribute that it reads to `Outcome`, `Tally` or `Row` in `result.py`, and its sentence to
+`reports/README.md`; `python tests/reports/test_exchange.py` writes the JSON schema anew. A change of the meaning of a
+file that exists already raises `SCHEMA`.
 """
 
 from __future__ import annotations

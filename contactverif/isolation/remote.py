@@ -1,7 +1,7 @@
 """Formulations and engines in processes of their own, with the methods of those in this one.
 
-Rules: each answers as it does in this process, but for a process that dies or hangs. One whose process ended is the
-same in the next process. Nothing of a plugin is imported here, and what its process states is checked like an answer.
+Rules: each answers as it does in this process, but for a process that dies or hangs. After its process has ended, a new
+one answers in its place. Nothing of a plugin is imported here, and what its process states is checked like an answer.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class _Remote(Generic[_Traits]):
     limits: Limits
     traits: _Traits
     provides: frozenset[str] = frozenset()  # The optional methods that the plugin has.
-    second: bool = False
+    second: bool = False  # A second process of the same plugin, which `purity` compares with the first.
 
     @property
     def host(self) -> Host:

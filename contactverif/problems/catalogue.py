@@ -4,7 +4,8 @@ The lengths along the interface are the paper's where it prints them (A1, B, C).
 lateral supports or lengths of the elements of A2 and of Examples 1 and 1bis, and little of the meshes of Example 2.
 Those are assumptions, and the attribute `assumptions` of each scene says so.
 
-Rule for the next editor: this file is data. A new scene is one entry of `BLOCKS` or `SCENES`, with its source.
+Rule for the next editor: this file is data. A new scene of `verify --scene` is one entry of `BLOCKS` or `SCENES`, with
+its source. A scene of `bench`, with an exact solution, is a `Problem` (`problem.py`).
 
 References
 ----------

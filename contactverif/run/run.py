@@ -3,7 +3,7 @@
 Each formulation is called once before anything else, and properties that state a turn are asked first. The cases of a
 strategy are drawn once for all formulations and all properties that have it, they are judged, and what failed is
 shrunk. Properties that solve bodies come last. All planned cases of a row are judged before one is shrunk, so that a
-failure ends nothing early. What the store has is not judged again, and a block of which it has all is not drawn.
+failure ends nothing early. What the store has is not judged again, and a block is not drawn if the store has all of it.
 """
 
 from __future__ import annotations
@@ -190,7 +190,8 @@ class Driver:
         self._known = known or {}
         self._share, self._shrink, self._keep_going = share, shrink, keep_going
         self._rows: dict[tuple[str, str], OpenRow | Row] = {}
-        # Properties with the same cases. Those that solve bodies take long, and a person waits for the first row.
+        # Properties with the same cases. Those that state a turn come first, and those that solve bodies last: they
+        # take long, and a person waits for the first row.
         self._groups: dict[tuple[str, bool], list[Property]] = {}
         # The property that each formulation is asked: with cases in the plane, or in space.
         self._variants: dict[tuple[str, str], Property] = {}

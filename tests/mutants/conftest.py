@@ -29,8 +29,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     ids = list(dict.fromkeys([*ids, *(json.loads(cell)[1] for cell in cells)]))
     matrix = {}
     for name, intended, number in map(json.loads, dict.fromkeys(cells)):
-        row = {each: int(cell) if (cell := rows.get(name, {}).get(each, "")).isdigit() else 0 for each in ids}
-        matrix[name] = intended, row | {intended: number}
+        row = {each: int(cell) if cell.isdigit() else 0 for each, cell in rows.get(name, {}).items() if each in ids}
+        matrix[name] = intended, {**dict.fromkeys(ids), **row, intended: number}
     terminalreporter.section("kill matrix")
     heading = f"the first of {EXAMPLES} cases that caught the mutant, in brackets; all others from {KILL_TABLE.name}"
     for line in (heading, *as_lines(matrix)):

@@ -147,11 +147,11 @@ def test_a_mutant_whose_line_is_gone_says_so() -> None:
 
 def test_the_matrix_marks_what_was_meant_and_what_survives() -> None:
     lines = as_lines(
-        {"caught": ("a.b", {"a.b": 3, "c.d": 1, "c.e": 0}), "not": ("c.e", {"a.b": 0, "c.d": 0, "c.e": 0})}
+        {"caught": ("a.b", {"a.b": 3, "c.d": 1, "c.e": 0}), "not": ("c.e", {"a.b": 0, "c.d": None, "c.e": 0})}
     )
     assert [line.split() for line in lines] == [
         ["a", "d", "e"],
         ["caught", "[3]", "1", "·"],
-        ["not", "·", "·", "[]"],
+        ["not", "·", "?", "[]"],
         ["caught", "1", "1", "0"],
     ]

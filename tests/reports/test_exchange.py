@@ -63,7 +63,7 @@ def _idle_by_numpy(outcome: Outcome) -> Outcome:
 
 
 def test_the_schema_in_the_repository_is_that_of_the_document() -> None:
-    """`python -c "…exchange.run_document import *; SCHEMA.write_bytes(schema())"` writes it anew."""
+    """`python tests/reports/test_exchange.py` writes it anew."""
     assert SCHEMA.read_bytes() == schema()
 
 
@@ -96,3 +96,7 @@ def test_each_row_is_a_test_case_that_ends_as_the_row_does(run: Run, tmp_path: P
     assert "slave" in str(failure.text)  # The drawing
     assert [case.get("name") for case in by_name["vts-ppt"].findall("testcase[failure]")] == ["sign"]
     assert by_name["gone"].get("errors") == "1"
+
+
+if __name__ == "__main__":
+    (Path(__file__).parents[2] / "reports" / "contactverif_reports" / "exchange" / SCHEMA.name).write_bytes(schema())

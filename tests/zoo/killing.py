@@ -123,11 +123,12 @@ def without_points(make: Make) -> Make:
     return lambda *, penalty: Changed(make(penalty=penalty), contact_points=None)
 
 
-def as_lines(matrix: dict[str, tuple[str, dict[str, int]]]) -> list[str]:
+def as_lines(matrix: dict[str, tuple[str, dict[str, int | None]]]) -> list[str]:
     """Write the kill matrix as text, from {mutant: (the property that is meant to catch it, its cells)}.
 
-    A number is the first case that caught the mutant, in brackets where the property is the one that is meant to; a
-    bracket without a number is a survivor. A title is the first word of an id, or the last where several share it.
+    A number is the first case that caught the mutant, in brackets where the property is the one that is meant to. A
+    bracket without a number is a survivor, and "?" a pair that was never asked. A title is the first word of an id, or
+    the last where several share it.
     """
     ids = list(next(iter(matrix.values()))[1])
     families = [name.partition(".")[0] for name in ids]
@@ -137,8 +138,9 @@ def as_lines(matrix: dict[str, tuple[str, dict[str, int]]]) -> list[str]:
     ]
     rows = [["", *titles]]
     for name, (intended, row) in matrix.items():
-        rows.append([name, *(f"[{row[each] or ''}]" if each == intended else str(row[each] or "·") for each in ids)])
-    rows.append(["caught", *(str(sum(row[each] > 0 for _, row in matrix.values())) for each in ids)])
+        cells = {each: "?" if number is None else str(number or "·") for each, number in row.items()}
+        rows.append([name, *(f"[{row[each] or ''}]" if each == intended else cells[each] for each in ids)])
+    rows.append(["caught", *(str(sum((row[each] or 0) > 0 for _, row in matrix.values())) for each in ids)])
     margin = max(map(len, matrix))
     return [
         f"{name:{margin}}  "
