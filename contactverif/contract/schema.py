@@ -70,7 +70,7 @@ class ReportColumn:
     """One column of a report: a variable of a netCDF file, and a key in JSON and in data frames."""
 
     name: str  # The name of the variable; empty if netCDF has none.
-    path: str  # The attribute, such as `measurement.undecided`; None on the way is nothing. Of bits one for each bit.
+    path: str  # The attribute, such as `measurement.undecided`. If one on the way is None, the number is missing.
     # real and count: numbers; code: an integer with a meaning; bits: truths; place: the place of a word among those
     # along the dimension of `axes`; words: text.
     kind: Kind

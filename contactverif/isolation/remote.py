@@ -296,7 +296,7 @@ class RemoteFormulation(Prefetching):
 class RemotePairing(Pairing):
     """A pairing that the process of a plugin keeps. It comes here, and is checked, when it is looked into.
 
-    The process keeps it as long as this object is there, and nobody here keeps more of it than this object.
+    The process keeps it as long as this object is there.
     """
 
     __slots__ = ("_content", "_host", "_interface", "_question", "_started")
@@ -363,7 +363,7 @@ def _pick(arrays: dict[str, Array], verb: str, name: str) -> Array:
 
 
 def _tangent(arrays: dict[str, Array], verb: str, size: int) -> Any:
-    """Return the tangent (size, size), dense or in the format in which it came, with nothing checked but coo."""
+    """Return the tangent (size, size), dense or in the format in which it came. Only a coo is checked."""
     if "dense" in arrays:
         return arrays["dense"]
     kind = next((kind for kind in _COMPRESSED if f"{kind} data" in arrays), "coo")
@@ -385,7 +385,7 @@ def python_program(file: str) -> tuple[str, ...]:
 def engine_program(entry: str, options: Mapping[str, Any], python: str | None = None) -> tuple[str, ...]:
     """Return the command that makes an engine of an entry point, by default in the interpreter of this process.
 
-    An interpreter of its own finds its own modules first, and of this process's the harness and the engine alone.
+    An interpreter of its own finds its own modules first, and of those of this process only the harness and the engine.
     """
     worker = str(Path(__file__).with_name("engine_worker.py"))
     places, folders = ({}, filter(None, sys.path)) if python is None else (_places_of(entry), ())
@@ -405,7 +405,7 @@ def _places_of(entry: str) -> dict[str, str]:
     names = {"contactverif", module, "landlockpy", *(name for name in owners if installed & set(owners[name]))}
     specs = ((name, importlib.util.find_spec(name)) for name in sorted(names))
     return {
-        name: str(Path(spec.origin).parents[bool(spec.submodule_search_locations)])
+        name: str(Path(spec.origin).parents[bool(spec.submodule_search_locations)])  # The parent of a package's folder.
         for name, spec in specs
         if spec and spec.origin
     }

@@ -134,8 +134,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     loop, with the pairing frozen?
 
     **Why it matters.** With a symmetric tangent the linear solver needs half of the memory and of the time. Forces
-    without a potential do work in a closed loop: a vibrating part gains energy from contact. Who says that a tangent is
-    symmetric, and makes it so by leaving out its other half, loses the quadratic convergence.
+    without a potential do work in a closed loop: a vibrating part gains energy from contact. A formulation that makes
+    its tangent symmetric by leaving out the other half loses the quadratic convergence.
 
     **How it is judged.** The first number is max|K − Kᵀ| over max|K|, rows and columns of multipliers included. The
     tolerance is u(8Z/min(g, ℓ) + 4N). The second is the work in a closed loop over the sum of the works on its parts.
@@ -145,7 +145,7 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
 
     Without a pairing, a loop in which work is left and that may cross a kink is followed by one with r = 2^-15 ℓ, then
     by one with 2^-20 ℓ; those of a barrier are too, since its forces bend where they begin. Kinks are looked for at √2
-    r along the two directions that span a circle, which none within the circle escapes.
+    r along the two directions that span a circle: the square between these four points holds the circle.
 
     **Undecided.** A loop in which work is left is undecided where the formulation has no pairing, and a kink is nearer
     than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
@@ -181,7 +181,7 @@ def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[f
             slope = measure_jump(state, radius, directions) / radius
             undecided = excuse_barrier(state, radius, radius, work * slope)
             continue
-        # Two directions of a plane that reach √2 as far enclose the circle.
+        # The four points at ±√2 r along the two directions of a plane are the corners of a square around the circle.
         kinks = (find_kink(state, np.sqrt(2) * radius, direction) for direction in directions)
         undecided = next(filter(None, kinks), "")
         if not undecided:
@@ -207,7 +207,7 @@ N_STEPS = 12  # The steps of the way that are looked at first.
 PLACES = np.linspace(0.0, 1.0, N_STEPS + 1)
 MOST_JUMPS = 3  # So many jumps are looked for, from the largest on.
 HALVINGS, HALVINGS_OF_SLOPE = 20, 16
-FIRST = 3  # So many halvings of each of the largest steps, before one is chosen.
+FIRST_HALVINGS = 3  # Those of each of the largest steps, before one is chosen.
 ALLOWED, ALLOWED_OF_SLOPE = 2.0**-12, 2.0**-10  # Shares of the largest change over a step: 2^8 and 2^6 times 2^-n.
 DIFFERENCE = 2.0**-26  # The step of the central difference along the way.
 FORCE = Quantity(
@@ -315,10 +315,10 @@ def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: 
         if all(abs(number - other) > 1 for other in selected):
             selected.append(number)
     # A few halvings tell a jump from a bend of the way, which differs from its neighbours too.
-    few = _halve([steps[number] for number in selected[:MOST_JUMPS]], function, FIRST)
+    few = _halve([steps[number] for number in selected[:MOST_JUMPS]], function, FIRST_HALVINGS)
     jumps: list[tuple[float, float]] = []
     for bracket in sorted(few, key=lambda bracket: -bracket.excess):
-        (last,) = _halve([bracket], function, halvings - FIRST)
+        (last,) = _halve([bracket], function, halvings - FIRST_HALVINGS)
         jumps.append((last.left, last.change))
         if last.change <= allowed * float(np.abs(changes).max()):
             break
