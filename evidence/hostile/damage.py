@@ -175,7 +175,7 @@ class Campaign:
 
     def attack(self, kind: str, chance: random.Random, name: str = "") -> str:
         """Attack once, count the ending and return it; the name is that of a copy of what does harm."""
-        raise NotImplementedError
+        raise NotImplementedError  # Each campaign has an attack of its own.
 
     def add(self, kind: str, word: str) -> str:
         """Count an ending."""
