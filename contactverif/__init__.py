@@ -30,8 +30,7 @@ if TYPE_CHECKING:
         evaluate_both,
     )
     from contactverif.contract.interface import Interface, Surface
-    from contactverif.contract.measurement import Finding, Measurement, Quantity
-    from contactverif.contract.property import Outcome, Property, Verdict
+    from contactverif.contract.property import Finding, Measurement, Outcome, Property, Quantity, Verdict
     from contactverif.contract.result import Row, Run
     from contactverif.contract.subject import CheckedFormulation, Subject
     from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
@@ -59,8 +58,7 @@ _HOMES = {
     "contract.errors": ("ContactverifError", "ContractError", "MisuseError"),
     "contract.formulation": ("ContactPoints", "Formulation", "Handle", "Pairing", "ResidualOnly", "evaluate_both"),
     "contract.interface": ("Interface", "Surface"),
-    "contract.measurement": ("Finding", "Measurement", "Quantity"),
-    "contract.property": ("Outcome", "Property", "Verdict"),
+    "contract.property": ("Finding", "Measurement", "Outcome", "Property", "Quantity", "Verdict"),
     "contract.result": ("Row", "Run"),
     "contract.subject": ("CheckedFormulation", "Subject"),
     "contract.traits": ("Abilities", "Evidence", "PatchPromises", "Promises", "Rules", "Traits"),

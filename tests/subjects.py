@@ -5,7 +5,7 @@ from functools import cache, partial
 from typing import Any
 
 from contactverif import Case, Outcome, Property, Subject, Verdict, judge_case, load_formulation, load_properties
-from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Measurement
 from contactverif.plugins.registry import standalone_names
 
 

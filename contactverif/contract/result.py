@@ -19,8 +19,15 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, freeze
 from contactverif.contract.errors import LONGEST_FACT, clean, name_line, one_line
-from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import CLOSED_CHAIN, DECIDED, Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.property import (
+    CLOSED_CHAIN,
+    DECIDED,
+    CheckedNumber,
+    Outcome,
+    PropertyInfo,
+    Verdict,
+    checked_numbers,
+)
 
 _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what right formulations decide was decided.

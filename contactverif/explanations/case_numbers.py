@@ -13,8 +13,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
-from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import checked_numbers
+from contactverif.contract.property import CheckedNumber, checked_numbers
 from contactverif.explanations.terms import plain, symbol_meanings
 
 # A word, or a product of two symbols such as uX; what follows may make it another symbol: h_m, K', P1.

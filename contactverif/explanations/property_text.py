@@ -8,8 +8,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import combinations
 
-from contactverif.contract.measurement import Quantity
-from contactverif.contract.property import Property
+from contactverif.contract.property import Property, Quantity
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.explanations.case_numbers import symbols_of

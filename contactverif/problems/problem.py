@@ -14,7 +14,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError, describe_error, place_of_error
-from contactverif.contract.measurement import Quantity
+from contactverif.contract.property import Quantity
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import (
     Field,

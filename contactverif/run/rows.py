@@ -15,7 +15,7 @@ from functools import lru_cache, partial
 from itertools import chain, product
 from math import sqrt
 
-from contactverif.contract import records
+from contactverif.contract import schema
 from contactverif.contract.case import Case, needs_of_place
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Outcomes, Property, Verdict
@@ -45,8 +45,8 @@ class RowOutcomes(Outcomes):
         self._n_whole = whole
         self._whole: dict[int, Outcome] = {}
         self._n_failures = 0
-        self._forms: list[records.Form] = []
-        self._numbers_of_forms: dict[records.Form, int] = {}
+        self._forms: list[schema.Form] = []
+        self._numbers_of_forms: dict[schema.Form, int] = {}
         self._form_of = array("l")
         self._starts = array("q", [0])
         self._numbers = array("d")
@@ -67,7 +67,7 @@ class RowOutcomes(Outcomes):
             self._n_failures += number >= self._n_whole
             self._whole[number] = outcome if case is None else replace(outcome, case_or_summary=case)
         else:
-            form, numbers = records.encode(outcome)
+            form, numbers = schema.encode(outcome)
             form_number = self._numbers_of_forms.setdefault(form, len(self._forms))
             if form_number == len(self._forms):
                 self._forms.append(form)
@@ -89,7 +89,7 @@ class RowOutcomes(Outcomes):
         return _decoder_of(self._forms[self._form_of[number]])(numbers)
 
 
-_decoder_of = lru_cache(1000)(partial(records.decoder, Outcome))
+_decoder_of = lru_cache(1000)(partial(schema.decoder, Outcome))
 
 
 @dataclass(frozen=True, slots=True)

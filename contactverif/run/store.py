@@ -18,7 +18,7 @@ from typing import IO, Any
 import msgspec
 import numpy as np
 
-from contactverif.contract import records
+from contactverif.contract import schema
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, judge_stored
@@ -98,7 +98,7 @@ class _OutcomeFile(RecordFile):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self.forms: dict[records.Form, int] = {}
+        self.forms: dict[schema.Form, int] = {}
 
 
 def _spell_out(item: Any) -> Any:
@@ -131,7 +131,7 @@ class Writer:
 
     def add(self, place: int, outcome: Outcome) -> None:
         """Append the outcome of the case at a place behind the first."""
-        file, (form, numbers) = self.file, records.encode(outcome)
+        file, (form, numbers) = self.file, schema.encode(outcome)
         if form not in file.forms:
             if len(file.forms) >= _MOST_FORMS:
                 file.forms.clear()
@@ -241,7 +241,7 @@ class Store:
                 stored = _read_record(stream, record.form)
                 if not isinstance(stored, FormRecord):
                     return None
-                self._decoders[key] = records.decoder(Outcome, stored.form)
+                self._decoders[key] = schema.decoder(Outcome, stored.form)
             outcome = judge_stored(info, self._decoders[key](array("d", record.numbers)))
         except ValueError:  # They are damaged, do not belong together, or are of another property.
             return None

@@ -11,8 +11,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
-from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
-from contactverif.contract.property import WITH_BARRIER, Property
+from contactverif.contract.property import WITH_BARRIER, Finding, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases

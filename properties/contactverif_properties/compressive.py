@@ -20,8 +20,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import ACTIVATION, Case, Cases, random_source
 from contactverif.contract.errors import ContractError
 from contactverif.contract.interface import PLANE, TRIANGLE, Interface, Surface, turns_of
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import WITH_BARRIER, Property
+from contactverif.contract.property import WITH_BARRIER, Measurement, Property, Quantity, check_all
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Rules, Traits

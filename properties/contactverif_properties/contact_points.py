@@ -19,8 +19,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE, TRIANGLE, Interface, turns_of
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import exact_points

@@ -14,8 +14,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Measure, Property
+from contactverif.contract.property import Measure, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integrals, solve_for_accuracy, traction_forces

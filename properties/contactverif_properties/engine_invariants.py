@@ -11,8 +11,7 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, random_source
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.mechanics import changed_scenes
 from contactverif.mechanics.accuracy import Solution, solve_by_engine

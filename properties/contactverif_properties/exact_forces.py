@@ -17,7 +17,7 @@ from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE, Interface, Surface
-from contactverif.contract.measurement import Finding, Measurement, Quantity
+from contactverif.contract.property import Finding, Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights

@@ -23,8 +23,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.problems import flat_states, hard_corner_states

@@ -10,8 +10,7 @@ from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases
-from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import CheckedNumber, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.mechanics.accuracy import solve_by_engine
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors

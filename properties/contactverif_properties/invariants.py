@@ -18,8 +18,15 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.interface import PLANE, Interface, Surface
-from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity, check_all
-from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Property
+from contactverif.contract.property import (
+    WITH_BARRIER,
+    WITHOUT_BARRIER,
+    CheckedNumber,
+    Measurement,
+    Property,
+    Quantity,
+    check_all,
+)
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import default_points, nearest_segments

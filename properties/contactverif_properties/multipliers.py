@@ -9,8 +9,7 @@ from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case, Cases, random_source
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.mechanics.inf_sup import inf_sup_constant
 from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors

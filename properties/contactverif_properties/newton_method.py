@@ -21,8 +21,7 @@ from contactverif.contract.case import Case, Cases
 from contactverif.contract.errors import ContractError
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, Subject
 from contactverif.mechanics.changed_scenes import change_units, move, snap
 from contactverif.mechanics.linear import scale_factors

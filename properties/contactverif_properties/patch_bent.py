@@ -14,8 +14,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import SOLVE, CheckedFormulation, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine, solve_for_accuracy

@@ -17,8 +17,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.errors import ContractError
 from contactverif.contract.interface import PLANE, Interface
-from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
-from contactverif.contract.property import WITH_BARRIER, Property
+from contactverif.contract.property import WITH_BARRIER, Finding, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits, parse_forces
 from contactverif.oracle import nodal_spring_weights, nodal_surface_weights

@@ -19,8 +19,7 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, dense
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.engine import EngineAnswer
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, EngineSubject, Subject
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine
 from contactverif.mechanics.linear import RANK_ROUNDOFF

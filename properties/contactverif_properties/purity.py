@@ -12,8 +12,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
-from contactverif.contract.measurement import CheckedNumber, Measurement, Quantity
-from contactverif.contract.property import WITH_BARRIER, Property
+from contactverif.contract.property import WITH_BARRIER, CheckedNumber, Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, FirstAnswers, Restartable, Subject, ask_first
 from contactverif.problems.named_states import first_state, named_case
 from contactverif.strategies.surfaces import surface_cases

@@ -19,7 +19,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
 from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.interface import PLANE
-from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.traits import Traits
 from contactverif_properties.states import FrozenState, random_directions
 

@@ -11,8 +11,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import uniform_pressure_weights_exact

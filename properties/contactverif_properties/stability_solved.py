@@ -13,8 +13,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity, check_all
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import shape_integrals, solve_by_engine

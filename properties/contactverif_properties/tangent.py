@@ -21,8 +21,16 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatA
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import PLANE, Surface
-from contactverif.contract.measurement import Finding, Measurement, Quantity, check_all
-from contactverif.contract.property import WITH_BARRIER, Property, Verdict, judge
+from contactverif.contract.property import (
+    WITH_BARRIER,
+    Finding,
+    Measurement,
+    Property,
+    Quantity,
+    Verdict,
+    check_all,
+    judge,
+)
 from contactverif.contract.subject import Subject
 from contactverif.problems.long_states import long_face_states, long_states
 from contactverif.strategies import smooth_cases

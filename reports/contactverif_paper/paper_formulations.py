@@ -7,7 +7,7 @@ from functools import cache
 from typing import Annotated
 
 from contactverif.contract.case import Case
-from contactverif.contract.measurement import Measurement
+from contactverif.contract.property import Measurement
 from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import the_formulation, the_property
 from contactverif.run.judge import judge_case

@@ -15,8 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, freeze
 from contactverif.contract.case import Case
-from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import DECIDED, Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.property import DECIDED, CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import Row, Run
 from contactverif_reports.tables import Code, Column, Measured, ResultCell, Table, numbers
 

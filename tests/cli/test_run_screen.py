@@ -9,8 +9,7 @@ from subjects import ResidualAlone, load_property
 
 import contactverif_nts
 from contactverif.cli.run_screen import run_screen
-from contactverif.contract.measurement import Measurement
-from contactverif.contract.property import Outcome, Verdict
+from contactverif.contract.property import Measurement, Outcome, Verdict
 from contactverif.contract.result import Row, Run
 from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.problems.named_states import named_case

@@ -8,9 +8,8 @@ import pytest
 
 from contactverif import Measurement, Outcome, Quantity, Verdict
 from contactverif.contract.case import CaseSummary
-from contactverif.contract.measurement import Finding
-from contactverif.contract.property import PropertyInfo
-from contactverif.contract.records import decoder, encode
+from contactverif.contract.property import Finding, PropertyInfo
+from contactverif.contract.schema import decoder, encode
 
 ERROR = Quantity("force error", "u", "rounding", unit="N")
 SUMMARY = CaseSummary(2, 3, 10.0, 4.0, 0.5, {"gap": -0.0}, kind="inside")

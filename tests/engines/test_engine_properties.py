@@ -5,7 +5,7 @@ import pytest
 from plain_engine import Plain
 
 from contactverif import Property, Verdict, judge_case
-from contactverif.contract.measurement import Quantity
+from contactverif.contract.property import Quantity
 from contactverif.contract.subject import EngineSubject
 from contactverif.plugins.registry import load_properties, property_ids
 from contactverif.sampling.draw import Sampling, draw_cases

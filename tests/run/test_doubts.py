@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from subjects import Changed
 
 from contactverif import Case, MisuseError, Subject, load_formulation, load_properties, named_case
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Property, PropertyInfo, Verdict
+from contactverif.contract.property import Measurement, Property, PropertyInfo, Quantity, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Row
 from contactverif.contract.traits import Traits
 from contactverif.run.run import run

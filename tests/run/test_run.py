@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_info
 
 from contactverif import Case, Interface, MisuseError, Outcome, Property, Subject, Verdict, judge_case
 from contactverif.contract.counterexample import Origin, counterexamples
-from contactverif.contract.measurement import Measurement, Quantity
+from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.traits import Traits
 from contactverif.run.profiles import PROFILES

@@ -18,8 +18,7 @@ import pytest
 from same_facts import facts
 
 from contactverif import MisuseError, Outcome, Run, Subject, Verdict, load_formulation, load_properties, named_case
-from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.contract.property import PropertyInfo, judge_stored
+from contactverif.contract.property import Finding, Measurement, PropertyInfo, Quantity, judge_stored
 from contactverif.plugins.provenance import machine
 from contactverif.run import run as driver
 from contactverif.run.journal import hold_journal, journal_folder, new_journal, read_messages, remove_journal

@@ -12,8 +12,7 @@ from subjects import load_subject
 from contactverif import Case, End, Interface, Subject, load_formulation, load_properties, load_scene, solve
 from contactverif.cli.comparison_screen import regressions_text
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Outcome, Property, Verdict, judge
+from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.run.worker_pool import worker_pool
 from contactverif.studies.comparison import make_state, measure_costs, run_comparison

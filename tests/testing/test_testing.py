@@ -22,8 +22,7 @@ from contactverif.plugins import registry
 from contactverif.contract.case import Case
 from contactverif.contract.traits import PatchPromises, Promises, Traits
 from contactverif.contract.interface import Interface
-from contactverif.contract.measurement import Measurement, Quantity
-from contactverif.contract.property import Property
+from contactverif.contract.property import Measurement, Property, Quantity
 
 ERROR = Quantity("error", "1e-6", "a number for a test")
 

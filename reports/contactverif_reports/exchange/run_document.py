@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
-from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import checked_numbers
+from contactverif.contract.property import CheckedNumber, checked_numbers
 from contactverif.contract.result import Row, Run
 from contactverif.contract.schema import ROW, value_of
 from contactverif_reports.files import whole

@@ -11,8 +11,7 @@ from typing import Any
 from markupsafe import Markup
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
-from contactverif.contract.measurement import CheckedNumber
-from contactverif.contract.property import checked_numbers
+from contactverif.contract.property import CheckedNumber, checked_numbers
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
 from contactverif_reports.comparisons import RowNumbers, count_iterations
 from contactverif_reports.html.margin_strips import Axis, strip, ticks

@@ -15,8 +15,16 @@ import numpy as np
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, CaseSummary
-from contactverif.contract.measurement import Finding, Measurement, Quantity
-from contactverif.contract.property import Outcome, Outcomes, PropertyInfo, Role, Verdict
+from contactverif.contract.property import (
+    Finding,
+    Measurement,
+    Outcome,
+    Outcomes,
+    PropertyInfo,
+    Quantity,
+    Role,
+    Verdict,
+)
 from contactverif.contract.schema import Axes, Group, StoredColumns, Variable, to_variables, words
 
 Table = dict[str, Variable]
