@@ -349,27 +349,26 @@ def judge_cases(
 
 
 def _judge_together(question: Property, subject: Subject, cases: Mapping[int, Case]) -> dict[int, Outcome]:
-    """Return {place: outcome} of the cases that pass where all are judged in lockstep; what fails is judged alone.
+    """Return {place: outcome} of cases that are judged in lockstep; a failure that nobody stated is judged alone.
 
-    Lockstep saves messages to the plugin's process. It is not tried if the first case fails or a process has ended.
+    Lockstep saves messages to the plugin's process. It is not tried if the first case fails so or a process has ended.
     """
-    # SuperLU frees a factor only in the thread that made it, and a body keeps its factor for other cases.
-    if not isinstance(subject, RemoteSubject) or question.bodies or len(cases) < 2 or count_ends(subject):
+    if not isinstance(subject, RemoteSubject) or len(cases) < 2 or count_ends(subject):
         return {}
+    stated = question.promise(subject.traits) is False
+
+    def counts(outcome: Outcome) -> bool:
+        return outcome.measurement is not None and (stated or outcome.verdict is not Verdict.FAIL)
+
     (first, case), *others = cases.items()
-    passed = {first: judge.judge_case(question, case, subject)}
-    if _may_fail(passed[first]):
-        return passed
-    with one_thread():  # It ends behind all cases: one that ends before another must not let BLAS have more.
-        judged = in_lockstep([partial(judge.judge_case, question, case, subject) for _, case in others])
-    for (place, _), (outcome, seconds) in zip(others, judged or (), strict=judged is not None):
-        if not _may_fail(outcome):
-            passed[place] = replace(outcome, seconds=seconds)
-    return passed
-
-
-def _may_fail(outcome: Outcome) -> bool:
-    return outcome.measurement is None or outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
+    judged_here = {first: judge.judge_case(question, case, subject)}
+    if counts(judged_here[first]):
+        with one_thread():  # It ends behind all cases: one that ends before another must not let BLAS have more.
+            judged = in_lockstep([partial(judge.judge_case, question, case, subject) for _, case in others])
+        for (place, _), (outcome, seconds) in zip(others, judged or (), strict=judged is not None):
+            if counts(outcome):
+                judged_here[place] = replace(outcome, seconds=seconds)
+    return judged_here
 
 
 def shrink_case(

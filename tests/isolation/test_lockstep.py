@@ -1,14 +1,12 @@
 """Cases in lockstep: one message asks for all, and whatever goes wrong there is asked again alone."""
 
-import threading
-from collections.abc import Iterator
-from time import perf_counter, sleep
+from functools import cached_property
+from time import perf_counter
 
 import pytest
 from isolation import hostile_few
 
 from contactverif import Verdict, load_formulation, load_properties
-from contactverif.isolation import lockstep
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.lockstep import in_lockstep, wait_in_lockstep
 from contactverif.isolation.remote import RemoteSubject, count_ends, load_remote
@@ -44,13 +42,9 @@ def test_a_process_that_ends_lets_each_case_be_judged_alone() -> None:
     assert count_ends(subject) == len(crashed)
 
 
-@pytest.fixture
-def grants(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
-    yield []
-    lockstep._blocks = False
+def test_one_wish_of_several_calls_is_granted_once_and_an_error_comes_through() -> None:
+    grants = []
 
-
-def test_one_wish_of_several_calls_is_granted_once_and_an_error_comes_through(grants: list[int]) -> None:
     def wish() -> bool:
         grants.append(1)
         return True
@@ -69,7 +63,7 @@ def test_one_wish_of_several_calls_is_granted_once_and_an_error_comes_through(gr
     assert not wait_in_lockstep(wish)  # Here is no call in lockstep.
 
 
-def test_a_wish_that_fails_and_an_interrupt_end_all_calls(grants: list[int]) -> None:
+def test_a_wish_that_fails_and_an_interrupt_end_all_calls() -> None:
     ends: list[str] = []
 
     def call(wish: object) -> None:
@@ -87,14 +81,13 @@ def test_a_wish_that_fails_and_an_interrupt_end_all_calls(grants: list[int]) -> 
     assert ends == 6 * ["end"]
 
 
-def test_calls_that_block_each_other_are_given_up(grants: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lockstep, "_LONGEST_STEP", 0.1)
-    lock = threading.Lock()
+def test_a_value_that_is_made_once_may_ask_while_it_is_made() -> None:
+    """In Python 3.11 `cached_property` holds a lock of its thread meanwhile, and all calls have the same thread."""
 
-    def call() -> None:
-        with lock:
-            wait_in_lockstep(lambda: bool(grants.append(1)) or True)
+    class Scene:
+        @cached_property
+        def stiffness(self) -> float:
+            return 2.0 if wait_in_lockstep(lambda: True) else 1.0
 
-    assert in_lockstep([call, call]) is None
-    assert not lock.locked()
-    assert in_lockstep([lambda: sleep(0.0)]) is None
+    scene = Scene()
+    assert [result for result, _ in in_lockstep([lambda: scene.stiffness] * 3) or ()] == [2.0] * 3
