@@ -14,6 +14,7 @@ from contactverif.plugins.provenance import machine
 from contactverif.plugins.registry import load_formulation, load_properties
 from contactverif.run.journal import read_messages, record_files
 from contactverif.run.run import run
+from contactverif.run.run_options import RunOptions
 from contactverif.run.store import FormRecord, OutcomeRecord, Plan, RejectedRecord, Store
 
 IDS = ("balance.force", "patch.flat.transmission")
@@ -35,7 +36,8 @@ def frame(record: Record) -> bytes:
 
 
 def plan_of(seed: int = SEED) -> Plan:
-    return Plan(formulations=("nts",), properties=IDS, examples=EXAMPLES, seed=seed, machine=machine())
+    options = RunOptions(names=("nts",), properties=IDS, examples=EXAMPLES, seed=seed)
+    return Plan(options=options, machine=machine())
 
 
 def judge(store: Store, seed: int = SEED) -> Run:

@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-import msgspec
 import typer
 from rich.text import Text
 
@@ -191,20 +190,9 @@ class Job:
 
     def plan(self) -> Plan:
         """Return the plan for the header of a journal."""
-        size = self.options.size
-        assert size.seed is not None
+        versions = versions_of(self.options)
         return Plan(
-            command=self.command,
-            options=self.options.to_builtins(),
-            folder=os.getcwd(),
-            versions=versions_of(self.options),
-            formulations=self.options.names,
-            properties=self.options.properties,
-            profile=size.name,
-            examples=size.examples,
-            seed=size.seed,
-            machine=machine(),
-            place=self.options.place_words,
+            command=self.command, versions=versions, options=self.options, folder=os.getcwd(), machine=machine()
         )
 
     @contextmanager
@@ -283,10 +271,7 @@ def options_of(plan: Plan, command: str, argument: str) -> RunOptions:
     """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
     if plan.command != command:
         raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")
-    try:
-        options = RunOptions.from_builtins(plan.options).from_folder(plan.folder)
-    except (msgspec.ValidationError, TypeError) as error:
-        raise MisuseError(argument, f"a journal with wrong options ({error})", "one of this version") from None
+    options = plan.options.from_folder(plan.folder)
     check_versions(plan.versions, versions_of(options), argument)
     # A box or Landlock may not be had here, and the results are the same without.
     weaker = options.isolation in (Isolation.BOX, Isolation.LANDLOCK)

@@ -8,19 +8,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import msgspec
 
 from contactverif.contract.errors import MisuseError
 from contactverif.run.journal import hold_journal, new_journal, read_record, write_record
+from contactverif.run.run_options import RunOptions
 from contactverif.run.store import Plan, Store, check_versions, read_plan
 
 _MARK = "done"
-_SHARD = "shard"  # The option in a plan that differs from shard to shard.
 _MOST_NAMES = 3  # The most missing shards that a message names.
-_OF_ONE_STORE = ("options", "folder", "machine")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -56,7 +55,7 @@ class Shard:
 
     def plan(self, plan: Plan) -> Plan:
         """Return the plan of this shard of a run."""
-        return msgspec.structs.replace(plan, options=plan.options | {_SHARD: self.text})
+        return msgspec.structs.replace(plan, shard=self.text)
 
 
 class EndMark(msgspec.Struct, frozen=True):
@@ -100,8 +99,8 @@ def read_shards(folder: Path, argument: str) -> tuple[Plan, tuple[Path, ...]]:
     stores = tuple(folder / shard.folder for shard in shards)
     plans = [read_plan(store, argument) for store in stores]
     for shard, plan in zip(shards, plans, strict=True):
-        if plan.options.get(_SHARD) != shard.text:
-            was = plan.options.get(_SHARD, f"a journal of {plan.command}")
+        if plan.shard != shard.text:
+            was = plan.shard or f"a journal of {plan.command}"
             raise MisuseError(argument, f"{shard.folder}, whose header says {was}", f"shard {shard.text}")
         if difference := _difference(plan, plans[0]):
             others = f"that of {shards[0].folder} ({difference})"
@@ -145,11 +144,8 @@ def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:
     The working folder and the machine are none, and neither is the place where plugins lived: it changes no number, and
     a machine may have no box.
     """
-    for name in (field for field in Plan.__struct_fields__ if field not in _OF_ONE_STORE):
-        if getattr(a, name) != getattr(b, name):
-            return name
-    for name in sorted({*a.options, *b.options} - {"isolation", *(() if shard_too else (_SHARD,))}):
-        values = (msgspec.msgpack.encode(plan.options.get(name)) for plan in (a, b))  # A file has lists for tuples.
-        if len({*values}) > 1:
-            return name
-    return ""
+    pairs: list[tuple[str, object, object]] = [
+        (name, a, b) for name in ("command", "versions", *(["shard"] if shard_too else []))
+    ]
+    pairs += [(each.name, a.options, b.options) for each in fields(RunOptions) if each.name != "isolation"]
+    return next((name for name, one, other in pairs if getattr(one, name) != getattr(other, name)), "")

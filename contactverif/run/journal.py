@@ -119,7 +119,7 @@ def write_record(path: Path, record: msgspec.Struct) -> None:
     """Write a file with one record, whole and on the disk."""
     part = path.with_name(f".{path.name}.part")
     with part.open("wb") as file:
-        file.write(_frame(msgspec.msgpack.encode(record)))
+        file.write(_frame(msgspec.msgpack.encode(record, enc_hook=os.fspath)))
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)
@@ -129,14 +129,15 @@ def read_record(path: Path, kind: type[_Record]) -> _Record | None:
     """Return the one record of a file; None if it is damaged. Without such a file there is an `OSError`."""
     with path.open("rb") as file:
         message = read_message(file)
-        return None if message is None or file.read(1) else decode(message, msgspec.msgpack.Decoder(kind))
+        decoder = msgspec.msgpack.Decoder(kind, dec_hook=lambda kind, value: kind(value))  # Of paths.
+        return None if message is None or file.read(1) else decode(message, decoder)
 
 
 def decode(message: bytes, decoder: msgspec.msgpack.Decoder[_Record]) -> _Record | None:
     """Return the record of a message; None if it is none of these."""
     try:
         return decoder.decode(message)
-    except (msgspec.MsgspecError, ValueError, RecursionError):
+    except (msgspec.MsgspecError, ValueError, TypeError, RecursionError):
         return None
 
 

@@ -307,20 +307,6 @@ class RunOptions:
             scene_file=self.scene_file and str(base / self.scene_file),
         )
 
-    def to_builtins(self) -> dict[str, Any]:
-        """Return the options as the plan of a journal has them."""
-        import msgspec
-
-        plain: dict[str, Any] = msgspec.to_builtins(self, enc_hook=str)
-        return plain
-
-    @classmethod
-    def from_builtins(cls, plain: dict[str, Any]) -> RunOptions:
-        """Return the options of a plan; others are a `ValueError` or a `TypeError`."""
-        import msgspec
-
-        return msgspec.convert(plain, cls, dec_hook=_to_path)
-
 
 @cache
 def declared_options(group: type) -> dict[str, tuple[Any, Option]]:
@@ -372,12 +358,6 @@ def _convert(table: dict[str, Any]) -> dict[str, Any]:
         if option:
             values[_settings()[name]] = converted
     return values
-
-
-def _to_path(kind: type, value: Any) -> Any:
-    if kind is Path and isinstance(value, str):
-        return Path(value)
-    raise TypeError(f"{kind.__name__} expected")
 
 
 def _strongest(wanted: Isolation | None, opened: tuple[str, ...], argument: str) -> Isolation:

@@ -24,8 +24,9 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, judge_stored
 from contactverif.plugins.provenance import CODE, machine
 from contactverif.run.journal import RecordFile, decode, read_header, read_message, read_messages, record_files
+from contactverif.run.run_options import RunOptions
 
-FORMAT = 4  # A change of a record is a new one.
+FORMAT = 5  # A change of a record is a new one.
 WITNESS = -1  # The number of the outcome of a row's witness.
 STORED = "stored_outcomes"  # The attribute of a report that says how many outcomes came from earlier processes.
 _MOST_FORMS = 10_000  # The most forms that a process remembers.
@@ -38,15 +39,10 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     """The plan of a run, the header of its store. A row is a formulation and a property, as on the command line."""
 
     command: str = ""
-    options: dict[str, Any] = {}
-    folder: str = ""  # The working folder of the command, to which names of files are relative.
     versions: dict[str, str] = {}  # {library or package: version or digest}.
-    formulations: tuple[str, ...] = ()
-    properties: tuple[str, ...] = ()
-    profile: str = ""
-    examples: int = 0
-    seed: int = 0
-    place: str = ""  # The options that say where the run asks; empty if it asks on random interfaces and scenes.
+    options: RunOptions = msgspec.field(default_factory=RunOptions)  # They are settled.
+    shard: str = ""  # The shard I/N of a campaign.
+    folder: str = ""  # The working folder of the command, to which names of files are relative.
     machine: dict[str, str] = {}  # What the last bits of a number depend on, beside the versions.
     format: int = FORMAT
 
@@ -156,6 +152,7 @@ class Store:
 
     def __init__(self, plan: Plan | None = None, folder: Path | None = None, sources: Sequence[Path] = ()) -> None:
         self.plan = plan = plan or Plan()
+        options = plan.options
         self.folder = folder
         self.write_error = ""
         self.remarks: list[str] = []
@@ -163,8 +160,8 @@ class Store:
         self.failures: Mapping[tuple[str, str], Case] = {}
         self.n_stored = self.n_rechecked = 0  # The numbers of stored outcomes of a run, and of those judged again.
         self._session = token_hex(4)
-        self._rows = {key: number for number, key in enumerate(product(plan.formulations, plan.properties))}
-        self._room = max(_LEAST_ROOM, 2 * plan.examples) + 1  # A case with a larger number is not believed.
+        self._rows = {key: number for number, key in enumerate(product(options.names, options.properties))}
+        self._room = max(_LEAST_ROOM, 2 * (options.examples or 0)) + 1  # A case with a larger number is not believed.
         self._paths = [path for source in sources for path in record_files(source)]
         self.same_machine = all(_machine_of(source) == machine() for source in sources)
         self._decoders: dict[tuple[int, int], Callable[[Any], Outcome]] = {}  # {(file, place of a form): …}
@@ -260,7 +257,8 @@ class Store:
         digests = {name: digest for name, digest in self.plan.versions.items() if name.startswith(CODE)}
         facts = {name.replace(" ", "_"): digest for name, digest in digests.items()}
         stored = f"{self.n_stored}, of which {self.n_rechecked} were judged again" if self.n_stored else ""
-        return facts | {name: words for name, words in (("place", self.plan.place), (STORED, stored)) if words}
+        entries = (("place", self.plan.options.place_words), (STORED, stored))
+        return facts | {name: words for name, words in entries if words}
 
     def close(self) -> None:
         """Close the file of this process, once it is on the disk."""

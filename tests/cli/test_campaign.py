@@ -8,6 +8,7 @@ import pytest
 from asking import Ask, asking
 
 from contactverif import Property, load_properties
+from contactverif.run.run_options import RunOptions
 from contactverif.run.store import Plan, Store
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
@@ -44,7 +45,7 @@ def cut_in_half(journal: Path) -> None:
 
 def count(folder: Path) -> tuple[int, int]:
     """Return the numbers of judged cases and of further outcomes of the same cases."""
-    store = Store(Plan(formulations=NAMES, properties=IDS), None, sorted(folder.glob("shard-*")))
+    store = Store(Plan(options=RunOptions(names=NAMES, properties=IDS)), None, sorted(folder.glob("shard-*")))
     return store.n_outcomes, store.n_records - store.n_outcomes
 
 

@@ -1,6 +1,7 @@
 """The options of a run: what is typed, what the project's settings say, and the place where plugins live."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ from contactverif.cli.verify import print_isolation
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation import box as boxes
 from contactverif.isolation import confine, process
+from contactverif.run.journal import read_record, write_record
 from contactverif.run.run_options import Isolation, RunOptions, read_settings
+from contactverif.run.store import Plan
 
 FORBIDDEN = "bwrap: setting up uid map: Permission denied; allow user namespaces"
 TABLE = """
@@ -57,10 +60,11 @@ def isolation_of(wanted: Isolation | None = None, opened: tuple[str, ...] | None
 
 def test_options_are_what_the_plan_of_a_journal_says() -> None:
     options = RunOptions(names=("nts",), out=(Path("r.nc"),), known={"mirror": "why"}, isolation=Isolation.BOX)
-    assert RunOptions.from_builtins(options.to_builtins()) == options
+    write_record(Path("plan"), Plan(options=options))
+    assert read_record(Path("plan"), Plan) == Plan(options=options)
     assert options.from_folder("/elsewhere").out == (Path("/elsewhere/r.nc"),)
-    with pytest.raises(ValueError, match=r"\$\.names"):
-        RunOptions.from_builtins({"names": 3})
+    write_record(Path("plan"), Plan(options=replace(options, names=3)))  # type: ignore[arg-type]
+    assert read_record(Path("plan"), Plan) is None
 
 
 def test_without_a_table_all_is_left_to_the_command_line() -> None:

@@ -13,6 +13,7 @@ from fresh_process import MAIN, PYTHON
 
 from contactverif.run.journal import journal_folder, new_journal
 from contactverif.run.rows import RowOutcomes
+from contactverif.run.run_options import RunOptions
 from contactverif.run.store import Plan, Store
 from contactverif_reports.netcdf.differences import same_data
 
@@ -55,7 +56,7 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_report_of_an_unbroke
     for more in (8_000,):
         kill_at(size_of(journal) + more, ["verify", "--resume", str(report)], journal)
         assert not report.exists()
-    store = Store(Plan(formulations=("nts", "vts-ppt"), properties=IDS), None, [journal])
+    store = Store(Plan(options=RunOptions(names=("nts", "vts-ppt"), properties=IDS)), None, [journal])
     assert store.n_outcomes == store.n_records > 0
     answer = ask("verify", "--resume", report, "--jobs", "1")
     assert (answer.status, answer.err) == (0, "")

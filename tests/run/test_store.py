@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from same_facts import facts
@@ -24,6 +23,7 @@ from contactverif.run import run as driver
 from contactverif.run.journal import hold_journal, journal_folder, new_journal, read_messages, remove_journal
 from contactverif.run.rows import find_missing
 from contactverif.run.run import RunStopped, run
+from contactverif.run.run_options import RunOptions
 from contactverif.run.scheduler import Progress
 from contactverif.run.store import Plan, Store, Writer, check_versions, read_plan
 from contactverif.sampling.draw import Sampling
@@ -31,14 +31,8 @@ from contactverif.sampling.draw import Sampling
 NAMES = ("nts", "vts-ppt")
 PROPERTY_IDS = ("hard.deep", "patch.flat.resultant", "patch.flat.transmission")  # A list, and one strategy for two.
 EXAMPLES = 30
-PLAN = Plan(
-    formulations=NAMES,
-    properties=PROPERTY_IDS,
-    examples=EXAMPLES,
-    seed=3,
-    versions={"numpy_version": "2"},
-    machine=machine(),
-)
+OPTIONS = RunOptions(names=NAMES, properties=PROPERTY_IDS, examples=EXAMPLES, seed=3)
+PLAN = Plan(options=OPTIONS, versions={"numpy_version": "2"}, machine=machine())
 
 
 def judge(store: Store | None, progress: Any = None) -> Run:
@@ -61,7 +55,7 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
 
 ERROR, OTHER = Quantity("error", "ξ", "a reason"), Quantity("other", "", "", sense="at least", unit="N")
 INFO = PropertyInfo("of.one", "of", "One.", (ERROR, OTHER))
-SMALL_PLAN = Plan(formulations=("mine", "other"), properties=(INFO.id,), examples=20)
+SMALL_PLAN = Plan(options=RunOptions(names=("mine", "other"), properties=(INFO.id,), examples=20))
 
 
 def outcome(number: float) -> Outcome:
@@ -159,7 +153,7 @@ def test_a_record_of_no_row_or_case_is_not_believed_and_takes_no_memory(tmp_path
     places = ((0, 0), (5, 0), (-1, 0), (0, 10**9), (0, -7), (0, 10**12))
     path = write(tmp_path, {place: outcome(1.0) for place in places})
     assert Store(SMALL_PLAN, None, [path.parent]).n_outcomes == 1
-    large = msgspec.structs.replace(SMALL_PLAN, examples=10**12)
+    large = Plan(options=replace(SMALL_PLAN.options, examples=10**12))
     assert Store(large, None, [path.parent]).numbers("mine", INFO.id) == [0, 10**9, 10**12]
 
 
@@ -187,7 +181,7 @@ def test_a_block_that_is_judged_is_not_drawn(monkeypatch: pytest.MonkeyPatch, tm
     """Only a block of which cases stay whole is drawn again, and what stays whole stays so."""
     for name, number in {"sampling.draw.BLOCK": 10, "run.run.BLOCK": 10, "run.rows.WHOLE": 10}.items():
         monkeypatch.setattr(f"contactverif.{name}", number)
-    plan = msgspec.structs.replace(PLAN, formulations=("vts-ppt",), properties=("patch.flat.resultant",))
+    plan = Plan(options=replace(OPTIONS, names=("vts-ppt",), properties=("patch.flat.resultant",)), machine=machine())
     subjects, questions = [load_formulation("vts-ppt")], load_properties(["patch.flat.resultant"])
     folder = journal_of(tmp_path, plan)
     first = run(subjects, questions, examples=EXAMPLES, seed=3, store=Store(plan, folder))
@@ -230,11 +224,11 @@ def test_a_new_journal_keeps_the_earlier_file_apart_and_the_stopped_run_aside(tm
         assert aside == ""
         assert not report.exists()
     assert read_plan(folder, "--resume") == PLAN
-    with new_journal(folder, msgspec.structs.replace(PLAN, seed=4), [report]) as aside:
+    with new_journal(folder, Plan(options=replace(OPTIONS, seed=4)), [report]) as aside:
         assert aside == "r.nc.journal.earlier"
     assert (folder / "earlier.nc").read_text() == "yesterday"
-    assert read_plan(folder, "--resume").seed == 4
-    assert read_plan(tmp_path / "r.nc.journal.earlier", "--resume").seed == 3
+    assert read_plan(folder, "--resume").options.seed == 4
+    assert read_plan(tmp_path / "r.nc.journal.earlier", "--resume").options.seed == 3
     remove_journal(folder)
     assert list(tmp_path.iterdir()) == []
 
