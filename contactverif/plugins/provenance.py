@@ -63,7 +63,19 @@ def collect_repeatable_facts() -> dict[str, str]:
 def machine() -> dict[str, str]:
     """Return what the last bits of a number depend on beside the versions; equal where the machine is the same."""
     import_module("scipy.linalg")  # It brings a BLAS of its own.
-    return {"blas": _blas(), "cpu_features": _cpu_features(), "platform": platform.platform()}
+    keys = ("internal_api", "version", "architecture")  # The last bits of a solution depend on the kernel of each BLAS.
+    pools = (entry for entry in threadpool_info() if entry["user_api"] == "blas")
+    libraries = {" ".join(str(entry[key]) for key in keys if entry.get(key)) for entry in pools}
+    try:  # The groups of instructions that numpy has found and may use, beyond those it always uses.
+        extensions = np.show_config(mode="dicts")["SIMD Extensions"]
+        features = " ".join([*extensions.get("baseline", []), *extensions.get("found", [])])
+    except (AttributeError, KeyError, TypeError):  # A numpy that was built in another way.
+        features = ""
+    return {
+        "blas": "; ".join(sorted(libraries)) or "unknown",
+        "cpu_features": features or "unknown",
+        "platform": platform.platform(),
+    }
 
 
 def _version(package: str) -> str:
@@ -71,25 +83,6 @@ def _version(package: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return "not installed"
-
-
-def _blas() -> str:
-    """Return library, version and kernel of each BLAS; the last bits of a solution depend on the kernel."""
-    libraries = [
-        " ".join(str(entry[key]) for key in ("internal_api", "version", "architecture") if entry.get(key))
-        for entry in threadpool_info()
-        if entry["user_api"] == "blas"
-    ]
-    return "; ".join(sorted(set(libraries))) or "unknown"
-
-
-def _cpu_features() -> str:
-    """Return the groups of instructions that numpy has found and may use, beyond those it always uses."""
-    try:
-        extensions = np.show_config(mode="dicts")["SIMD Extensions"]
-        return " ".join([*extensions.get("baseline", []), *extensions.get("found", [])]) or "unknown"
-    except (AttributeError, KeyError, TypeError):  # A numpy that was built in another way.
-        return "unknown"
 
 
 def _commit() -> str:

@@ -89,15 +89,15 @@ _FITTING: dict[Any, tuple[tuple[type, ...], str]] = {
 
 def entries_by_name(group: str) -> dict[str, list[EntryPoint]]:
     """Return the entry points by name, sorted. A name has several where distributions disagree about it."""
-    folders = tuple((os.path.abspath(path), _time_of_change(path)) for path in sys.path)
+
+    def time_of_change(path: str) -> int:
+        try:
+            return os.stat(path or ".").st_mtime_ns
+        except OSError:
+            return 0
+
+    folders = tuple((os.path.abspath(path), time_of_change(path)) for path in sys.path)
     return dict(_read_entries(entry_points, group, folders))
-
-
-def _time_of_change(path: str) -> int:
-    try:
-        return os.stat(path or ".").st_mtime_ns
-    except OSError:
-        return 0
 
 
 # To list the formulations takes sixty looks, and each would read the files of all distributions.
@@ -171,7 +171,7 @@ def describe_engines() -> dict[str, str]:
     words = {}
     for name, entries in entries_by_name(ENGINES).items():
         make = load_entry(name, entries)
-        words[name] = f"not loaded: {make.reason}" if isinstance(make, NotLoaded) else _summary(make)
+        words[name] = f"not loaded: {make.reason}" if isinstance(make, NotLoaded) else _first_line(make)
     return words
 
 
@@ -304,15 +304,13 @@ def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
 def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
     """Return the wrapper or loader of that name; None if it stands for a formulation or does not load."""
     make = load_entry(name, entries)
-    if not callable(make):
-        return None
-    parameters = _parameters_of(make)
-    needs = (form for option, form in _NEEDED.items() if option in parameters and _is_required(parameters[option]))
-    needed = next((f"{name}:{form}" for form in needs), f"{name}/NAME" if "inner" in parameters else "")
-    return Wrapper(name, _summary(make), needed) if needed else None
+    parameters = _parameters_of(make) if callable(make) else {}
+    forms = {option: form for option, form in _NEEDED.items() if option in _required_among(parameters)}
+    needed = next((f"{name}:{form}" for form in forms.values()), f"{name}/NAME" if "inner" in parameters else "")
+    return Wrapper(name, _first_line(make), needed) if needed else None
 
 
-def _summary(make: Any) -> str:
+def _first_line(make: Any) -> str:
     return (inspect.getdoc(make) or "").partition("\n")[0].rstrip(".")
 
 
@@ -351,7 +349,12 @@ def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     if text.partition(":")[0].endswith(".py"):
         needed = "an installed name (`contactverif new NAME` begins one); in Python, contactverif.verify takes a class"
         raise MisuseError("formulation", f"a file, {text!r}", needed)
-    make = _find_factory(text)
+    outermost, installed = re.split(f"[{_MARKS}]", text, maxsplit=1)[0], entries_by_name(FORMULATIONS)
+    if not outermost:
+        raise MisuseError("formulation", repr(text), _FORM)
+    if outermost not in installed:
+        raise unknown_name_error("formulation", outermost, installed)
+    make = _callable_of(text, installed[outermost], "*, penalty, …")
     parameters = {} if isinstance(make, NotLoaded) else _parameters_of(make)
     wraps = "inner" in parameters
     outer, slash, inner_text = text.partition("/")
@@ -376,16 +379,6 @@ def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     return partial(make, **options, inner=inner)
 
 
-def _find_factory(text: str) -> Callable[..., Any] | NotLoaded:
-    name = re.split(f"[{_MARKS}]", text, maxsplit=1)[0]
-    installed = entries_by_name(FORMULATIONS)
-    if not name:
-        raise MisuseError("formulation", repr(text), _FORM)
-    if name not in installed:
-        raise unknown_name_error("formulation", name, installed)
-    return _callable_of(text, installed[name], "*, penalty, …")
-
-
 def _callable_of(text: str, entries: Sequence[EntryPoint], arguments: str) -> Callable[..., Any] | NotLoaded:
     make = load_entry(entries[0].name, entries)
     if isinstance(make, NotLoaded):
@@ -403,8 +396,8 @@ def _parameters_of(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
         return {}
 
 
-def _is_required(parameter: inspect.Parameter) -> bool:
-    return parameter.default is inspect.Parameter.empty
+def _required_among(parameters: Mapping[str, inspect.Parameter]) -> list[str]:
+    return [name for name, parameter in parameters.items() if parameter.default is parameter.empty]
 
 
 def _check_options(
@@ -425,8 +418,8 @@ def _check_options(
             near = difflib.get_close_matches(option, known, n=1)
             nearest = f" (nearest: {near[0]})" if near else ""
             raise MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
-    for name, entry in known.items():
-        if _is_required(entry) and name not in options:
+    for name in _required_among(known):
+        if name not in options:
             raise MisuseError(f"options of {text!r}", f"no {name}", f"{name}=VALUE; {names}")
 
 
@@ -439,9 +432,7 @@ def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:
     if typing.get_origin(annotation) is Literal:
         choices = typing.get_args(annotation)
         return "" if value in choices else "one of " + ", ".join(map(str, choices))
-    if annotation not in _FITTING:
-        return ""
-    types, needed = _FITTING[annotation]
+    types, needed = _FITTING.get(annotation, ((object,), ""))
     return "" if isinstance(value, types) and (annotation is bool or not isinstance(value, bool)) else needed
 
 

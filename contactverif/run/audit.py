@@ -13,12 +13,11 @@ from contactverif.contract.property import Outcome, Outcomes, Property, Property
 from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.plugins.provenance import code_digests, collect_versions, machine
-from contactverif.run.recheck import Recheck, Sample, choose_share, draw_planned, judge_again
-from contactverif.run.rows import OpenRow, find_missing_row, open_row, verdict_of_row
+from contactverif.run.recheck import Sample, choose_share, judge_again, judge_samples
+from contactverif.run.rows import OpenRow, find_missing_cases, find_missing_row, open_row, verdict_of_row
 from contactverif.run.run import Driver
 from contactverif.run.scheduler import Scheduler
 from contactverif.run.store import WITNESS, Store
-from contactverif.sampling import draw
 from contactverif.sampling.draw import Sampling
 
 
@@ -49,40 +48,60 @@ def audit(
 
     The formulations and the properties are those of its rows, and the sampling has its size, its seed and its place.
     """
-    start = perf_counter()
-    changes = find_changes(run)
-    rows = _open_rows(run, subjects, questions, sampling)
-    derived = [_derive(row, opened, sampling) for row, opened in zip(run.rows, rows, strict=True)]
-    stored = [(row, opened) for row, opened in zip(derived, rows, strict=True) if isinstance(opened, OpenRow)]
-    samples = [_sample(row, opened, share) for row, opened in stored]
+    start, changes = perf_counter(), _find_changes(run)
+    subject_of = {subject.name: subject for subject in subjects}
+    question_of = {question.id: question for question in questions}
+    source_of = cache(sampling.source)
+    rows: list[OpenRow | Row] = []
+    derived, samples = [], []
+    for row in run.rows:
+        subject = subject_of[row.formulation]
+        question = question_of[row.property_id].for_traits(subject.traits)
+        stopped = row.reason.removeprefix(OMITTED) if row.omitted else ""
+        opened = open_row(subject, question, source_of(question), row.known, sampling, stopped)
+        rows.append(opened)
+        derived.append(_derive(row, opened, on_scene=sampling.scene is not None))
+        if isinstance(opened, OpenRow):
+            numbers = choose_share(range(len(row.outcomes)), share)
+            outcomes = {number: derived[-1].outcomes[number] for number in numbers}
+            # A failure of an earlier run is judged as a counterexample: nothing but the report says what its case is.
+            if opened.witness is not None and derived[-1].witness is not None:
+                outcomes[WITNESS] = derived[-1].witness
+            samples.append(Sample(opened, outcomes))
     scheduler = Scheduler()
     driver = Driver(subjects, questions, sampling, scheduler, Store())
     driver.call_first()
-    recheck = Recheck(samples, sampling, exact=not changes)
-    scheduler.work(recheck)
+    judge_samples(samples, sampling, scheduler, exact=not changes)
+    differences = [find_missing_row(run, subject_of, question_of)]
+    differences += [_other_property(row, opened, bool(changes)) for row, opened in zip(run.rows, rows, strict=True)]
+    for row, opened in zip(derived, rows, strict=True):
+        if isinstance(opened, OpenRow):
+            differences.append(find_missing_cases(row, opened.listed, opened.question, sampling))
+    for each in (difference for sample in samples for difference in sample.differences):
+        differences.append(f"{each.formulation} {each.property_id}: {each.words}")
     examples = list(counterexamples(run).values())
+    for example in examples:
+        subject, question = subject_of[example.formulation], question_of[example.property_id]
+        words = "the property is not asked of the formulation"
+        if not question.refusal_of(subject) and not question.needs - subject.provides:
+            (words,) = judge_again(question, subject, [(example.case, example.outcome)], not changes)
+        differences.append(f"{example.id}: {words}" if words else "")
     opened_of = dict(zip(run.rows, rows, strict=True))
-    differences = [
-        find_missing_row(run, [subject.name for subject in subjects], [question.id for question in questions]),
-        *(_other_property(row, opened, bool(changes)) for row, opened in zip(run.rows, rows, strict=True)),
-        *(_missing(row, opened, sampling) for row, opened in stored),
-        *(f"{each.formulation} {each.property_id}: {each.words}" for each in recheck.differences),
-        *(_judge_example(example, subjects, questions, not changes) for example in examples),
-        *(_other_case(example, opened_of[example.row]) for example in examples if not changes),
-    ]
+    if not changes:
+        differences += [_other_case(example, opened_of[example.row]) for example in examples]
     n_witnesses = sum(WITNESS in sample.outcomes for sample in samples)
     return Audit(
         derived=replace(run, rows=tuple(derived), provided=driver.provided, opposite_signs=driver.opposite_signs),
         changes=changes,
         differences=tuple(filter(None, differences)),
         n_outcomes=sum(len(row.outcomes) for row in run.rows),
-        n_judged=recheck.n_judged - n_witnesses,
+        n_judged=sum(len(sample.words) for sample in samples) - n_witnesses,
         n_examples=len(examples) + n_witnesses,
         seconds=perf_counter() - start,
     )
 
 
-def find_changes(run: Run) -> tuple[str, ...]:
+def _find_changes(run: Run) -> tuple[str, ...]:
     """Return what is other today than in a run, of what the last bits of a number depend on."""
     digests = code_digests(run.formulations, list(run.properties))
     today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
@@ -105,43 +124,16 @@ class DerivedOutcomes(Outcomes):
         return judge_stored(self._info, self._outcomes[number])
 
 
-def _open_rows(
-    run: Run, subjects: Sequence[Subject], questions: Sequence[Property], sampling: Sampling
-) -> list[OpenRow | Row]:
-    subject_of = {subject.name: subject for subject in subjects}
-    question_of = {question.id: question for question in questions}
-    source_of = cache(sampling.source)
-    opened = []
-    for row in run.rows:
-        subject = subject_of[row.formulation]
-        question = question_of[row.property_id].for_traits(subject.traits)
-        stopped = row.reason.removeprefix(OMITTED) if row.omitted else ""
-        opened.append(open_row(subject, question, source_of(question), row.known, sampling, stopped))
-    return opened
-
-
-def _derive(row: Row, opened: OpenRow | Row, sampling: Sampling) -> Row:
+def _derive(row: Row, opened: OpenRow | Row, *, on_scene: bool) -> Row:
     """Return a stored row with all that follows from its numbers, and with what the formulation states today."""
     if isinstance(opened, Row):
         return replace(opened, info=row.info, seconds=row.seconds)
-    witness, shrunk, first = (
-        None if outcome is None else judge_stored(row.info, outcome) for outcome in (row.witness, row.shrunk, row.first)
-    )
     outcomes = DerivedOutcomes(row.info, row.outcomes)
+    witness, shrunk, first = (each and judge_stored(row.info, each) for each in (row.witness, row.shrunk, row.first))
     derived = replace(row, promise=opened.row.promise, outcomes=outcomes, planned=len(outcomes))
     derived = replace(derived, witness=witness, shrunk=shrunk, first=first)
-    verdict, reason = verdict_of_row(derived, opened, on_scene=sampling.scene is not None)
+    verdict, reason = verdict_of_row(derived, opened, on_scene=on_scene)
     return replace(derived, verdict=verdict, reason=reason)
-
-
-def _sample(row: Row, opened: OpenRow, share: float) -> Sample:
-    """Return the random share of a row that is judged again, and its witness.
-
-    A failure of an earlier run is judged as a counterexample: nothing but the report says what its case is.
-    """
-    outcomes = {number: row.outcomes[number] for number in choose_share(range(len(row.outcomes)), share)}
-    witness = {} if row.witness is None or opened.witness is None else {WITNESS: row.witness}
-    return Sample.of_row(opened, outcomes | witness)
 
 
 def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str:
@@ -157,40 +149,15 @@ def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str
     return ""
 
 
-def _missing(row: Row, opened: OpenRow, sampling: Sampling) -> str:
-    """Return what a row lacks; no more than one block of cases is drawn for it."""
-    planned, count, name = len(opened.listed or ()), len(row.outcomes), f"{row.formulation} {row.property_id}"
-    if opened.listed is None:
-        planned = count
-        if count != sampling.examples:
-            number = count // draw.BLOCK
-            planned = number * draw.BLOCK + len(draw_planned(sampling, opened.question, number).cases)
-    if count != planned or not count:
-        return f"{name}: outcomes of {count} cases, and the run has {'more' if planned > count else planned}"
-    lacks_witness = opened.witness is not None and row.witness is None
-    return f"{name}: no outcome of its witness" if lacks_witness else ""
-
-
-def _judge_example(
-    example: Counterexample, subjects: Sequence[Subject], questions: Sequence[Property], exact: bool
-) -> str:
-    subject = next(subject for subject in subjects if subject.name == example.formulation)
-    question = next(question for question in questions if question.id == example.property_id)
-    if question.refusal_of(subject) or question.needs - subject.provides:
-        return f"{example.id}: the property is not asked of the formulation"
-    (words,) = judge_again(question, subject, [(example.case, example.outcome)], exact)
-    return f"{example.id}: {words}" if words else ""
-
-
 def _other_case(example: Counterexample, opened: OpenRow | Row) -> str:
     """Return whether a stored case with a name is another one than that of today, which measures what it measured."""
-    if not isinstance(opened, OpenRow):
+
+    def bytes_of(case: Case) -> dict[str, tuple[str, bytes]]:
+        return {name: (str(array.shape), array.tobytes()) for name, array in case.to_arrays().items()}
+
+    if isinstance(opened, Row):
         return ""
     named = [opened.witness] if example.origin is Origin.WITNESS else list(opened.listed or ())
     today = next((each for each in named if each is not None and each.name == example.case.name), None)
-    same = today is None or _bytes_of(example.case) == _bytes_of(today)
+    same = today is None or bytes_of(example.case) == bytes_of(today)
     return "" if same else f"{example.id}: its mesh is not that of {example.case.name} today"
-
-
-def _bytes_of(case: Case) -> dict[str, tuple[str, bytes]]:
-    return {name: (str(array.shape), array.tobytes()) for name, array in case.to_arrays().items()}

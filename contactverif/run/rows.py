@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import chain, product
 from math import sqrt
+from typing import TypedDict
 
 from contactverif.contract import schema
 from contactverif.contract.case import Case, needs_of_place
@@ -29,7 +30,8 @@ from contactverif.run import judge
 from contactverif.run.judge import badness
 from contactverif.run.scheduler import CaseChunk
 from contactverif.run.store import Writer
-from contactverif.sampling.draw import CaseSource, Sampling, draw_cases, shrink
+from contactverif.sampling import draw
+from contactverif.sampling.draw import CaseSource, PlannedCases, Sampling
 from contactverif.sampling.hypothesis_draws import one_thread
 
 WHOLE = 100  # The first outcomes of a row that stay as they are.
@@ -118,11 +120,6 @@ class OpenRow:
         self._waiting: dict[int, Sequence[Outcome]] = {}
         self._witness_outcome: Outcome | None = None
 
-    @property
-    def witness_is_listed(self) -> bool:
-        """Return whether the witness is among the planned cases, so that it is judged anyway."""
-        return any(case is self.witness for case in self.listed or ())
-
     def expect(self, chunks: Mapping[int, CaseChunk | int], *, planned: int, last: bool) -> None:
         """Note chunks {first number: chunk} of a row with so many planned cases; `last` if no others follow.
 
@@ -159,19 +156,22 @@ class OpenRow:
 
     @property
     def witnessed(self) -> bool:
-        """Return whether the witness is judged, or is among the planned cases; without one too."""
-        return self.witness is None or self._witness_outcome is not None or self.witness_is_listed
+        """Whether the witness is judged, or is among the planned cases; true without one, too."""
+        return self.witness is None or self._witness_outcome is not None or self._place_of_witness is not None
+
+    @property
+    def _place_of_witness(self) -> int | None:
+        return next((place for place, case in enumerate(self.listed or ()) if case is self.witness), None)
 
     @property
     def complete(self) -> bool:
-        """Return whether all cases and the witness are judged."""
+        """Whether all cases and the witness are judged."""
         return self._all_drawn and not self._expected and self.witnessed
 
     def judge(self, *, on_scene: bool) -> None:
         """Make the row of the outcomes; `on_scene` if the run is about one scene alone."""
-        witness = self._witness_outcome
-        if self.witness_is_listed:
-            witness = next(outcome for outcome in self.outcomes if outcome.case_or_summary is self.witness)
+        place = self._place_of_witness
+        witness = self._witness_outcome if place is None else self.outcomes[place]
         row = self._row_of(self.outcomes, self.planned, witness)
         verdict, reason = verdict_of_row(row, self, on_scene=on_scene)
         self.row = replace(row, verdict=verdict, reason=reason)
@@ -196,12 +196,12 @@ class OpenRow:
         number it must be a clear one, half-way on a logarithmic scale between the tolerance and the worst value: the
         smallest case that fails at all often fails by a hair, which convinces no reader.
         """
-        kind, worst = max((badness(self.row.info, outcome) for outcome in self.outcomes), default=(0, 0.0))
+        badnesses = [badness(self.row.info, outcome) for outcome in self.outcomes]
+        kind, worst = max(badnesses, default=(0, 0.0))
         if kind == 0:
             return None
         least = (kind, min(CLEAR_RATIO, sqrt(worst)) if kind == 1 else worst)  # No other kind is worse than the worst.
-        bad = (badness(self.row.info, outcome) >= least for outcome in self.outcomes)
-        return Shrinking(next(number for number, is_bad in enumerate(bad) if is_bad), least)
+        return Shrinking(next(number for number, bad in enumerate(badnesses) if bad >= least), least)
 
 
 def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdict, str]:
@@ -312,14 +312,6 @@ def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -
     return case
 
 
-@dataclass(frozen=True, slots=True)
-class JudgedCases:
-    """The outcomes of some cases, in their order."""
-
-    outcomes: tuple[Outcome, ...]
-    write_error: str = ""  # What kept the process from storing them.
-
-
 def judge_cases(
     question: Property,
     subject: Subject,
@@ -327,10 +319,10 @@ def judge_cases(
     writer: Writer | None,
     stored: Mapping[int, Outcome],
     count: Callable[[int], None] | None = None,
-) -> JudgedCases:
+) -> tuple[tuple[Outcome, ...], str]:
     """Judge the cases of a chunk but for those at the places of `stored`, and store each outcome at once.
 
-    The outcomes hold summaries, because the parent has the cases.
+    Return all outcomes, which hold summaries because the parent has the cases, and what kept this process from storing.
     """
     outcomes: list[Outcome] = []
     cases = dict(enumerate(chunk.cases))
@@ -345,7 +337,7 @@ def judge_cases(
             writer.add(place, outcomes[-1])
         if count is not None:
             count(place + 1)
-    return JudgedCases(tuple(outcomes), writer.file.write_error if writer is not None else "")
+    return tuple(outcomes), writer.file.write_error if writer is not None else ""
 
 
 def _judge_together(question: Property, subject: Subject, cases: Mapping[int, Case]) -> dict[int, Outcome]:
@@ -379,8 +371,6 @@ def shrink_case(
     count: Callable[[int], None] | None = None,
 ) -> Outcome | None:
     """Return the outcome of the smallest case that is bad enough; None if the search judged none."""
-    source = sampling.source(question)
-    assert source is not None
     smallest: Outcome | None = None
     calls, ended = 0, count_ends(subject)
 
@@ -398,8 +388,51 @@ def shrink_case(
         smallest = outcome
         return True
 
-    shrink(source, seed=sampling.key(question), examples=sampling.examples, first=goal.first, fails=fails)
+    draw.shrink(**_drawing(sampling, question), first=goal.first, fails=fails)
     return smallest
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# What is planned, and what is missing of it
+
+
+class _Drawing(TypedDict):
+    source: CaseSource
+    seed: str
+    examples: int
+
+
+def _drawing(sampling: Sampling, question: Property) -> _Drawing:
+    source = sampling.source(question)
+    assert source is not None
+    return {"source": source, "seed": sampling.key(question), "examples": sampling.examples}
+
+
+def draw_planned(
+    sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
+) -> PlannedCases:
+    """Draw a block of the cases of a property, and of all properties with the same strategy."""
+    return draw.draw_block(**_drawing(sampling, question), number=number, progress=count)
+
+
+def draws_blocks(sampling: Sampling, question: Property) -> bool:
+    """Return whether the cases of a property are drawn block by block; otherwise the first block has all of them."""
+    return draw.draws_blocks(**_drawing(sampling, question))
+
+
+def find_missing_cases(row: Row, listed: Sequence[Case] | None, question: Property, sampling: Sampling) -> str:
+    """Return which outcomes a row lacks, or has beyond the plan; no more than one block of cases is drawn for it."""
+    count = len(row.outcomes)
+    planned = count if listed is None else len(listed)
+    if listed is None and count != sampling.examples:  # A strategy may have fewer cases than were wanted.
+        number = min(count, sampling.examples - 1) // draw.BLOCK
+        number = number if draws_blocks(sampling, question) else 0
+        block = draw_planned(sampling, question, number)
+        planned = number * draw.BLOCK + len(block.cases) if block.last else sampling.examples
+    missing = "" if count == planned > 0 else f"outcomes of {count} of {planned} cases"
+    if not missing and row.promise is False and row.witness is None:
+        missing = "no outcome of its witness"
+    return f"{row.formulation} {row.property_id}: {missing}" if missing else ""
 
 
 def find_missing(
@@ -411,9 +444,19 @@ def find_missing(
     """
     names = {subject.name: subject for subject in subjects if isinstance(subject, Subject)}
     properties = {question.id: question for question in questions if isinstance(question, Property)}
-    rows = ((row, names[row.formulation], properties[row.property_id]) for row in result.rows)
-    lacks = (_missing_of(row, subject, question, sampling) for row, subject, question in rows)
-    return find_missing_row(result, names, properties) or next(filter(None, lacks), "")
+    missing = find_missing_row(result, names, properties)
+    for row in () if missing else result.rows:
+        subject = names[row.formulation]
+        question = properties[row.property_id].for_traits(subject.traits)
+        source = sampling.source(question)
+        if question.refusal_of(subject) or question.needs - subject.provides or source is None:
+            if row.verdict not in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED):
+                missing = f"{row.formulation} {row.property_id}: {row.verdict}"
+        else:
+            missing = find_missing_cases(row, source if isinstance(source, tuple) else None, question, sampling)
+        if missing:
+            break
+    return missing
 
 
 def find_missing_row(result: Run, names: Iterable[str], property_ids: Iterable[str]) -> str:
@@ -422,18 +465,3 @@ def find_missing_row(result: Run, names: Iterable[str], property_ids: Iterable[s
     rows = Counter((row.formulation, row.property_id) for row in result.rows)
     wrong = next((key for key in planned | rows if rows[key] != planned[key]), None)
     return "" if wrong is None else f"{' '.join(wrong)}: {rows[wrong]} rows instead of {planned[wrong]}"
-
-
-def _missing_of(row: Row, subject: Subject, question: Property, sampling: Sampling) -> str:
-    question, name = question.for_traits(subject.traits), f"{row.formulation} {row.property_id}"
-    source = sampling.source(question)
-    if question.refusal_of(subject) or question.needs - subject.provides or source is None:
-        return "" if row.verdict in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED) else f"{name}: {row.verdict}"
-    planned = count = sum(isinstance(outcome, Outcome) for outcome in row.outcomes)
-    if isinstance(source, tuple):
-        planned = len(source)
-    elif count != sampling.examples:  # A strategy that may have fewer than were wanted is drawn once more.
-        planned = len(draw_cases(source, seed=sampling.key(question), examples=sampling.examples).cases)
-    if count != planned or not planned:
-        return f"{name}: outcomes of {count} of {planned} cases"
-    return f"{name}: no outcome of its witness" if row.promise is False and row.witness is None else ""

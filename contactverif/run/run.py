@@ -17,7 +17,7 @@ from functools import partial
 from itertools import chain, islice, product
 from operator import attrgetter
 from time import perf_counter
-from typing import NamedTuple, TypeVar, get_args
+from typing import TypeVar, get_args
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
@@ -34,12 +34,12 @@ from contactverif.run import judge
 from contactverif.run.failure_memory import Failures
 from contactverif.run.profiles import Profile, Shrink, profile_named
 from contactverif.run.ranking import first_failure, wrong_rows
-from contactverif.run.recheck import draw_planned, recheck_store
+from contactverif.run.recheck import recheck_store
 from contactverif.run.rows import (
     WHOLE,
-    JudgedCases,
     OpenRow,
-    Shrinking,
+    draw_planned,
+    draws_blocks,
     judge_cases,
     lacks_witness,
     open_row,
@@ -49,12 +49,13 @@ from contactverif.run.rows import (
 from contactverif.run.scheduler import CaseChunk, Job, Progress, RunProgress, Scheduler
 from contactverif.run.store import WITNESS, Store
 from contactverif.sampling import draw
-from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, Sampling
+from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, PlannedCases, Sampling
 
 CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
 _FACE_NAMES = {2: "segments in the plane", 3: "triangles in space", 4: "quadrilaterals in space"}
 _Kind = TypeVar("_Kind")
+_Key = tuple[str, str]  # A formulation, and the id of a property.
 
 
 class RunStopped(KeyboardInterrupt):
@@ -189,19 +190,18 @@ class Driver:
         self._scheduler, self._report = scheduler, scheduler.report
         self._known = known or {}
         self._share, self._shrink, self._keep_going = share, shrink, keep_going
-        self._rows: dict[tuple[str, str], OpenRow | Row] = {}
+        self._rows: dict[_Key, OpenRow | Row] = {}
         # Properties with the same cases. Those that state a turn come first, and those that solve bodies last: they
         # take long, and a person waits for the first row.
         self._groups: dict[tuple[str, bool], list[Property]] = {}
-        # The property that each formulation is asked: with cases in the plane, or in space.
-        self._variants: dict[tuple[str, str], Property] = {}
+        self._variants: dict[_Key, Property] = {}  # What each formulation is asked: with cases in the plane or space.
         for question in sorted(questions, key=attrgetter("bodies", "turn")):
             variants = {(subject.name, question.id): question.for_traits(subject.traits) for subject in subjects}
             self._variants |= variants
             for variant in dict.fromkeys(variants.values()):
                 self._groups.setdefault(sampling.group(variant), []).append(variant)
         self._meter = RunMeter(self._variants, subjects, sampling)
-        self._fail_again: dict[tuple[str, str], Outcome] = {}
+        self._fail_again: dict[_Key, Outcome] = {}
         self._opposite_signs: set[str] = set()
         self._diagnoses: dict[str, str] = {}
         self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
@@ -248,18 +248,14 @@ class Driver:
     def _earlier_failures(self) -> Iterator[Job]:
         """Yield the jobs to judge what failed in earlier runs; none of them counts among the planned cases."""
         for question, subject in product(chain.from_iterable(self._groups.values()), self._subjects):
-            case = self._store.failures.get((subject.name, question.id))
-            if (
-                case is None
-                or question is not self._variants[subject.name, question.id]
-                or subject.name in self._stopped
-                or question.promise(subject.traits) is False
-            ):
-                continue
-            before = Progress(subject.name, question.id, "asking again", 0, 1)
-            self._report(before)
-            note = partial(self._note_earlier_failure, before, subject, question)
-            yield Job(judge.judge_if_applicable, (question, case, subject), note)
+            key = subject.name, question.id
+            case = self._store.failures.get(key)
+            is_asked = question is self._variants[key] and subject.name not in self._stopped
+            if case is not None and is_asked and question.promise(subject.traits) is not False:
+                before = Progress(*key, "asking again", 0, 1)
+                self._report(before)
+                note = partial(self._note_earlier_failure, before, subject, question)
+                yield Job(judge.judge_if_applicable, (question, case, subject), note)
 
     def _note_earlier_failure(self, before: Progress, subject: Subject, question: Property, outcome: Outcome) -> None:
         if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED):
@@ -285,6 +281,7 @@ class Driver:
         provenance |= places(self._subjects)
         if reason := draw.why_the_engine_draws():
             provenance["drawing"] = reason
+        provenance |= self._store.provenance()
         provenance |= self._store.provenance()
         while self._groups:
             self._open_next()
@@ -327,16 +324,14 @@ class Driver:
         for row in rows:
             if row.witness is not None and not row.witnessed:
                 yield self._judge(row, CaseChunk([row.witness], WITNESS))
-        if not rows:
-            return
-        if (listed := rows[0].listed) is not None:
+        if rows and (listed := rows[0].listed) is not None:
             for row in rows:
                 chunks = _in_chunks(listed, LIST_CHUNK)
                 if self._share is None:
                     row.expect({chunk.first: chunk for chunk in chunks}, planned=len(listed), last=True)
                     yield self._finish(row)
                 yield from (self._judge(row, chunk) for chunk in chunks)
-        else:
+        elif rows:
             n_blocks = 1 if self._share is None else draw.number_of_blocks(self._sampling.examples)
             yield from (self._blocks(rows, number) for number in range(n_blocks))
 
@@ -363,83 +358,83 @@ class Driver:
     def _blocks(self, rows: Sequence[OpenRow], number: int) -> Iterator[Job]:
         """Yield the jobs of a block and, but for a share, of all blocks behind it: the rows have the same cases."""
         question, sampling = rows[0].question, self._sampling
-        while (known := self._known_block(rows, number)) is not None:
+        # The first block is drawn: rows keep its cases whole, and only what draws it tells whether it has all cases.
+        while number and (known := self._known_block(rows, number)) is not None:
             yield from known
             number += 1
             if self._share is not None or number * BLOCK >= sampling.examples:
                 return
-        if number > 0 and self._share is not None:
-            source = sampling.source(question)
-            assert source is not None
-            if not draw.draws_blocks(source, seed=sampling.key(question), examples=sampling.examples):
-                return  # Where a strategy runs out of cases, the first block has all of them.
+        if number and self._share is not None and not draws_blocks(sampling, question):
+            return  # Where a strategy runs out of cases, the first block has all of them.
         before = Progress(rows[0].subject.name, question.id, "drawing", 0, sampling.examples)
         yield Job(draw_chunks, (sampling, question, number), partial(self._add_drawn, rows, number), before)
 
     def _known_block(self, rows: Sequence[OpenRow], number: int) -> Iterable[Job] | None:
-        """Return the jobs that follow from the outcomes of a block; None if it is to be drawn.
+        """Return the jobs that follow from the outcomes of a block.
 
-        The first is: rows keep its cases whole, and only what draws it tells whether it has all cases. Another one is
-        if the store lacks an outcome, or a row keeps one of its cases whole.
+        None if it is to be drawn: the store lacks an outcome, or a row keeps one of its cases whole.
         """
-        if number == 0:
-            return None
-        first = number * BLOCK
-        examples = self._sampling.examples
+        first, examples = number * BLOCK, self._sampling.examples
         count, parts = min(BLOCK, examples - first), []
         for row in rows:
             stored = self._store.outcomes(row.subject.name, row.question.info, first, count)
             if len(stored) < count or (self._share is None and row.outcomes.may_keep_whole(first, stored.values())):
                 return None
-            parts.append(tuple(stored[place] for place in range(count)))
+            parts.append([stored[place] for place in range(count)])
         if self._share is not None:
             return ()
         jobs: list[Job] = []
         for row, outcomes in zip(rows, parts, strict=True):
             row.expect({first: count}, planned=examples, last=first + count == examples)
-            jobs += self._add(row, first, JudgedCases(outcomes))
+            jobs += self._add(row, first, outcomes)
         return jobs
 
-    def _add_drawn(self, rows: Sequence[OpenRow], number: int, cases: DrawnCases) -> Iterable[Job]:
+    def _add_drawn(
+        self, rows: Sequence[OpenRow], number: int, drawn: tuple[Sequence[CaseChunk], PlannedCases]
+    ) -> Iterable[Job]:
+        chunks, block = drawn
         if number == 0:
-            for chunk in cases.chunks[: -(-WHOLE // CHUNK)]:
+            for chunk in chunks[: -(-WHOLE // CHUNK)]:
                 chunk.keep()
-        judging = chain.from_iterable(self._judge(row, chunk) for row in rows for chunk in cases.chunks)
+        judging = chain.from_iterable(self._judge(row, chunk) for row in rows for chunk in chunks)
         if self._share is not None:
             return judging
-        count = number * BLOCK + sum(chunk.count for chunk in cases.chunks)
-        planned = count if cases.exhausted else self._sampling.examples
+        count = number * BLOCK + sum(chunk.count for chunk in chunks)
         for row in rows:
-            row.expect({chunk.first: chunk for chunk in cases.chunks}, planned=planned, last=cases.last)
+            planned = count if block.exhausted else self._sampling.examples
+            row.expect({chunk.first: chunk for chunk in chunks}, planned=planned, last=block.last)
         # A row without any case is complete.
-        return chain(*map(self._finish, rows), judging, () if cases.last else self._blocks(rows, number + 1))
+        return chain(*map(self._finish, rows), judging, () if block.last else self._blocks(rows, number + 1))
 
     def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
         """Yield the job to judge the cases of a chunk that are not judged yet."""
         name, question = row.subject.name, row.question
         stored = self._store.outcomes(name, question.info, chunk.first, chunk.count)
         if len(stored) == chunk.count:
-            yield from self._add(row, chunk.first, JudgedCases(tuple(stored[place] for place in range(chunk.count))))
-            return
-        arguments = question, row.subject, chunk, self._store.writer(name, question.id, chunk.first), stored
-        yield Job(judge_cases, arguments, partial(self._add, row, chunk.first, is_new=True), self._judging(row))
+            yield from self._add(row, chunk.first, [stored[place] for place in range(chunk.count)])
+        else:
+            arguments = question, row.subject, chunk, self._store.writer(name, question.id, chunk.first), stored
+            yield Job(judge_cases, arguments, partial(self._add_judged, row, chunk.first), self._judging(row))
 
     def _judging(self, row: OpenRow) -> Progress:
         of_run = self._meter.read(self._rows)
         return Progress(row.subject.name, row.question.id, "judging", row.n_finished, row.planned, of_run=of_run)
 
-    def _add(self, row: OpenRow, first: int, judged: JudgedCases, *, is_new: bool = False) -> Iterable[Job]:
+    def _add_judged(self, row: OpenRow, first: int, judged: tuple[Sequence[Outcome], str]) -> Iterable[Job]:
+        outcomes, write_error = judged
+        self._meter.measure(row.question.id, outcomes)
+        self._store.write_error = self._store.write_error or write_error
+        return self._add(row, first, outcomes)
+
+    def _add(self, row: OpenRow, first: int, outcomes: Sequence[Outcome]) -> Iterable[Job]:
         """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""
-        if is_new:
-            self._meter.measure(row.question.id, judged.outcomes)
-        self._store.write_error = self._store.write_error or judged.write_error
         if self._share is not None:
             self.check_written()
             return ()
         if first == WITNESS:
-            row.add_witness(*judged.outcomes)
+            row.add_witness(*outcomes)
         else:
-            row.add(first, judged.outcomes)
+            row.add(first, outcomes)
             self._report(self._judging(row))
         return self._finish(row)
 
@@ -449,14 +444,13 @@ class Driver:
             return ()
         row.judge(on_scene=self._sampling.scene is not None)
         self._report(replace(self._judging(row), row=row.row))
-        goal = row.goal()
-        if goal is None:
-            return ()
         shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
-        return self._shrink_row(row, goal, shrinks=shrinks)
+        return self._shrink_row(row, shrinks=shrinks)
 
-    def _shrink_row(self, row: OpenRow, goal: Shrinking, *, shrinks: bool = True) -> Iterable[Job]:
+    def _shrink_row(self, row: OpenRow, *, shrinks: bool) -> Iterable[Job]:
         """Return the job to shrink what failed in a row; of a list of cases nothing is smaller."""
+        if (goal := row.goal()) is None:
+            return ()
         add = partial(self._add_shrunk, row, goal.first)
         if row.listed is not None or not shrinks:
             add(None)
@@ -486,8 +480,8 @@ class Driver:
             if subject.traits.abilities.in_plane:  # The rules look at plane states.
                 note = partial(self._diagnoses.__setitem__, subject.name)
                 yield Job(diagnose, (subject, failure.property_id, others), note)
-            if self._shrink == "one" and (goal := row.goal()) is not None:
-                yield from self._shrink_row(row, goal)
+            if self._shrink == "one":
+                yield from self._shrink_row(row, shrinks=True)
 
     def _measure_forces(self) -> Iterator[Job]:
         """Yield the jobs to ask for the forces on each counterexample in space, which no text can show."""
@@ -521,20 +515,12 @@ def _check_once(argument: str, names: Iterable[str]) -> None:
             raise MisuseError(argument, f"{name} {times} times", "each of them once")
 
 
-class DrawnCases(NamedTuple):
-    """A block of the cases of a strategy, in order."""
-
-    chunks: tuple[CaseChunk, ...]
-    exhausted: bool  # The strategy has no other cases.
-    last: bool  # No further block follows.
-
-
 def draw_chunks(
     sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
-) -> DrawnCases:
-    """Draw a block of the cases of a property in chunks: so they travel between processes."""
+) -> tuple[Sequence[CaseChunk], PlannedCases]:
+    """Draw a block of the cases of a property in chunks, so that they travel between processes, and the block's end."""
     block = draw_planned(sampling, question, number, count)
-    return DrawnCases(_in_chunks(block.cases, CHUNK, number * BLOCK), block.exhausted, block.last)
+    return _in_chunks(block.cases, CHUNK, number * BLOCK), replace(block, cases=())
 
 
 def _in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[CaseChunk, ...]:
@@ -554,11 +540,9 @@ _COSTS = {(False, False): 1.0, (False, True): 0.7, (True, False): 2.7, (True, Tr
 class RunMeter:
     """A meter of a run. A kind of cases is whether they solve bodies, and whether they stand in a list."""
 
-    def __init__(
-        self, variants: Mapping[tuple[str, str], Property], subjects: Sequence[Subject], sampling: Sampling
-    ) -> None:
+    def __init__(self, variants: Mapping[_Key, Property], subjects: Sequence[Subject], sampling: Sampling) -> None:
         self._kinds: dict[str, tuple[bool, bool]] = {}
-        self._planned: dict[tuple[str, str], int] = {}
+        self._planned: dict[_Key, int] = {}
         self._cases, self._seconds = Counter[tuple[bool, bool]](), defaultdict[tuple[bool, bool], float](float)
         self._started: float | None = None
         subject_of = {subject.name: subject for subject in subjects}
@@ -576,10 +560,11 @@ class RunMeter:
             self._cases[self._kinds[property_id]] += 1
             self._seconds[self._kinds[property_id]] += outcome.seconds
 
-    def read(self, rows: Mapping[tuple[str, str], OpenRow | Row]) -> RunProgress:
+    def read(self, rows: Mapping[_Key, OpenRow | Row]) -> RunProgress:
         """Return how far a run with these rows is, in which others may still be missing."""
+        now = perf_counter()
         if self._started is None:  # First calls, which may compile, say nothing about the cases.
-            self._started = perf_counter()
+            self._started = now
         finished, planned, left = 0, 0, Counter[tuple[bool, bool]]()
         for key, count in self._planned.items():
             row = rows.get(key)
@@ -588,13 +573,10 @@ class RunMeter:
             n_finished, n_cases = (0, count) if row is None else (row.n_finished, row.planned or count)
             finished, planned = finished + n_finished, planned + n_cases
             left[self._kinds[key[1]]] += n_cases - n_finished
-        return RunProgress(finished, planned, self._guess(left) if finished > _SHARE * planned else None)
-
-    def _guess(self, left: Mapping[tuple[bool, bool], int]) -> float | None:
         measured = sum(self._seconds.values())
-        if not measured or self._started is None:
-            return None
+        if finished <= _SHARE * planned or not measured:
+            return RunProgress(finished, planned, None)
         unit = measured / sum(_COSTS[kind] * count for kind, count in self._cases.items())
         costs = {kind: self._seconds[kind] / count for kind, count in self._cases.items()}
         ahead = sum(count * costs.get(kind, _COSTS[kind] * unit) for kind, count in left.items())
-        return ahead * (perf_counter() - self._started) / measured
+        return RunProgress(finished, planned, ahead * (now - self._started) / measured)

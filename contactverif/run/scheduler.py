@@ -24,7 +24,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contactverif.contract.arrays import freeze
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContactverifError, MisuseError
 from contactverif.contract.property import Property
@@ -108,10 +107,12 @@ class Scheduler:
                 elif (future := _submit(self._executor, job.function, *job.arguments)) is not None:
                     running[future] = job
                 else:
-                    waiting.appendleft(iter(job.then(self._do_here(job)) or ()))
+                    result = job.function(*job.arguments, **self._counting(job.progress))
+                    waiting.appendleft(iter(job.then(result) or ()))
             for future in self._wait(running):
                 job = running.pop(future)
-                waiting.appendleft(iter(job.then(_fetch(future, partial(self._do_here, job))) or ()))
+                here = partial(job.function, *job.arguments, **self._counting(job.progress))
+                waiting.appendleft(iter(job.then(_fetch(future, here)) or ()))
 
     def _wait(self, running: Iterable[Future[bytes]]) -> Iterable[Future[bytes]]:
         while running:
@@ -127,15 +128,11 @@ class Scheduler:
             self._last = step
             self._report(step)
 
-    def _do_here(self, job: Job) -> Any:
-        start = job.progress
+    def _counting(self, start: Progress | None) -> dict[str, Callable[[int], None]]:
+        """Return the argument with which a job that is done here reports how far it is behind its start."""
         if start is None:
-            return job.function(*job.arguments)
-
-        def count(finished: int) -> None:
-            self.report(replace(start, count=start.count + finished))
-
-        return job.function(*job.arguments, count=count)
+            return {}
+        return {"count": lambda finished: self.report(replace(start, count=start.count + finished))}
 
 
 def _submit(executor: Executor | None, function: Callable[..., Any], *arguments: Any) -> Future[bytes] | None:
@@ -176,9 +173,10 @@ def begin_loading(names: Sequence[str], limits: Limits | None, executor: Executo
     `load_subject` does. Without an executor this process loads all: within limits, the first begins to load at once.
     """
     here: list[Loader] = [partial(load_subject, name, limits) for name in names]
-    if executor is None or limits is None:
-        if limits is not None:
-            start_loading(names[0], limits)
+    if limits is None:
+        return here
+    if executor is None:
+        start_loading(names[0], limits)
         return here
     futures = [_submit(executor, _load, name, limits) for name in names]
     n_workers = int(getattr(executor, "_max_workers", 0))
@@ -269,16 +267,11 @@ def decode(data: bytes) -> Any:
 class _Pickler(pickle.Pickler):
     def reducer_override(self, item: Any) -> Any:
         if type(item) is np.ndarray and not item.flags.writeable and not item.dtype.hasobject:
-            return _read_only, (item.tobytes(), item.dtype.str, item.shape)
+            # From bytes, because an array that owns its memory could be made writeable again.
+            return np.ndarray, (item.shape, item.dtype.str, item.tobytes())
         if isinstance(item, Property) and _find_registered(item.id) is item:
             return _find_registered, (item.id,)
         return NotImplemented
-
-
-def _read_only(data: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
-    if not data:
-        return freeze(np.empty(shape, dtype), np.dtype(dtype).type)
-    return np.frombuffer(data, dtype=dtype).reshape(shape)
 
 
 @cache
