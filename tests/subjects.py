@@ -75,6 +75,20 @@ def change_verbs(inner: Any, **changes: Callable[..., Any]) -> Changed:
     return Changed(inner, **{verb: partial(change, getattr(inner, verb)) for verb, change in changes.items()})
 
 
+def with_verbs(right: str | Subject | Callable[..., Any], **changes: Callable[..., Any] | None) -> Subject:
+    """Return a formulation, its factory or its name, with verbs as `change_verbs` makes them, or without one (None)."""
+    subject = load_subject(right) if isinstance(right, str) else right
+    make = subject._make if isinstance(subject, Subject) else subject
+    missing = {verb: None for verb, change in changes.items() if change is None}
+    others = {verb: change for verb, change in changes.items() if change is not None}
+
+    def make_changed(*, penalty: float) -> Changed:
+        inner = make(penalty=penalty)
+        return Changed(inner, **missing, **{verb: partial(each, getattr(inner, verb)) for verb, each in others.items()})
+
+    return Subject("changed", make_changed)
+
+
 class ResidualAlone:
     """A formulation that pairs at each state of its residual, and has no other verb."""
 

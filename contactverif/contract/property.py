@@ -366,16 +366,17 @@ class Property(PropertyInfo):
         cls,
         *,
         id: str,
-        family: str,
         quantities: tuple[Quantity, ...],
         cases: Callable[[Any], Any],
-        promise: Callable[[Traits], bool | None],
+        family: str = "",
+        promise: Callable[[Traits], bool | None] = lambda traits: True,
         **others: Unpack[OtherAttributes],
     ) -> Callable[[Measure], Property]:
         """Return a decorator that makes a property of the function that measures.
 
         The first line of its docstring is the summary, and what follows is the question. The arguments are the other
-        attributes of the property. A property that is made so can be pickled. A function without a docstring is
+        attributes of the property. Its family is the first word of its id, and every formulation promises it, unless
+        the arguments say otherwise. A property that is made so can be pickled. A function without a docstring is
         refused.
         """
 
@@ -385,7 +386,8 @@ class Property(PropertyInfo):
                 name = f"{measure.__module__}.{measure.__qualname__}"
                 needed = "what must hold, in one line, and the question below it: the property's page is made of them"
                 raise MisuseError(f"docstring of {name}", "none", needed)
-            return cls(id, family, summary, quantities, cases, measure, promise, question=question, **others)
+            values = (id, family or id.partition(".")[0], summary, quantities, cases, measure, promise)
+            return cls(*values, question=question, **others)
 
         return make
 

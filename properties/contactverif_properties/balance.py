@@ -37,7 +37,6 @@ WORK = Quantity(
 
 _define = partial(
     Property.define,
-    family="balance",
     cases=Cases.random(any_cases),
     cases_in_space=Cases.random(surface_cases),
     asks=WITH_BARRIER,
@@ -223,7 +222,6 @@ Function = Callable[[FloatArray], FloatArray]
 
 
 def _refuse_unstated_continuity(traits: Traits) -> str:
-    """Return why the question makes no sense for a formulation, or an empty string if it does."""
     if traits.rules.enforcement == "multiplier":
         return "multipliers would change on the way, and here nothing is solved"
     return "the trait `continuity` is not stated" if traits.promises.continuity is None else ""

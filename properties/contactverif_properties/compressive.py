@@ -138,7 +138,6 @@ def _move_by_roundoff(case: Case) -> Iterator[Case]:
 
 
 def _describe(constraints: _Constraints, rows: FloatArray, multipliers: FloatArray, gap: float, row: int) -> str:
-    """Return in words which constraint row is wrong, beside what is right."""
     multiplier, scale = float(multipliers[row]), constraints.scale
     area = "1, since it is a nodal force" if constraints.rules.penalty == "nodal" else f"{constraints.areas[row]:.6g}"
     state = f"at a gap of {gap:.6g}, λ = {multiplier:.6g} and c = {scale:.6g}"
@@ -234,7 +233,6 @@ _define = partial(
     rank=60,
     turn=2,
     quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH),
-    promise=lambda traits: True,
     asks=WITH_BARRIER,
 )
 def unilateral(case: Case, subject: Subject) -> Measurement:
@@ -408,10 +406,15 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     size = roundoff.sum_larger_forces(case, state.forces)
     if not size:
         return Measurement([PULL_OF_NODE.check(0.0, 0.0)], idle=True)
+    from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
+
     normals, allowance = allowed_pushes(state)
-    pulls = np.array(
-        [_distance_from_cone(normals[node], force) - allowance[node] for node, force in enumerate(-state.forces)]
-    )
+    # The distances of forces from the sums of non-negative multiples of the normals.
+    distances = [
+        float(nnls(np.array(sorted(normals[node])).T, force)[1]) if normals[node] else float(np.linalg.norm(force))
+        for node, force in enumerate(-state.forces)
+    ]
+    pulls = np.array(distances) - allowance
     tolerance = roundoff.segment_tolerance(case, state.forces, case.largest_coordinate)
     pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
     undecided = _excuse_pulls(state, pulled, subject.traits) if pulled else ""
@@ -419,7 +422,6 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
 
 
 def _excuse_pulls(state: FrozenState, pulled: set[int], traits: Traits) -> str:
-    """Return why some nodes may be pulled, or an empty string."""
     if pulled <= _nodes_round_corners(state):
         return "a point faces the master beside a corner, and parts of its force may lie round it"
     twice = traits.promises.unbiased or may_act_twice(traits)
@@ -508,10 +510,3 @@ def _allow_points(each: Pass, normals: dict[int, set[Direction]], allowance: Flo
     for segment, pull in zip(points.master_segment.tolist(), pulls, strict=True):
         if segment >= 0:
             allowance[numbers[master[segment]]] += pull
-
-
-def _distance_from_cone(normals: set[Direction], force: FloatArray) -> float:
-    """Return the distance of a force from the sums of non-negative multiples of the normals."""
-    from scipy.optimize import nnls  # It takes long to import, and the first rows of a run do not need it.
-
-    return float(nnls(np.array(sorted(normals)).T, force)[1]) if normals else float(np.linalg.norm(force))

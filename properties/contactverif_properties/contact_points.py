@@ -46,8 +46,6 @@ FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Reported:
-    """The answers of a formulation in a state."""
-
     state: Case  # With multipliers, if the formulation has any.
     forces: FloatArray  # The position rows of the residual, of shape (n_nodes, dim).
     points: ContactPoints
@@ -140,10 +138,8 @@ def _largest(values: FloatArray) -> float:
 
 define_projection = partial(
     Property.define,
-    family="projection",
     cases=Cases.by_kind(projected_cases),
     kinds=PROJECTED_KINDS,
-    promise=lambda traits: True,
     needs=frozenset({"contact_points"}),
 )
 
@@ -234,7 +230,6 @@ def _longest_edges(corners: FloatArray) -> FloatArray:
 
 
 def _refuse_without_rule(traits: Traits) -> str:
-    """Return why places cannot be judged, or an empty string where the trait `gap` states a rule."""
     return "" if traits.rules.gap is not None else "the trait `gap` states no rule of projection"
 
 
@@ -403,7 +398,6 @@ WRONG = Quantity("wrong decisions", "0", "A decision is right or wrong; what rou
 
 
 def _refuse_other_decisions(traits: Traits) -> str:
-    """Return why the decision is not known from the gap, or an empty string."""
     if traits.rules.enforcement == "multiplier":
         return "the enforcement is by a multiplier, which decides in its own way"
     if traits.rules.gap == "cells and nodes":
@@ -452,7 +446,6 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
 
 
 def _count_decisions(reported: _Reported) -> tuple[int, int]:
-    """Return how many decisions for contact are wrong in a state, and how many points are decided."""
     wrong = decided = 0
     for each in reported.passes:
         weighted = each.points.select(each.points.weighted)

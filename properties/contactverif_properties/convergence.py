@@ -94,10 +94,8 @@ def _exact_forces(studies: Studies, case: Case) -> FloatArray:
 
 
 def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
-    """Return the function that defines a property which asks studies on finer and finer meshes."""
     return partial(
         Property.define,
-        family="accuracy",
         quantities=studies.quantities,
         cases=Cases.from_list(studies.cases),
         applicable=applicability.refuse_dependent_multipliers,
@@ -256,7 +254,6 @@ PRESSURE = Quantity("error of the reported pressures", _CHORDS, _CHORD_REASON)
 
 @cache
 def _arc_cases() -> tuple[Case, ...]:
-    """Return a convex and a concave slave on the coarsest mesh."""
     return tuple(
         Arcs(convex_slave=convex).case(1, name) for name, convex in (("convex slave", True), ("concave slave", False))
     )
@@ -265,7 +262,6 @@ def _arc_cases() -> tuple[Case, ...]:
 @Property.define(
     id="accuracy.arc",
     rank=440,
-    family="accuracy",
     quantities=(SLAVE, MASTER, SLAVE_SUM, MASTER_SUM, ALONG, FORCES, SUM, PRESSURE),
     cases=Cases.from_list(_arc_cases),
     promise=lambda traits: None if applicability.refuse_unknown_total(traits) else True,

@@ -7,7 +7,6 @@ from functools import partial
 from math import cos, radians, sin
 
 import numpy as np
-from hypothesis.strategies import SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, random_source
@@ -31,19 +30,13 @@ ANGLES = (17.3, 45.0, 90.0, 135.0)  # Degrees
 IMAGE = np.diag([-1.0, 1.0])
 
 
-@random_source("contactverif_properties.engine_scenes.scenes")
-def _tilted_scenes(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return blocks that are pressed together and tilted, all of the interface in contact; or a scene that is given."""
-    return closed_cases(scene)
-
-
+# Blocks that are pressed together and tilted, all of the interface in contact; or a scene that is given.
+_tilted_scenes = random_source("contactverif_properties.engine_scenes.scenes")(lambda scene=None: closed_cases(scene))
 _define_for_codes = partial(
     Property.define,
-    family="engine",
     quantities=(CHANGE,),
     cases=Cases.random(_tilted_scenes),
     needs=frozenset({SOLVE}),
-    promise=lambda traits: True,
     bodies=True,
 )
 

@@ -245,15 +245,14 @@ def uniform_multiplier(case: Case) -> float:
 
 def node_gaps(case: Case) -> FloatArray:
     """Return the gaps (n_slave_nodes,) of the slave's nodes along the master's normal, each rounded once."""
-    if case.interface.dim != PLANE:
-        corners = _largest_part(case, case.interface.master)
+    corners = _largest_part(case, case.interface.master)
+    if case.interface.dim == PLANE:  # All master segments lie on its line.
+        along = corners[1] - corners[0]
+        normal = np.array([along[1], -along[0]])
+    else:
         normal = _normal_of_face(corners)
-        heights = (_exact(case.positions[: case.interface.n_slave_nodes]) - corners[0]) @ normal
-        return np.array([float(height) for height in heights]) / sqrt(normal @ normal)
-    first, second = _largest_part(case, case.interface.master)  # All master segments lie on its line.
-    along, arms = second - first, _exact(case.positions[: case.interface.n_slave_nodes]) - first
-    areas = arms[:, 0] * along[1] - arms[:, 1] * along[0]
-    return np.array([float(area) for area in areas]) / sqrt(along @ along)
+    heights = (_exact(case.positions[: case.interface.n_slave_nodes]) - corners[0]) @ normal
+    return np.array([float(height) for height in heights]) / sqrt(normal @ normal)
 
 
 def directions(case: Case) -> tuple[FloatArray, FloatArray]:

@@ -77,8 +77,6 @@ def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tup
 
 
 class _Change(NamedTuple):
-    """The change of the forces, or of the tangent, between two states."""
-
     part: str  # "forces" or "tangent".
     quantity: Quantity
     change: FloatArray
@@ -116,7 +114,7 @@ def _judge_changes(
 
 
 def _compare(
-    quantities: tuple[Quantity, Quantity],
+    question: Property,
     subject: Subject,
     case: Case,
     other: Case,
@@ -133,14 +131,14 @@ def _compare(
         _ask(state, subject, penalty, multiplier) for state in (case, other)
     )
     size = max(roundoff.sum_larger_forces(case, forces), roundoff.sum_larger_forces(other, forces_there))
-    changes = [_Change("forces", quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
+    changes = [_Change("forces", question.quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
     if tangent.size:
         dim = case.interface.dim
         places = (dim * carry.nodes[:, None] + np.arange(dim)).reshape(-1)
         turn = np.kron(np.eye(len(carry.nodes)), carry.matrix)
         change = tangent_there[np.ix_(places, places)] - turn @ tangent @ turn.T
         size = float(max(np.abs(tangent).max(), np.abs(tangent_there).max()))
-        changes.append(_Change("tangent", quantities[1], change, size, carry.nodes, dim))
+        changes.append(_Change("tangent", question.quantities[1], change, size, carry.nodes, dim))
     distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
     tolerance = roundoff.segment_tolerance(case, forces, distance)
     numbers, undecided = _judge_changes(changes, tolerance, [first, second] if explain else [])
@@ -181,14 +179,10 @@ def _find_tie(state: FrozenState) -> str:
     return ""
 
 
-IN_MIRROR = _same_answer("in the mirror image")
-WITH_ROLES_EXCHANGED = _same_answer("with roles exchanged")
-IN_OTHER_NUMBERS = _same_answer("in other numbers")
 ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 FAR, BEHIND = "a far pair of bodies", "a body behind the master"
 DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
 PLATE = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]])  # The faces of a plate's lower and upper side.
-BESIDE_OTHERS = _same_answer("beside another body")
 
 
 def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> tuple[Case, Carry]:
@@ -228,14 +222,14 @@ def _mirror_signs(dim: int) -> FloatArray:
     return np.where(np.arange(dim) == 0, -1.0, 1.0)
 
 
-_define = partial(Property.define, family="invariants", promise=lambda traits: True, asks=WITH_BARRIER)
+_define = partial(Property.define, family="invariants", asks=WITH_BARRIER)
 
 
 @_define(
     id="mirror",
     rank=120,
     role="comparison",
-    quantities=IN_MIRROR,
+    quantities=_same_answer("in the mirror image"),
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
 )
@@ -256,14 +250,14 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
     vertex, a point is as near to one segment as to another, and the mirror image may choose the other.
     """
-    return _compare(IN_MIRROR, subject, case, *mirror_case(case))
+    return _compare(mirror, subject, case, *mirror_case(case))
 
 
 @_define(
     id="swap",
     rank=400,
     role="comparison",
-    quantities=WITH_ROLES_EXCHANGED,
+    quantities=_same_answer("with roles exchanged"),
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
     promise=lambda traits: traits.promises.unbiased,
@@ -286,7 +280,7 @@ def swap(case: Case, subject: Subject) -> Measurement:
     or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
     """
     unbiased = bool(subject.traits.promises.unbiased)
-    return _compare(WITH_ROLES_EXCHANGED, subject, case, *exchange_roles(case), explain=unbiased)
+    return _compare(swap, subject, case, *exchange_roles(case), explain=unbiased)
 
 
 @random_source("contactverif_properties.renumbering.renumbering_cases")
@@ -301,7 +295,7 @@ def renumbering_cases(
     id="renumbering",
     rank=130,
     role="comparison",
-    quantities=IN_OTHER_NUMBERS,
+    quantities=_same_answer("in other numbers"),
     cases=Cases.by_kind(renumbering_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
     kinds=(ANY, CLOSED),
@@ -339,11 +333,11 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
     if interface.dim != PLANE:  # Which corner of a face is the first has no meaning.
         slave, master = (_roll_corners(faces, random) for faces in (slave, master))
     renumbered = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
-    measurement = _compare(IN_OTHER_NUMBERS, subject, case, *renumbered)
+    measurement = _compare(renumbering, subject, case, *renumbered)
     if measurement.undecided != TIE:
         return measurement
     # The numbers of segments may decide a tie. Those of nodes still must not matter.
-    return _compare(IN_OTHER_NUMBERS, subject, case, *renumber(case, nodes, slave, master))
+    return _compare(renumbering, subject, case, *renumber(case, nodes, slave, master))
 
 
 def _roll_corners(faces: IntArray, random: np.random.Generator) -> IntArray:
@@ -373,7 +367,7 @@ def _remote_surface_cases(interface: Interface | None = None) -> dict[str, Searc
     id="remote",
     rank=190,
     role="comparison",
-    quantities=BESIDE_OTHERS,
+    quantities=_same_answer("beside another body"),
     cases=Cases.by_kind(_remote_cases),
     cases_in_space=Cases.by_kind(_remote_surface_cases),
     kinds=(FAR, BEHIND),
@@ -402,7 +396,7 @@ def remote(case: Case, subject: Subject) -> Measurement:
         parts, first = ((nothing, nothing.astype(np.int64)), _as_part(case.parameters["behind"])), False
     else:  # Multipliers of a plane case keep their places.
         parts, first = _make_far_pair(case), case.interface.dim != PLANE and case.seed % 2 == 1
-    return _compare(BESIDE_OTHERS, subject, case, *_add_parts(case, *parts, first=first))
+    return _compare(remote, subject, case, *_add_parts(case, *parts, first=first))
 
 
 _Part = tuple[FloatArray, IntArray]  # The nodes (n, dim) of a part of a surface, and its faces by their places there.
@@ -458,14 +452,11 @@ def _add_parts(case: Case, slave: _Part, master: _Part, *, first: bool = False) 
     return state, Carry(number[:n_all], np.eye(interface.dim))
 
 
-AFTER_A_BEND = _same_answer("after a bend elsewhere")
-
-
 @Property.define(
     id="locality.bend",
     rank=260,
     family="invariants",
-    quantities=AFTER_A_BEND,
+    quantities=_same_answer("after a bend elsewhere"),
     cases=Cases.random(bent_end_cases),
     promise=lambda traits: traits.promises.local,
 )
@@ -489,7 +480,7 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
     the answer by a quarter of the error or more.
     """
     bent = replace(case, z=case.parameters["bent"])
-    return _compare(AFTER_A_BEND, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))
+    return _compare(locality_bend, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))
 
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
@@ -502,19 +493,11 @@ TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGM
 
 
 def _refuse_unknown_unit(traits: Traits) -> str:
-    """Return why the number of the penalty in another unit of length is unknown, or an empty string."""
     if traits.rules.enforcement != "barrier":
         return refuse_unstated_penalty(traits)
     if traits.rules.activation_unit == "length":
         return "the activation distance of the barrier is a length, which another unit would change"
     return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"
-
-
-def _penalty_power(traits: Traits, dim: int = PLANE) -> float:
-    """Return the power of a length in the penalty, so that forces grow with lengths and the tangent stays."""
-    if traits.rules.enforcement == "barrier":
-        return traits.rules.penalty_power or 0.0
-    return float(1 - dim) if traits.rules.penalty == "distributed" else 0.0
 
 
 @_define(
@@ -553,9 +536,11 @@ def units(case: Case, subject: Subject) -> Measurement:
     z_there = np.concatenate([z[:n] * factor, z[n:] * (1.0 if distributed else factor)])
     case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
-    there = FrozenState.at(
-        subject.with_penalty(penalty * factor ** _penalty_power(subject.traits, interface.dim)), case_there
-    )
+    # The power of a length in the penalty, so that forces grow with lengths and the tangent stays.
+    power = float(1 - dim) if distributed else 0.0
+    if subject.traits.rules.enforcement == "barrier":
+        power = subject.traits.rules.penalty_power or 0.0
+    there = FrozenState.at(subject.with_penalty(penalty * factor**power), case_there)
     (forces,), tangents = ask_forces_and_tangents(state)
     (forces_there,), tangents_there = ask_forces_and_tangents(there)
     forces, forces_there = forces[:n], forces_there[:n]

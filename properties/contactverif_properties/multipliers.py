@@ -106,7 +106,6 @@ def covered_and_overhanging_cases(scene: Case | None = None) -> dict[str, Search
 @Property.define(
     id="multipliers.rank",
     rank=480,
-    family="multipliers",
     quantities=(REDUNDANT,),
     cases=Cases.by_kind(covered_and_overhanging_cases),
     kinds=(COVERED, OVERHANG),
@@ -169,7 +168,6 @@ SLOPE = Quantity(
 @Property.define(
     id="stability.inf-sup",
     rank=490,
-    family="stability",
     quantities=(ZEROS, SLOPE),
     series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
     cases=Cases.from_list(refinement_cases),

@@ -129,7 +129,6 @@ ORDER = Quantity(
 
 _define = partial(
     Property.define,
-    family="newton",
     cases=Cases.random(solid_cases),
     promise=applicability.promise_exact_tangent,
     needs=frozenset({"tangent"}),
@@ -204,7 +203,6 @@ def _is_solved(trace: Trace) -> bool:
 
 
 def _find_excuse(system: System, trace: Trace) -> str:
-    """Return why the solution decides nothing about the tangent, or an empty string."""
     last, settled = len(trace.residuals) - 1, _settling_iterate(system, trace)
     if _is_solved(trace):
         return f"the pairing does not settle: {trace.end.label}" if settled == last > SHORT else ""
@@ -371,10 +369,8 @@ STEPS = Quantity(
 @Property.define(
     id="newton.units",
     rank=570,
-    family="newton",
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),
-    promise=lambda traits: True,
     applicable=applicability.refuse_unknown_pressure,
     bodies=True,
 )
@@ -520,7 +516,6 @@ class _Attained(NamedTuple):
 @Property.define(
     id="newton.attainable",
     rank=550,
-    family="newton",
     quantities=(ADDED, RESIDUAL, ERROR),
     cases=Cases.random(closed_cases),
     promise=lambda traits: traits.promises.translation_stable,

@@ -80,7 +80,6 @@ def bound_of_rings(refine: int, penalty: float, traits: Traits) -> float:
 
 
 def _refuse_unknown_mean(traits: Traits) -> str:
-    """Return why the mean pressure is unknown from the traits, or an empty string if they say enough."""
     if traits.rules.enforcement == "multiplier":
         return refuse_dependent_multipliers(traits)
     return refuse_unknown_total(traits)
@@ -101,7 +100,6 @@ def _promise_mean(traits: Traits) -> bool | None:
 @Property.define(
     id="patch.curved",
     rank=470,
-    family="patch",
     quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES),
     cases=Cases.from_list(_rings),
     promise=_promise_mean,
@@ -256,7 +254,6 @@ FALL = Quantity(
 
 @cache
 def _kinked_cases() -> tuple[Case, ...]:
-    """Return blocks on three broken lines, either block as the slave."""
     return tuple(
         replace(
             kinked_patch(KinkedPatch(line, pressure=STRAINS[0]), upper_slave=upper, penalty=MODERATE),
@@ -269,7 +266,6 @@ def _kinked_cases() -> tuple[Case, ...]:
 @Property.define(
     id="patch.kinked",
     rank=500,
-    family="patch",
     quantities=(STRESS, SLAVE, MASTER, PRESSURE, APPROACH, CUT, FALL),
     cases=Cases.from_list(_kinked_cases),
     promise=lambda traits: traits.promises.patch.kinked,
@@ -315,7 +311,6 @@ def patch_kinked(case: Case, subject: Subject) -> Measurement:
 
 
 def _measure_two_normals(case: Case, subject: Subject) -> Measurement:
-    """Return the errors of the uniform state, which is exact."""
     problem, upper_slave = patch_of(case)
     penalty, traits, pressure = case.penalty, subject.traits, problem.pressure
     scene, gap = kinked_patch(problem, upper_slave=upper_slave, penalty=penalty), pressure / penalty
@@ -425,7 +420,6 @@ KINK_FORCES = Quantity("error of a nodal force", KINK_TERMS, KINK_REASON)
 
 @Property.define(
     id="engine.kinked",
-    family="engine",
     needs=frozenset({SOLVE}),
     bodies=True,
     quantities=(KINK_STRESS, KINK_FORCES),

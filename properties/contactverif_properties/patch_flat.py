@@ -42,10 +42,8 @@ _MOVED = 16.0  # A moved end node bends shares by 128uX over a segment, which th
 # The share for NTS-AR without a tolerance past free ends: the slave ends where the master ends in every ninth case.
 WITHOUT_TOLERANCE = 0.11
 
-_define = partial(Property.define, family="patch")
 
-
-@_define(
+@Property.define(
     id="patch.flat.transmission",
     rank=240,
     role="exact",
@@ -87,7 +85,7 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     return _unless_end_is_lost(case, partial(exact_forces.measure_transmission, FORCE, subject=subject), most)
 
 
-@_define(
+@Property.define(
     id="patch.flat.resultant",
     rank=220,
     role="exact",
@@ -136,8 +134,6 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
 
 
 def _measure_class(case: Case, subject: Subject) -> Measurement:
-    """Compare forces, reported gaps and reported pressures of a uniform penetration with the exact ones."""
-
     def measure(case: Case) -> Measurement:
         transmission = exact_forces.measure_transmission(FORCE, case, subject=subject)
         numbers, state = [*transmission.numbers], exact_forces.uniform_state(case, subject)
@@ -194,7 +190,7 @@ def _move_ends_inwards(case: Case) -> Case | None:
 
 
 _define_class = partial(
-    _define,
+    Property.define,
     quantities=(FORCE, GAP, PRESSURE),
     exact=exact_forces.forces_of_penetration,
     usual_undecided=WITHOUT_TOLERANCE,
@@ -259,7 +255,7 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     return _measure_class(case, subject)
 
 
-@_define(
+@Property.define(
     id="patch.flat.nodal",
     rank=90,
     quantities=(FORCE, GAP, REPORTED_FORCE),
@@ -310,7 +306,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     return Measurement(check_all(values, tolerance), finding=finding)
 
 
-@_define(
+@Property.define(
     id="patch.flat.published",
     rank=290,
     quantities=(STATED,),
@@ -401,7 +397,6 @@ PUSH = Quantity(
     quantities=(MOST, LEAST, PUSH),
     cases=Cases.from_list(equal_length_states),
     cases_in_space=Cases.from_list(equal_area_states),
-    promise=lambda traits: True,
     asks=frozenset({"penalty"}),
 )
 def total_stiffness(case: Case, subject: Subject) -> Measurement:
@@ -479,11 +474,6 @@ def _resultant_cases(interface: Interface | None = None) -> dict[str, SearchStra
     return {TILTED: tilted, STEEP: steep} if tilted is not None and steep is not None else None
 
 
-def _refuse_unknown_direction(traits: Traits) -> str:
-    known = traits.rules.force_along is not None
-    return "" if known else "the trait `force_along` is not stated, so the direction of the force is unknown"
-
-
 def _tolerance(case: Case, traits: Traits) -> float:
     mean_gap = abs(float(exact_forces.node_gaps(case).mean()))
     return roundoff.gap_tolerance(case, mean_gap, roundoff.rounding_distance(case, traits))
@@ -492,13 +482,16 @@ def _tolerance(case: Case, traits: Traits) -> float:
 @Property.define(
     id="patch.tilted.resultant",
     rank=250,
-    family="patch",
     quantities=(OFF_NORMAL, TILTED_TOTAL),
     cases=Cases.by_kind(_resultant_cases),
     cases_in_space=Cases.random(tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
-    applicable=_refuse_unknown_direction,
+    applicable=lambda traits: (
+        ""
+        if traits.rules.force_along
+        else "the trait `force_along` is not stated, so the direction of the force is unknown"
+    ),
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
@@ -547,7 +540,6 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
 
 
 def _refuse_unknown_integral(traits: Traits) -> str:
-    """Return why no exact nodal force follows from the traits, or an empty string if one does."""
     if traits.rules.enforcement == "multiplier":
         return "multipliers have pressures of their own, not those of a gap"
     if not exact_forces.knows_linear_total(traits):
@@ -558,7 +550,6 @@ def _refuse_unknown_integral(traits: Traits) -> str:
 @Property.define(
     id="patch.tilted.nodal",
     rank=370,
-    family="patch",
     quantities=(TILTED_NODAL,),
     cases=Cases.random(tilted_cases),
     cases_in_space=Cases.random(tilted_plane_cases),

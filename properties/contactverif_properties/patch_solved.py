@@ -349,7 +349,6 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
 
 
 def _at_high(quantity: Quantity) -> Quantity:
-    """Return a quantity at the high penalty."""
     return replace(quantity, name=f"{quantity.name}{AT_HIGH}")
 
 
@@ -364,7 +363,7 @@ def _scenes_of_class(make: Callable[[], tuple[Case, ...]], *, midpoints: bool) -
     return Cases.from_list(make, on_place=on_scene, needs=UNIFORM)
 
 
-_define = partial(Property.define, family="patch", bodies=True, engines=True, exact=forces_to_draw)
+_define = partial(Property.define, bodies=True, engines=True, exact=forces_to_draw)
 _define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_high, QUANTITIES), MULTIPLIERS))
 
 
@@ -475,7 +474,6 @@ def patch_variants(case: Case, subject: Subject) -> Measurement:
 
 
 def _widen_tolerance(quantity: Quantity) -> Quantity:
-    """Return the quantity with L/A times its tolerance."""
     reason = "Loads on the whole slave, of length L, are rounded, and the part A that faces the master bears that."
     return replace(quantity, tolerance=f"({quantity.tolerance}) L/A", reason=f"{quantity.reason} {reason}")
 

@@ -212,7 +212,6 @@ FIRST_TANGENT = Quantity(
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),
     cases_in_space=Cases.random(surface_cases),
-    promise=lambda traits: True,
     asks=WITH_BARRIER,
 )
 def purity(case: Case, subject: Subject) -> Measurement:
@@ -286,7 +285,11 @@ def purity(case: Case, subject: Subject) -> Measurement:
     bound = pair_coordinates(state) * UNIT_ROUNDOFF
     forces = np.array(formulation.answers([("residual", interface, pairing, u) for u in (z, near)]))
     if subject.traits.rules.enforcement == "penalty":
-        broken += _compare_penalties(formulation, subject.with_penalty(2 * penalty), questions[0], forces[0])
+        changed = subject.with_penalty(2 * penalty).residual(*questions[0])
+        if forces[0].any() and (changed == forces[0]).all():
+            broken.append("another penalty gives the same forces")
+        if (formulation.residual(*questions[0]) != forces[0]).any():
+            broken.append("the forces change when another instance is made with another penalty")
     if subject.traits.abilities.batched:
         batch = formulation.residual(interface, pairing, np.array([[z, near], [near, z]]))
         difference = max(_compare(state, near, forces, each) for each in (batch[0], batch[1][::-1]))
@@ -335,7 +338,6 @@ def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) ->
     quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
     cases=Cases.from_list(lambda: (named_case("offset-c"),)),
     cases_in_space=Cases.from_list(lambda: (named_case("tilted-faces"),)),
-    promise=lambda traits: True,
     asks=WITH_BARRIER,
 )
 def purity_long(case: Case, subject: Subject) -> Measurement:
@@ -387,17 +389,6 @@ def _compare_first(first: FirstAnswers, subject: Subject, random: np.random.Gene
             now = np.array([dense(answer) for answer in answers])
             numbers.append(quantity.check(_compare(case, near, now, np.array([then, now[1]])), tolerance))
     return numbers
-
-
-def _compare_penalties(
-    formulation: CheckedFormulation, other: CheckedFormulation, question: _Question, forces: Array
-) -> list[str]:
-    """Return what is wrong, in words, where another instance has another penalty; `forces` are those of the first."""
-    changed = other.residual(*question)
-    broken = ["another penalty gives the same forces"] if forces.any() and (changed == forces).all() else []
-    if (formulation.residual(*question) != forces).any():
-        broken.append("the forces change when another instance is made with another penalty")
-    return broken
 
 
 def _compare(case: Case, near: FloatArray, answers: Array, others: Array) -> float:

@@ -146,20 +146,11 @@ FORCES_REASON = (
     "Rounding the positions relative to one another changes forces by 1 at most. Right kernels reach 4 in all ways of "
     "writing that were tried."
 )
-TANGENT_REASON = (
-    "Rounding the positions relative to one another by uD turns a segment by uD/ℓ, and changes the stiffness of a law "
-    "that is not linear by uD max|dK/dx|."
-)
 
 
 def forces_quantity(name: str) -> Quantity:
     """Return a quantity for an ω of the residual."""
     return Quantity(name, "16 (times what rounding the positions relative to their centroid does)", FORCES_REASON)
-
-
-def tangent_quantity(name: str) -> Quantity:
-    """Return a quantity for an error of the tangent in units of u D max(max|K|/ℓ, max|dK/dx|)."""
-    return Quantity(name, "16 (times u D max(max|K|/ℓ, max|dK/dx|))", TANGENT_REASON)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -225,8 +225,6 @@ MOST_REPEATED = 3  # So many moves of a long interface that look wrong are taken
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Comparison:
-    """The blocks of a tangent beside those of the derivative of the residual."""
-
     error: FloatArray  # (count, count) The largest error of an entry of each block, and what is allowed.
     tolerance: FloatArray
     largest: FloatArray  # (count, count) The largest entry of each block, of tangent or derivative.
@@ -294,13 +292,9 @@ def judge_of(case: Case, subject: Subject) -> BlockJudge:
     state = freeze_state(case, subject)
     formulation, abilities = state.formulation, subject.traits.abilities
     tangent = formulation.tangent(state.case.interface, state.pairing, state.case.z)
-    dtype: type = np.float64
-    if formulation.decides_anew(state.pairing):  # No smaller step is exact where decisions may change with it.
-        pass
-    elif abilities.takes_complex:
-        dtype = np.complex128
-    elif abilities.takes_longdouble:
-        dtype = np.longdouble
+    sharpest = np.complex128 if abilities.takes_complex else np.longdouble if abilities.takes_longdouble else np.float64
+    # No smaller step is exact where decisions may change with it.
+    dtype: type = np.float64 if formulation.decides_anew(state.pairing) else sharpest
     matrix = dense(tangent)
     pattern = matrix != 0
     if sparse.issparse(tangent):  # A sparse tangent has an entry where it stores a zero, too.
@@ -344,7 +338,6 @@ def _compare_blocks(judge: BlockJudge) -> _Comparison:
 
 _define = partial(
     Property.define,
-    family="tangent",
     quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
@@ -568,7 +561,6 @@ COMPLEX = Quantity(
 @Property.define(
     id="tangent.directional",
     rank=0,
-    family="tangent",
     quantities=(CENTRAL, TAYLOR, COMPLEX),
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
@@ -654,8 +646,6 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Directional:
-    """The results of differences along some directions."""
-
     error: float  # The largest error against the best central difference, over the size of the derivative at its node.
     # The least slope of the Taylor remainder; infinite where all remainders are roundoff, or the residual has none.
     slope: float

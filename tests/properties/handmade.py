@@ -28,6 +28,20 @@ class Handmade:
         )
 
 
+class OneForce(Handmade):
+    """A force on y of the first node, `force(z, pairing)`, and its derivative by that y, `stiffness(z, pairing)`."""
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        forces = 0 * z
+        forces[..., 1] = self.force(z, pairing)
+        return forces
+
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        k = np.zeros((z.size, z.size))
+        k[1, 1] = self.stiffness(z, pairing)
+        return k
+
+
 class Springs(Handmade):
     """A spring between the ends of the slave segment; its stiffness is of the kind that the traits promise."""
 

@@ -4,17 +4,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, change_verbs, judge_as, load_property, load_subject
+from subjects import judge_as, load_property, load_subject, with_verbs
 from textbook_springs import NodalMultipliers
 
-import contactverif_mortar
 from contactverif import Case, Interface, Pairing, Subject, Verdict, judge_case, load_properties, named_case
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.flat_states import Turn, flat_master, flat_state
 from contactverif.run.run import run
 from contactverif_mortar import mortar, mortar_lm
-from contactverif_nts import vts_ppt
 from contactverif_properties.compressive import (
     allowed_pushes,
     check_constraint_rows,
@@ -177,11 +175,11 @@ def pull(node: int, sign: float) -> Subject:
         forces[..., 2 * node + 1] -= 2 * np.abs(forces).max()
         return sign * forces
 
-    return Subject("pulled", lambda *, penalty: change_verbs(vts_ppt(penalty=penalty), residual=residual))
+    return with_verbs("vts-ppt", residual=residual)
 
 
-def without_points(subject: Subject) -> Subject:
-    return Subject("silent", lambda *, penalty: Changed(subject.with_penalty(penalty).plugin, contact_points=None))
+def without_points(right: str | Subject) -> Subject:
+    return with_verbs(right, contact_points=None)
 
 
 # Eq. 6 leaves ξ unclipped: the foot of a part may be past the neighbour of its point's segment by its whole length. In
@@ -194,7 +192,7 @@ PUSHES: list[tuple[Subject, Interface, Verdict]] = [
     (pull(3, 1.0), STRAIGHT, Verdict.FAIL),
     (without_points(pull(0, -1.0)), STRAIGHT, Verdict.FAIL),
     *((load_subject(name), VALLEY, Verdict.PASS) for name in ("nts-ar", "nts", "two-pass/nts-ar")),
-    *((without_points(load_subject(name)), VALLEY, Verdict.UNDECIDED) for name in ("nts-ar", "nts", "two-pass/nts-ar")),
+    *((without_points(name), VALLEY, Verdict.UNDECIDED) for name in ("nts-ar", "nts", "two-pass/nts-ar")),
 ]
 
 
@@ -236,33 +234,23 @@ def test_the_multipliers_of_a_textbook_are_not_accused() -> None:
 
 
 def test_a_row_of_another_size_breaks_the_contract_and_is_told_beside_the_right_one() -> None:
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_mortar.mortar_lm(penalty=penalty)
+    def residual(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        answer = np.array(right(interface, pairing, z))
+        answer[..., interface.n_unknowns :] *= right.__self__.penalty
+        return answer
 
-        def residual(interface: Any, pairing: Any, z: Any) -> Any:
-            answer = np.array(inner.residual(interface, pairing, z))
-            answer[..., interface.n_unknowns :] *= penalty
-            return answer
-
-        return Changed(inner, residual=residual)
-
-    outcome = judge_case(unilateral, named_case("a1"), Subject("scaled", make))
+    outcome = judge_case(unilateral, named_case("a1"), with_verbs("mortar-lm", residual=residual))
     assert outcome.breach
     assert "breaks the contract: residual: constraint row 1 is 2 at a gap of -0.0625" in outcome.reason
     assert "c = 16; needed −area · gap = 0.125 with the area 2, since λ − c gap is" in outcome.reason
 
 
 def test_a_decision_that_is_late_by_a_hair_is_told() -> None:
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_mortar.mortar_lm(penalty=penalty)
+    def pair(right: Any, interface: Any, z: Any) -> Any:
+        n = interface.n_unknowns
+        return right(interface, np.append(z[:n], z[n:] + 1e-6 * np.abs(z[n:]).max()))
 
-        def pair(interface: Any, z: Any) -> Any:
-            n = interface.n_unknowns
-            return inner.pair(interface, np.append(z[:n], z[n:] + 1e-6 * np.abs(z[n:]).max()))
-
-        return Changed(inner, pair=pair)
-
-    outcome = judge_as(Verdict.FAIL, unilateral, named_case("b"), Subject("late", make))
+    outcome = judge_as(Verdict.FAIL, unilateral, named_case("b"), with_verbs("mortar-lm", pair=pair))
     assert outcome.breach
     assert "needed area · λ = -" in outcome.reason
 

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, judge_as, load_subject, measure_case, with_promises
+from subjects import judge_as, load_subject, measure_case, with_promises, with_verbs
 from textbook_cells import ClippedCells, WeightedGaps
 from wave_strangers import Heights
 
-import contactverif_nts
 from contactverif import Case, Promises, Property, Subject, Traits, Verdict, judge_case
 from contactverif.mechanics.accuracy import solve_for_accuracy
 from contactverif.problems.hertz_boxes import (
@@ -254,9 +253,7 @@ def test_who_converges_and_does_not_lock_promises_the_curved_interface(
 
 def test_who_locks_and_reports_no_pressure_is_not_held_to_fail() -> None:
     """Its pressures alone show it here, so that "stated to fail, but passes" accused a right formulation."""
-    silent = Subject(
-        "silent", lambda *, penalty: Changed(contactverif_nts.vts_ppt(penalty=penalty), contact_points=None)
-    )
+    silent = with_verbs("vts-ppt", contact_points=None)
     row = run([silent], [accuracy_wavy_curved], shrink="none").rows[0]
     assert accuracy_wavy_curved.promise(silent.traits) is False
     assert (row.verdict, row.promise, row.unexpected) == (Verdict.PASS, None, "")

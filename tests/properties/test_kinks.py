@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from handmade import Handmade, case, over_a_node, subject
+from handmade import Handmade, OneForce, case, over_a_node, subject
 from scipy import sparse
-from subjects import change_verbs, judge_as, load_property, load_subject
+from subjects import judge_as, load_property, with_verbs
 
-from contactverif import Subject, Verdict
+from contactverif import Verdict
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.diagnosis.flat_state import flat_state
@@ -39,13 +39,17 @@ class Wide(Pointed):
     half_area = 0.5
 
 
-class Springs(Handmade):
+class Springs(OneForce):
     """A spring to the master's node on its side; no contact points."""
 
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = 0 * z
-        forces[1] = z[1] * (1.0 if z[0] + z[2] > 0 else 3.0)
-        forces[0] = z[0] ** 2
+    tangent = None
+
+    def force(self, z: Any, pairing: Any) -> Any:
+        return z[1] * (1.0 if z[0] + z[2] > 0 else 3.0)
+
+    def residual(self, *state: Any) -> Any:
+        forces = super().residual(*state)
+        forces[0] = state[-1][0] ** 2
         return forces
 
 
@@ -109,16 +113,14 @@ def test_a_jump_is_seen_from_both_sides() -> None:
     assert measure_jump_of_slope(beside, REACH, directions) < 1e-5
 
 
-class Sided(Springs):
+class Sided(OneForce):
     """Springs whose stiffness changes over the master's node, where the pairing does."""
 
     def pair(self, interface: Any, z: Any) -> Any:
         return {"right": np.array([z[0] + z[2] > 0])}
 
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = 0 * z
-        forces[1] = z[1] * (1.0 if pairing["right"][0] else 3.0)
-        return forces
+    def force(self, z: Any, pairing: Any) -> Any:
+        return z[..., 1] * (1.0 if pairing["right"][0] else 3.0)
 
 
 def test_a_jump_of_the_derivative_counts_too() -> None:
@@ -127,11 +129,9 @@ def test_a_jump_of_the_derivative_counts_too() -> None:
 
 
 def test_a_smooth_derivative_changes_by_its_own_slope() -> None:
-    class Stiffening(Springs):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            forces = 0 * z
-            forces[1] = 400 * z[1] ** 2
-            return forces
+    class Stiffening(OneForce):
+        def force(self, z: Any, pairing: Any) -> Any:
+            return 400 * z[1] ** 2
 
     state = at(Stiffening, over_a_node(1 / 7))
     reach = 2.0**-40  # So short that the error of a difference hides it.
@@ -155,13 +155,11 @@ def test_sparse_and_dense_tangents_are_the_same() -> None:
     assert np.array_equal(dense(array), array)
 
 
-class Dropping(Springs):
+class Dropping(OneForce):
     """The springs again, which push with the same stiffness on both sides, and not exactly over the node."""
 
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = 0 * z
-        forces[1] = z[1] * (0.0 if z[0] + z[2] == 0 else 1.0)
-        return forces
+    def force(self, z: Any, pairing: Any) -> Any:
+        return z[1] * (0.0 if z[0] + z[2] == 0 else 1.0)
 
 
 def test_a_choice_between_the_sides_of_a_kink_is_excused() -> None:
@@ -191,10 +189,6 @@ def test_a_wrong_tangent_is_asked_for_kinks_in_few_columns() -> None:
         tangent[:, -1] = 0.0
         return tangent
 
-    def make(*, penalty: float) -> Any:
-        right = load_subject("nts-ar").with_penalty(penalty).plugin
-        return change_verbs(right, residual=count, tangent=drop_last_column)
-
-    state = flat_state().case
-    judge_as(Verdict.FAIL, load_property("objectivity"), state, Subject("wrong", make))
+    wrong = with_verbs("nts-ar", residual=count, tangent=drop_last_column)
+    judge_as(Verdict.FAIL, load_property("objectivity"), flat_state().case, wrong)
     assert sum(states) < 300  # All columns took 1,226.

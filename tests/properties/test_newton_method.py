@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, change_verbs, judge_as, load_subject
+from subjects import Changed, judge_as, load_subject, with_verbs
 
 import contactverif_nts
 from contactverif import Case, End, Rectangle, Subject, Trace, Traits, Verdict, judge_case, solve, two_blocks
@@ -169,16 +169,13 @@ def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
 
 
 def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:
-    def make(*, penalty: float) -> Changed:
-        inner = contactverif_nts.vts_ppt(penalty=penalty)
-        return Changed(
-            inner, residual=lambda *state: 0 * state[-1], tangent=lambda *state: np.zeros((state[-1].size,) * 2)
-        )
-
+    nothing = with_verbs(
+        "vts-ppt", residual=lambda *state: 0 * state[-1], tangent=lambda *state: np.zeros((state[-1].size,) * 2)
+    )
     scene = two_blocks(
         Rectangle([0, 1, 3], [0, 2]), Rectangle([-1, 1.2, 4], [-2, 0]), penalty=10.0, approach=0.1
     ).case()
-    (row,) = run([Subject("nothing", make)], [newton_history], place=scene).rows
+    (row,) = run([nothing], [newton_history], place=scene).rows
     assert (row.verdict, row.unexpected) == (Verdict.NOT_JUDGED, "not judged"), row.reason
 
 
@@ -205,7 +202,7 @@ def test_entries_of_the_pairing_that_change_no_force_leave_nothing_undecided() -
         noise = np.array([hash(z.tobytes()) % 2])
         return Pairing({**right(interface, z), "noise": noise})
 
-    noisy = Subject("noisy", lambda *, penalty: change_verbs(inner.with_penalty(penalty).plugin, pair=pair))
+    noisy = with_verbs(inner, pair=pair)
     for question in (newton_order, newton_history):
         [quiet_row], [row] = (
             run([each], [question], examples=12, seed=3, shrink="none").rows for each in (inner, noisy)
@@ -253,17 +250,11 @@ def test_a_power_and_an_angle_are_not_accused() -> None:
 
 
 def test_another_pairing_in_other_units_is_told_in_words() -> None:
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_nts.nts(penalty=penalty)
+    def pair(right: Any, interface: Any, z: Any) -> Any:
+        pairing = right(interface, z)
+        return {**pairing, "active": pairing["active"] & (np.abs(z).max() > 1e3)}  # The limit has a unit.
 
-        def pair(interface: Any, z: Any) -> Any:
-            pairing = inner.pair(interface, z)
-            long = np.abs(z).max() > 1e3  # The limit has a unit.
-            return {**pairing, "active": pairing["active"] & long}
-
-        return Changed(inner, pair=pair)
-
-    outcomes = [judge_case(newton_units, case, Subject("limit", make)) for case in draw(10)]
+    outcomes = [judge_case(newton_units, case, with_verbs("nts", pair=pair)) for case in draw(10)]
     assert any("the pairing is another one in other units" in outcome.reason for outcome in outcomes)
 
 

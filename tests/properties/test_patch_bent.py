@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, change_verbs, judge_as, load_property, load_subject, with_promises
+from subjects import judge_as, load_property, load_subject, with_promises, with_verbs
 
 import contactverif_mortar
 from contactverif import Case, Measurement, Outcome, Subject, Verdict, judge_case
@@ -27,12 +27,6 @@ def judge_all(property_id: str, subject: Subject) -> list[Outcome]:
 def measurement_of(outcome: Outcome) -> Measurement:
     assert outcome.measurement is not None, outcome.reason
     return outcome.measurement
-
-
-def change(name: str, **verbs: Any) -> Subject:
-    """Return an installed formulation with verbs that are changed, or None."""
-    inner = load_subject(name)
-    return Subject("changed", lambda *, penalty: change_verbs(inner.with_penalty(penalty).plugin, **verbs))
 
 
 @pytest.mark.parametrize("name", ["sts", "mortar", "nts-ar", "vts-ppt"])
@@ -88,7 +82,10 @@ def test_the_traits_say_which_exact_forces_count(unbiased: Any, balanced: Any, k
     ],
 )
 def test_springs_that_are_a_little_too_soft_are_caught(property_id: str, factor: float, names: set[str]) -> None:
-    soft, question = change("sts", residual=lambda right, *state: factor * right(*state)), load_property(property_id)
+    soft, question = (
+        with_verbs("sts", residual=lambda right, *state: factor * right(*state)),
+        load_property(property_id),
+    )
     cases = [case for case in question.cases(None) if case.name in names]
     assert len(cases) == len(names)
     assert {judge_case(question, case, soft).verdict for case in cases} == {Verdict.FAIL}
@@ -99,7 +96,7 @@ def test_forces_that_are_turned_by_a_milliradian_are_caught_on_arcs() -> None:
         forces = right(*state).reshape(-1, 2)
         return (forces + 1e-3 * np.stack([-forces[:, 1], forces[:, 0]], axis=1)).reshape(-1)
 
-    turned = change("mortar", residual=turn)
+    turned = with_verbs("mortar", residual=turn)
     for outcome in judge_all("accuracy.arc", turned):
         assert outcome.verdict is Verdict.FAIL
         assert "tangential" in outcome.reason
@@ -118,7 +115,7 @@ def test_reported_pressures_that_are_one_percent_off_are_found_out(property_id: 
         points = right(*arguments)
         return replace(points, pressure=0.99 * points.pressure)
 
-    for outcome in judge_all(property_id, change("mortar", contact_points=report)):
+    for outcome in judge_all(property_id, with_verbs("mortar", contact_points=report)):
         assert outcome.verdict is Verdict.FAIL
         assert "reported" in outcome.reason
         assert "force" not in outcome.reason.replace("against the forces", "")
@@ -126,16 +123,13 @@ def test_reported_pressures_that_are_one_percent_off_are_found_out(property_id: 
 
 @pytest.mark.parametrize("property_id", BENT)
 def test_a_wrong_tangent_or_none_plays_no_part(property_id: str) -> None:
-    stiff = change("sts", tangent=lambda right, *state: 3 * right(*state))
+    stiff = with_verbs("sts", tangent=lambda right, *state: 3 * right(*state))
     assert {outcome.verdict for outcome in judge_all(property_id, stiff)} == {Verdict.PASS}
 
 
 @pytest.mark.parametrize("property_id", BENT)
 def test_who_reports_nothing_is_judged_by_its_forces(property_id: str) -> None:
-    def silence(*, penalty: float) -> Changed:
-        return Changed(contactverif_mortar.sts(penalty=penalty), contact_points=None)
-
-    for outcome in judge_all(property_id, Subject("silent", silence)):
+    for outcome in judge_all(property_id, with_verbs("sts", contact_points=None)):
         assert outcome.verdict is Verdict.PASS
         assert not any("reported" in name for name in measurement_of(outcome).values)
 
@@ -159,7 +153,7 @@ def test_springs_that_are_too_stiff_at_kinks_are_found_by_the_approach_alone() -
         points = right(*state)
         return replace(points, pressure=1.01 * points.pressure)
 
-    stiff = change("sts", residual=lambda right, *state: 1.01 * right(*state), contact_points=report)
+    stiff = with_verbs("sts", residual=lambda right, *state: 1.01 * right(*state), contact_points=report)
     for outcome in judge_all("patch.kinked", stiff):
         assert outcome.verdict is Verdict.FAIL
         assert outcome.reason.startswith("error of the approach 0.01")
@@ -261,5 +255,5 @@ def test_springs_beside_multipliers_are_no_force_on_an_arc() -> None:
         forces[..., :n] += springs.residual(interface, springs.pair(interface, np.real(positions)), positions)
         return forces
 
-    subject = change("mortar-lm", residual=add_springs)
+    subject = with_verbs("mortar-lm", residual=add_springs)
     assert [outcome.verdict for outcome in judge_all("accuracy.arc", subject)] == [Verdict.PASS] * 2

@@ -3,7 +3,7 @@
 import os
 import subprocess
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 from expected_verdicts import FAILS
 from fresh_process import PYTHON
 from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, springs_of
-from subjects import Changed, ResidualAlone, alone, judge_as, load_property, load_subject, measure_case
+from subjects import ResidualAlone, alone, judge_as, load_property, load_subject, measure_case, with_verbs
 from textbook_cells import WeightedGaps
 
 from contactverif import (
@@ -22,6 +22,7 @@ from contactverif import (
     PatchPromises,
     Promises,
     Property,
+    Quantity,
     Rules,
     Subject,
     Traits,
@@ -46,20 +47,23 @@ from contactverif.strategies.translations import KINDS
 from contactverif_properties.exact_forces import forces_of_penetration, node_gaps
 from contactverif_properties.roundoff import CONDITION, ERROR, FORCE_ERROR
 from contactverif_properties.stability import (
+    DRIFT,
     FORCES,
     FORCES_THERE,
     LARGEST_DENOMINATOR,
+    ROUGHNESS,
     SWEPT_ROUNDINGS,
     TOTAL_THERE,
     ExactMotion,
+    answer_to_wave,
     exact_residual,
     move_swept,
     refuse_unknown_forces,
     stability_local,
+    stability_stiffness,
     stability_sweep,
     stability_translation,
 )
-from contactverif_properties.stability_solved import DRIFT, ROUGHNESS, answer_to_wave, stability_stiffness
 from contactverif_properties.states import move_state
 
 
@@ -68,11 +72,16 @@ def cases(count: int = 100) -> tuple[Case, ...]:
     return draw_cases(stability_translation.cases(None), seed="0/translation", examples=count).cases
 
 
+def assert_exact_move(case: Case) -> None:
+    shift = case.parameters["shift"]
+    far = move_state(case, shift)
+    assert np.array_equal(far.positions - shift, case.positions)
+    assert np.array_equal(far.interface.nodes - shift, case.interface.nodes)
+
+
 def test_every_case_moves_without_rounding_and_every_kind_is_drawn() -> None:
     for case in cases():
-        far = move_state(case, case.parameters["shift"])
-        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
-        assert np.array_equal(far.interface.nodes - case.parameters["shift"], case.interface.nodes)
+        assert_exact_move(case)
         assert np.array_equal(case.z * 2.0**32, np.round(case.z * 2.0**32))
     assert {case.kind for case in cases()} == set(KINDS)
     assert max(float(np.abs(case.parameters["shift"]).max()) for case in cases()) == 2.0**20
@@ -80,44 +89,38 @@ def test_every_case_moves_without_rounding_and_every_kind_is_drawn() -> None:
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_formulation_in_another_way_of_writing_passes(name: str) -> None:
-    way, before = RIGHT[name]
-    subject = springs_of(way, before, translation_stable=True)
-    outcomes = [judge_case(stability_translation, case, subject) for case in cases()]
-    assert {outcome.verdict for outcome in outcomes} == {Verdict.PASS}, [outcome.reason for outcome in outcomes]
-    assert sum(measure_case(stability_translation, case, subject).idle for case in cases()) <= 10
-    assert max(max(measure_case(stability_translation, case, subject).values.values()) for case in cases()) <= 4
+    subject, idle = springs_of(*RIGHT[name], translation_stable=True), 0
+    for case in cases():
+        measurement = judge_as(Verdict.PASS, stability_translation, case, subject).measurement
+        assert max(measurement.values.values()) <= 4
+        idle += measurement.idle
+    assert idle <= 10
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_formulation_is_accused_by_five_orders_of_magnitude(name: str) -> None:
-    way, before = WRONG[name]
-    subject = springs_of(way, before, translation_stable=True)
+    subject = springs_of(*WRONG[name], translation_stable=True)
     assert max(measure_case(stability_translation, case, subject).values[FORCES.name] for case in cases()) >= 1e5
 
 
-def test_points_first_without_a_promise_are_shown_and_break_nothing() -> None:
-    silent, boastful = springs_of(by_points_first), springs_of(by_points_first, translation_stable=True)
-    result = run([silent], [stability_translation], examples=20, seed=0)
-    assert result.rows[0].verdict is Verdict.FAIL
-    assert result.promises_kept
-    assert run([boastful], [stability_translation], examples=20, seed=0).rows[0].unexpected
-
-
-def test_a_statement_of_not_being_stable_is_kept_by_a_named_state() -> None:
+def test_points_first_are_shown_and_break_nothing_but_a_promise_and_keep_a_statement_by_a_named_state() -> None:
     witnesses = {"stability.translation": "moved"}
+    silent, boastful = springs_of(by_points_first), springs_of(by_points_first, translation_stable=True)
     stated = springs_of(by_points_first, translation_stable=False, witnesses=witnesses)
-    assert run([stated], [stability_translation], examples=10, seed=0).promises_kept
-    way, before = RIGHT["einsum"]
-    modest = springs_of(way, before, translation_stable=False, witnesses=witnesses)
-    assert (
-        run([modest], [stability_translation], examples=10, seed=0).rows[0].unexpected == "stated to fail, but passes"
+    modest = springs_of(*RIGHT["einsum"], translation_stable=False, witnesses=witnesses)
+    shown, accused, kept, broken = (
+        run([each], [stability_translation], examples=20, seed=0) for each in (silent, boastful, stated, modest)
     )
+    assert shown.rows[0].verdict is Verdict.FAIL
+    assert shown.promises_kept
+    assert accused.rows[0].unexpected
+    assert kept.promises_kept
+    assert broken.rows[0].unexpected == "stated to fail, but passes"
 
 
 @pytest.mark.parametrize("name", ["differences first", "cross product", "point rounded before the difference"])
 def test_a_plugin_that_is_a_residual_and_nothing_else_is_judged(name: str) -> None:
-    way, before = (RIGHT | WRONG)[name]
-    inner = springs_of(way, before, translation_stable=True)
+    inner = springs_of(*(RIGHT | WRONG)[name], translation_stable=True)
     subject = Subject(name, lambda *, penalty: ResidualAlone(inner.with_penalty(penalty).plugin))
     verdicts = [judge_case(stability_translation, case, subject).verdict for case in cases(60)]
     assert (Verdict.FAIL in verdicts) is (name in WRONG)
@@ -129,12 +132,8 @@ def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
     states = draw_cases(stability_translation.cases(distant), seed="0", examples=20).cases
     for case in states:
         assert case.largest_coordinate < 4
-        far = move_state(case, case.parameters["shift"])
-        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
-    way, before = RIGHT["einsum"]
-    assert all(
-        judge_case(stability_translation, case, springs_of(way, before)).verdict is Verdict.PASS for case in states
-    )
+        assert_exact_move(case)
+        judge_as(Verdict.PASS, stability_translation, case, springs_of(*RIGHT["einsum"]))
 
 
 @pytest.mark.parametrize("property_id", ["balance.force", "balance.moment", "units"])
@@ -142,8 +141,7 @@ def test_states_of_a_given_mesh_are_moved_to_the_origin_first() -> None:
 def test_whoever_promises_to_be_stable_is_asked_for_balance_and_scaling_at_its_diameter(
     name: str, property_id: str
 ) -> None:
-    way, before = RIGHT[name]
-    subject = springs_of(way, before, translation_stable=True, conserves_force=True, conserves_moment=True)
+    subject = springs_of(*RIGHT[name], translation_stable=True, conserves_force=True, conserves_moment=True)
     (row,) = run([subject], [load_property(property_id)], examples=30, seed=0).rows
     assert row.verdict is Verdict.PASS, row.reason
 
@@ -165,9 +163,7 @@ def bits(value: float) -> int:
 
 def test_the_states_are_exactly_flat_and_have_many_bits_and_their_move_is_exact() -> None:
     for case in local_cases():
-        far = move_state(case, case.parameters["shift"])
-        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
-        assert np.array_equal(far.interface.nodes - case.parameters["shift"], case.interface.nodes)
+        assert_exact_move(case)
         x, y = (Fraction(entry).limit_denominator(LARGEST_DENOMINATOR) for entry in case.parameters["direction"])
         assert x**2 + y**2 == 1
         heights = [Fraction(b) * x - Fraction(a) * y for a, b in case.positions.tolist()]
@@ -191,16 +187,14 @@ def test_exact_forces_balance_and_are_the_rounded_ones() -> None:
 @pytest.mark.parametrize("takes_longdouble", [False, True])
 def test_a_right_formulation_in_another_way_of_writing_is_exact(name: str, takes_longdouble: bool) -> None:
     """Long double is the answer where the plugin takes it."""
-    way, before = RIGHT[name]
-    subject = springs_of(way, before, translation_stable=True, takes_longdouble=takes_longdouble)
+    subject = springs_of(*RIGHT[name], translation_stable=True, takes_longdouble=takes_longdouble)
     assert max(worst_number(case, subject) for case in local_cases()) <= 8
 
 
 @pytest.mark.parametrize("name", WRONG)
 @pytest.mark.parametrize("takes_longdouble", [False, True])
 def test_a_wrong_formulation_is_accused_by_three_orders_of_magnitude(name: str, takes_longdouble: bool) -> None:
-    way, before = WRONG[name]
-    subject = springs_of(way, before, translation_stable=True, takes_longdouble=takes_longdouble)
+    subject = springs_of(*WRONG[name], translation_stable=True, takes_longdouble=takes_longdouble)
     assert max(worst_number(case, subject) for case in local_cases()) >= 16e3
 
 
@@ -218,16 +212,10 @@ def test_multipliers_that_are_pressures_are_judged_by_the_distribution(name: str
     subject = load_subject(name)
     assert max(worst_number(case, subject) for case in local_cases()) <= 4
 
-    class Doubled:
-        def __init__(self, *, penalty: float) -> None:
-            self.inner = subject.with_penalty(penalty)
-            self.traits, self.n_multipliers, self.pair = subject.traits, self.inner.n_multipliers, self.inner.pair
+    def double(right: Any, *state: Any) -> Any:
+        return 2 * right(*state)
 
-        def residual(self, interface: object, pairing: object, z: np.ndarray) -> np.ndarray:
-            forces = self.inner.residual(interface, pairing, z)  # type: ignore[arg-type]
-            return 2 * forces
-
-    assert max(worst_number(case, Subject("doubled", Doubled)) for case in local_cases(30)) <= 4
+    assert max(worst_number(case, with_verbs(name, residual=double)) for case in local_cases(30)) <= 4
 
 
 UNCOMPILED = """
@@ -278,15 +266,17 @@ def test_a_linear_penetration_is_exactly_linear_and_closed_everywhere() -> None:
         (x_0, y_0), (x_1, y_1) = points[0], points[-1]
         assert all((x - x_0) * (y_1 - y_0) == (y - y_0) * (x_1 - x_0) for x, y in points)
         assert (node_gaps(case) < 0).all()
-        far = move_state(case, case.parameters["shift"])
-        assert np.array_equal(far.positions - case.parameters["shift"], case.positions)
+        assert_exact_move(case)
 
 
-def test_what_is_exact_under_a_linear_penetration_follows_the_traits() -> None:
+@pytest.mark.parametrize(
+    ("name", "quantities"),
+    [("sts", {FORCES_THERE, TOTAL_THERE}), ("vts-ppt", {TOTAL_THERE}), ("mortar-lm", {FORCES_THERE})],
+)
+def test_what_is_exact_under_a_linear_penetration_follows_the_traits(name: str, quantities: set[Quantity]) -> None:
     (case,) = local_cases(1, "linear penetration")
-    assert set(stability_local.measure(case, load_subject("sts")).values) == {FORCES_THERE.name, TOTAL_THERE.name}
-    assert set(stability_local.measure(case, load_subject("vts-ppt")).values) == {TOTAL_THERE.name}
-    assert set(stability_local.measure(case, load_subject("mortar-lm")).values) == {FORCES_THERE.name}
+    measured = stability_local.measure(case, load_subject(name)).values
+    assert set(measured) == {quantity.name for quantity in quantities}
 
 
 def state_named(name: str) -> Case:
@@ -437,10 +427,7 @@ def test_springs_that_are_softer_or_stiffer_than_they_say_do_not_lock(factor: fl
 
 
 def test_without_contact_points_the_drift_alone_finds_what_locks() -> None:
-    def make(name: str, *, penalty: float) -> Any:
-        return Changed(load_subject(name).with_penalty(penalty).plugin, contact_points=None)
-
-    silent, stable = Subject("silent", partial(make, "sts")), Subject("stable", partial(make, "mortar"))
+    silent, stable = (with_verbs(name, contact_points=None) for name in ("sts", "mortar"))
     assert "contact_points" not in silent.provides
     assert judge_case(QUESTION, STIFFEST[0], silent).verdict is Verdict.FAIL
     assert judge_case(QUESTION, STIFFEST[0], stable).verdict is Verdict.PASS
