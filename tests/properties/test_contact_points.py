@@ -78,7 +78,6 @@ def test_at_a_tie_either_segment_is_right() -> None:
 
         outcome = outcome_of("projection.segment", case, with_arrays(choose))
         assert outcome.verdict is Verdict.PASS
-        assert outcome.measurement is not None
         assert outcome.measurement.details["tied points"] == 1
 
 
@@ -95,10 +94,10 @@ def test_beside_a_tie_the_farther_segment_is_wrong_by_how_much_farther_it_is() -
 def test_a_gap_of_roundoff_may_have_either_sign_and_either_decision() -> None:
     case = over_a_vertex(0.0, place=0.5)
     for active in (True, False):
-        subject = with_arrays(lambda points, active=active: {"active": np.full_like(points.active, active)})  # type: ignore[misc]
+        subject = with_arrays(lambda points, active=active: {"active": np.full_like(points.active, active)})
         assert measure_case(load_property("projection.activity"), case, subject).details["decided points"] == 0
     for gap in (1e-17, -1e-17):
-        subject = with_arrays(lambda points, gap=gap: {"gap": np.full_like(points.gap, gap)})  # type: ignore[misc]
+        subject = with_arrays(lambda points, gap=gap: {"gap": np.full_like(points.gap, gap)})
         assert outcome_of("projection.place", case, subject).verdict is Verdict.PASS
 
 

@@ -52,7 +52,6 @@ def test_a_case_that_was_stored_is_the_same_study() -> None:
 
 
 def test_the_forces_of_a_picture_are_those_of_the_exact_pressure() -> None:
-    assert accuracy_hertz.exact is not None
     case = CASES["parabola-soft"]
     forces = accuracy_hertz.exact(case)
     assert forces.sum(axis=0) == pytest.approx(0, abs=1e-12)
@@ -269,7 +268,6 @@ def test_pressures_of_one_point_a_segment_alternate_on_a_finer_slave_so_their_co
     for mesh in study.meshes[-3:]:
         instance = study.pose(mesh, subject.traits)
         points = solve_for_accuracy(instance.scene, subject, instance.start, instance.step).points
-        assert points is not None
         error = (points.pressure - instance.pressure(points.position)) / instance.pressure_scale
         errors.append([np.sqrt(np.mean(each**2)) for each in (error, (error[1:] + error[:-1]) / 2)])
     alternating, means = np.transpose(errors)

@@ -82,10 +82,8 @@ def test_the_traits_say_which_exact_forces_count(unbiased: Any, balanced: Any, k
     ],
 )
 def test_springs_that_are_a_little_too_soft_are_caught(property_id: str, factor: float, names: set[str]) -> None:
-    soft, question = (
-        with_verbs("sts", residual=lambda right, *state: factor * right(*state)),
-        load_property(property_id),
-    )
+    soft = with_verbs("sts", residual=lambda right, *state: factor * right(*state))
+    question = load_property(property_id)
     cases = [case for case in question.cases(None) if case.name in names]
     assert len(cases) == len(names)
     assert {judge_case(question, case, soft).verdict for case in cases} == {Verdict.FAIL}

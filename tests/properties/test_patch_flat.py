@@ -243,7 +243,6 @@ def scale_springs(factor: float, traits: Traits) -> Subject:
 @pytest.mark.parametrize("factor", [1.0, 2.0])
 def test_without_a_trait_one_pass_and_two_passes_pass(factor: float, name: str) -> None:
     outcome = judge_as(Verdict.PASS, SCALE, CASES[name], scale_springs(factor, SILENT))
-    assert outcome.measurement is not None
     assert outcome.measurement.details["springs over ε̂ L"] == pytest.approx(factor)
     sentences = {1.0: "None", 2.0: "your springs are 2.00 ε̂ L: two passes, or twice too stiff"}
     assert str(outcome.measurement.finding) == sentences[factor]
@@ -310,7 +309,6 @@ def test_springs_that_lose_both_ends_to_roundoff_pass() -> None:
 def test_a_law_that_is_not_linear_has_no_stiffness_and_is_not_judged() -> None:
     outcome = judge_case(SCALE, CASES["8 segments"], Subject("soft", lambda *, penalty: Softened(penalty)))
     assert outcome.verdict is Verdict.PASS
-    assert outcome.measurement is not None
     assert not outcome.measurement.numbers
     assert 0 < outcome.measurement.details["springs over ε̂ L"] < 0.5
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from subjects import Changed, judge_as, load_subject, reporting
+from subjects import judge_as, load_subject, reporting, with_verbs
 
 import contactverif_mortar
 import contactverif_nts
-from contactverif import Case, ContactPoints, Rectangle, Subject, solve
+from contactverif import Case, ContactPoints, Rectangle, solve
 from contactverif.contract.property import Property, Verdict, judge
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.problems.blocks import exact_unknowns, is_uniform, pressure_of, two_blocks
@@ -74,27 +74,18 @@ def test_nts_ar_on_c_fails_at_any_penalty() -> None:
 
 @pytest.mark.parametrize("wrong", ["nothing", "transposed"])
 def test_a_wrong_tangent_is_no_reason_to_accuse_a_right_residual(wrong: str) -> None:
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_nts.vts_ppt(penalty=penalty)
-
-        def tangent(interface: Any, pairing: Any, z: Any) -> Any:
-            return 0 * np.eye(z.size) if wrong == "nothing" else inner.tangent(interface, pairing, z).T
-
-        return Changed(inner, tangent=tangent)
+    def tangent(right: Any, *state: Any) -> Any:
+        return 0 * np.eye(state[-1].size) if wrong == "nothing" else right(*state).T
 
     for scene in ("c-prime:lowered=0,degrees=17.3", "example-1bis"):
-        judge_as(Verdict.PASS, patch_flat_solve, load_scene_case(scene), Subject(wrong, make))
+        judge_as(Verdict.PASS, patch_flat_solve, load_scene_case(scene), with_verbs("vts-ppt", tangent=tangent))
 
 
 def test_a_tangent_that_leads_nowhere_hides_no_wrong_residual() -> None:
     """With 1e12 on the diagonal every step is nearly none, so that whoever starts at the exact solution stays there."""
-
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_nts.vts_me(penalty=penalty)
-        return Changed(inner, tangent=lambda interface, pairing, z: -1e12 * penalty * np.eye(z.size))
-
-    aimless = Subject("aimless", make)
-    measurement = measure_at_penalty(load_scene_case("c-prime"), aimless, load_scene_case("c-prime").penalty)
+    case = load_scene_case("c-prime")
+    aimless = with_verbs("vts-me", tangent=lambda _, *state: -1e12 * case.penalty * np.eye(state[-1].size))
+    measurement = measure_at_penalty(case, aimless, case.penalty)
     assert judge(patch_variants, measurement)[0] is Verdict.FAIL
     assert measurement.values["master force error"] > 1e6 * measurement.tolerances["master force error"]
 
@@ -114,9 +105,7 @@ def test_a_scene_that_is_not_uniform_is_not_asked() -> None:
 
 
 def test_every_variant_is_drawn() -> None:
-    strategy = variant_cases()
-    assert strategy is not None
-    cases = draw_cases(strategy, seed="1", examples=60).cases
+    cases = draw_cases(variant_cases(), seed="1", examples=60).cases
     variants = {int(case.parameter("variant")) for case in cases}
     assert variants == set(range(len(NAMES_OF_VARIANTS)))
     assert any(scene_of(case).bodies[1].rigid for case in cases)
@@ -180,8 +169,8 @@ def test_either_block_may_overhang() -> None:
 
 def test_no_pressure_is_known_of_a_block_lowered_beside_a_rigid_floor() -> None:
     floor = {"approach": 0.1, "rigid_master": True}
-    assert is_uniform(two_blocks(Rectangle([0, 1, 2], [0, 1]), Rectangle([0, 2], [0]), **floor).case())  # type: ignore[arg-type]
-    assert not is_uniform(two_blocks(Rectangle([0, 1, 2], [0, 1]), Rectangle([0.5, 2], [0]), **floor).case())  # type: ignore[arg-type]
+    assert is_uniform(two_blocks(Rectangle([0, 1, 2], [0, 1]), Rectangle([0, 2], [0]), **floor).case())
+    assert not is_uniform(two_blocks(Rectangle([0, 1, 2], [0, 1]), Rectangle([0.5, 2], [0]), **floor).case())
 
 
 # --- who passes -------------------------------------------------------------------------------------------------

@@ -324,7 +324,6 @@ def test_a_right_formulation_in_another_way_of_writing_is_swept(name: str, quest
     (row,) = run([subject], [question], examples=1).rows
     assert row.verdict is Verdict.PASS, row.reason
     assert row.judged == row.planned == len(row.outcomes)
-    assert row.closest is not None
     assert row.closest.number.value <= 6
 
 
@@ -450,7 +449,6 @@ def test_a_formulation_without_a_pairing_is_not_judged() -> None:
 def test_matching_meshes_answer_as_a_right_formulation_does_on_them() -> None:
     answer = answer_to_wave((8, 8), 1e4, load_subject("sts"))
     exact = matching_answer(8, wave_blocks(8, 8, 1e4, wave=0.0).penalty)
-    assert answer is not None
     assert answer.compliance == pytest.approx(exact.compliance, rel=1e-2)  # The mean pressure turns with the surface.
 
 
