@@ -40,13 +40,9 @@ def freeze(values: ArrayLike, dtype: type[_Scalar]) -> NDArray[_Scalar]:
 
 
 def freeze_together(arrays: Collection[NDArray[_Scalar]], dtype: type[_Scalar]) -> list[NDArray[_Scalar]]:
-    """Return read-only copies of arrays of a dtype as parts of one, which is the last of the list.
-
-    One copy of many small arrays takes less time than a copy of each.
-    """
+    """Return read-only copies of arrays of a dtype as parts of one, the last of the list: that takes less time."""
     buffers: list[Any] = [array if array.flags.c_contiguous else array.tobytes() for array in arrays]
-    data = b"".join(buffers)
-    together: NDArray[_Scalar] = np.ndarray((len(data) // np.dtype(dtype).itemsize,), dtype, data)
+    together: NDArray[_Scalar] = np.frombuffer(b"".join(buffers), dtype)
     parts, end = [], 0
     for array in arrays:
         begin, end = end, end + array.size
@@ -103,6 +99,5 @@ def as_floats(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> Float
 def check_shape(argument: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
     """Check the shape of an array, in which −1 stands for any length."""
     if array.ndim != len(shape) or any(n not in (-1, actual) for n, actual in zip(shape, array.shape, strict=True)):
-        lengths = ["n" if length < 0 else str(length) for length in shape]
-        needed = f"shape ({lengths[0]},)" if len(shape) == 1 else f"shape ({', '.join(lengths)})"
-        raise MisuseError(argument, f"shape {array.shape}", needed)
+        lengths = ", ".join("n" if length < 0 else str(length) for length in shape)
+        raise MisuseError(argument, f"shape {array.shape}", f"shape ({lengths}{',' * (len(shape) == 1)})")

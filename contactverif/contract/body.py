@@ -16,7 +16,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, as_array, check_shape, freeze
 from contactverif.contract.errors import MisuseError
 
-_CORNERS = (3, 4)  # Nodes of a cell: triangles or quadrilaterals.
+_Fault = tuple[str, str, str]  # The attribute of a `Body` that is wrong, what was found and what is needed.
 _POISSON = "Poisson's ratio above −1 and below 0.5 (an incompressible body has no stiffness matrix in displacements)"
 
 
@@ -78,38 +78,45 @@ class Body:
 
     def __post_init__(self) -> None:
         self._set_array("nodes", np.float64, (-1, 2))
-        n_nodes = len(self.nodes)
-        self._set_array("cells", np.int64, (-1, self._n_corners()))
+        n_nodes, cells = len(self.nodes), as_array(f"{self.name}: cells", self.cells).shape
+        n_corners = cells[1] if len(cells) == 2 and cells[1] in (3, 4) else 4
+        self._set_array("cells", np.int64, (-1, n_corners), default=0)
         self._set_array("contact", np.int64, (-1, 2))
         self._set_array("fixed", np.bool_, (n_nodes, 2), default=False)
         for name in ("imposed", "load"):
             self._set_array(name, np.float64, (n_nodes, 2), default=0.0)
-        self._set_array("axis", np.float64, (2,))
-        self._set_array("start", np.float64, (2,))
+        for name in ("axis", "start"):
+            self._set_array(name, np.float64, (2,))
         if abs(np.hypot(*self.axis) - 1) > 1e-12:
             self._refuse("axis", f"({self.axis[0]}, {self.axis[1]})", "a unit vector")
         frame = [[self.axis[0], -self.axis[1]], [self.axis[1], self.axis[0]]]
         object.__setattr__(self, "frame", freeze(frame, np.float64))
+        if fault := _find_wrong_number(n_nodes, self.cells, self.contact):
+            self._refuse(*fault)
         check = _check_small_mesh if self.cells.size <= _SMALL else _check_mesh
-        mesh = check(n_nodes, self.cells.shape, self.cells.tobytes(), self.contact.tobytes())
-        if mesh.fault is not None and not mesh.is_numbered:
-            self._refuse(*mesh.fault)
-        object.__setattr__(self, "contact_nodes", mesh.contact_nodes)
+        contact_nodes, fault = check(n_nodes, self.cells.shape, self.cells.tobytes(), self.contact.tobytes())
+        object.__setattr__(self, "contact_nodes", contact_nodes)
         if (self.imposed[~self.fixed] != 0).any():
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
-        self._set_material("young", 0.0, np.inf, "Young's modulus > 0")
-        self._set_material("poisson", -1.0, 0.5, _POISSON)
+        for name, low, high, needed in (
+            ("young", 0.0, np.inf, "Young's modulus > 0"),
+            ("poisson", -1.0, 0.5, _POISSON),
+        ):
+            number = np.asarray(value := getattr(self, name))
+            if number.shape != () or number.dtype.kind not in "fiu" or not (self.rigid or low < number < high):
+                self._refuse(name, f"{value!r}", needed)
+            object.__setattr__(self, name, float(number))
         if self.rigid and not self.fixed.all():
             self._refuse("fixed", "a free node of a rigid body", "every component of every node fixed")
-        corners, following = self.nodes[self.cells], _following(self.cells.shape[1])  # (n_cells, n_corners, 2)
-        to_next = corners[:, following] - corners
-        after = to_next[:, following]
+        corners = self.nodes[self.cells]  # (n_cells, n_corners, 2)
+        to_next = np.roll(corners, -1, axis=1) - corners
+        after = np.roll(to_next, -1, axis=1)
         turn = to_next[..., 0] * after[..., 1] - to_next[..., 1] * after[..., 0]
         if not (turn > 0).all():
             bad = np.flatnonzero((turn <= 0).any(axis=1))
             self._refuse("cells", f"cell {bad[0]}, which is clockwise, folded or flat", "convex, counter-clockwise")
-        if mesh.fault is not None:
-            self._refuse(*mesh.fault)
+        if fault:
+            self._refuse(*fault)
 
     @property
     def rigid(self) -> bool:
@@ -121,65 +128,24 @@ class Body:
         """The oedometric modulus M = E(1−ν)/((1+ν)(1−2ν)): stress over strain without lateral strain."""
         return self.young * (1 - self.poisson) / ((1 + self.poisson) * (1 - 2 * self.poisson))
 
-    def _n_corners(self) -> int:
-        shape = as_array(f"{self.name}: cells", self.cells).shape
-        return shape[1] if len(shape) == 2 and shape[1] in _CORNERS else 4
-
     def _set_array(self, name: str, dtype: Any, shape: tuple[int, ...], default: Any = None) -> None:
         """Make the attribute a read-only array of that dtype and shape; an empty one becomes the default everywhere."""
         argument, values = f"{self.name}: {name}", getattr(self, name)
         raw = as_array(argument, values)
         if default is not None and raw.size == 0:
-            raw = np.full(shape, default)
-        if name == "cells" and raw.size == 0:
-            raw = np.zeros((0, self._n_corners()), np.int64)
+            raw = np.full([max(length, 0) for length in shape], default)
         check_shape(argument, raw, shape)
-        kinds = {np.float64: "fiu", np.int64: "iu", np.bool_: "b"}[dtype]
-        if raw.dtype.kind not in kinds:
+        if raw.dtype.kind not in {np.float64: "fiu", np.int64: "iu", np.bool_: "b"}[dtype]:
             self._refuse(name, f"dtype {raw.dtype}", f"{np.dtype(dtype).name}")
         if raw.dtype.kind == "f" and not np.isfinite(raw).all():
             self._refuse(name, "NaN or infinity", "finite numbers")
         object.__setattr__(self, name, freeze(raw, dtype))
 
-    def _set_material(self, name: str, low: float, high: float, needed: str) -> None:
-        """Make the attribute a float and check its range; a rigid body has no material."""
-        number = np.asarray(getattr(self, name))
-        if number.shape != () or number.dtype.kind not in "fiu" or not (self.rigid or low < number < high):
-            self._refuse(name, f"{getattr(self, name)!r}", needed)
-        object.__setattr__(self, name, float(number))
-
     def _refuse(self, name: str, found: str, needed: str) -> None:
         raise MisuseError(f"{self.name}: {name}", found, needed)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _MeshCheck:
-    """The part of a check of a mesh for which node numbers are enough."""
-
-    contact_nodes: IntArray  # (n_contact_nodes,) The numbers of the nodes on the contact boundary, ascending.
-    is_numbered: bool  # Cells and contact edges are there, and no number is beyond the nodes.
-    # The attribute of `Body` that is wrong, what was found and what is needed; None if nothing is.
-    fault: tuple[str, str, str] | None
-
-
-def _check_mesh(n_nodes: int, shape: tuple[int, int], cell_bytes: bytes, contact_bytes: bytes) -> _MeshCheck:
-    """Check the node numbers of cells, of that shape, and of contact edges, both given as the bytes of int64 arrays."""
-    cells = np.frombuffer(cell_bytes, np.int64).reshape(shape)
-    contact = np.frombuffer(contact_bytes, np.int64).reshape(-1, 2)
-    fault = _find_wrong_number(n_nodes, cells, contact)
-    is_numbered = fault is None
-    if fault is None and len(cells):
-        fault = _find_wrong_cell(n_nodes, cells, contact)
-    if fault is None and any(len(set(ends)) < len(ends) for ends in contact.T.tolist()):
-        fault = "contact", "two edges that begin or end at one node", "each edge once, in chains"
-    return _MeshCheck(freeze(np.unique(contact), np.int64), is_numbered, fault)
-
-
-_SMALL = 512  # Number of node numbers of a mesh that is remembered: random meshes share few ways to hang together.
-_check_small_mesh = lru_cache(maxsize=1024)(_check_mesh)
-
-
-def _find_wrong_number(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[str, str, str] | None:
+def _find_wrong_number(n_nodes: int, cells: IntArray, contact: IntArray) -> _Fault | None:
     for name, numbers in (("cells", cells), ("contact", contact)):
         if numbers.size and not 0 <= numbers.min() <= numbers.max() < n_nodes:
             outlier = numbers.min() if numbers.min() < 0 else numbers.max()
@@ -189,11 +155,27 @@ def _find_wrong_number(n_nodes: int, cells: IntArray, contact: IntArray) -> tupl
     return None
 
 
-def _find_wrong_cell(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[str, str, str] | None:
+def _check_mesh(
+    n_nodes: int, shape: tuple[int, int], cell_bytes: bytes, contact_bytes: bytes
+) -> tuple[IntArray, _Fault | None]:
+    """Return the contact nodes, and what is wrong with cells, of that shape, and edges, both bytes of int64 arrays."""
+    cells = np.frombuffer(cell_bytes, np.int64).reshape(shape)
+    contact = np.frombuffer(contact_bytes, np.int64).reshape(-1, 2)
+    fault = _find_wrong_cell(n_nodes, cells, contact) if len(cells) else None
+    if fault is None and any(len(set(ends)) < len(ends) for ends in contact.T.tolist()):
+        fault = "contact", "two edges that begin or end at one node", "each edge once, in chains"
+    return freeze(np.unique(contact), np.int64), fault
+
+
+_SMALL = 512  # Number of node numbers of a mesh that is remembered: random meshes share few ways to hang together.
+_check_small_mesh = lru_cache(maxsize=1024)(_check_mesh)
+
+
+def _find_wrong_cell(n_nodes: int, cells: IntArray, contact: IntArray) -> _Fault | None:
     unused = np.setdiff1d(np.arange(n_nodes), cells)
     if len(unused):
         return "nodes", f"node {unused[0]} in no cell", "every node in a cell"
-    following = cells[:, _following(cells.shape[1])]
+    following = np.roll(cells, -1, axis=1)
     edges = cells * n_nodes + following  # Each edge as one number, the cell on its left.
     ordered = np.sort(edges, axis=None)
     if (ordered[1:] == ordered[:-1]).any():
@@ -203,10 +185,8 @@ def _find_wrong_cell(n_nodes: int, cells: IntArray, contact: IntArray) -> tuple[
     if not len(wrong):
         return None
     first, second = contact[wrong[0]]
-    needed = "edges of the boundary, each with the body on its left"
-    return "contact", f"the edge from node {first} to node {second}", needed
-
-
-def _following(n_corners: int) -> list[int]:
-    """Return the number of the next corner of each corner of a cell."""
-    return [*range(1, n_corners), 0]
+    return (
+        "contact",
+        f"the edge from node {first} to node {second}",
+        "edges of the boundary, each with the body on its left",
+    )

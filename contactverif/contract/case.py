@@ -120,13 +120,13 @@ class Case:
     @cached_property
     def largest_coordinate(self) -> float:
         """The largest coordinate of the state and of the reference, a length; X in the tolerances."""
-        return float(max(np.abs(self.positions).max(), np.abs(self.interface.nodes).max()))
+        return float(max(np.abs(each).max() for each in (self.positions, self.interface.nodes)))
 
     @cached_property
     def shortest_segment(self) -> float:
         """The length of the shortest current segment of both sides, or the least height of a face."""
-        interface, positions = self.interface, self.positions
-        return float(min(interface.slave.heights(positions).min(), interface.master.heights(positions).min()))
+        sides = (self.interface.slave, self.interface.master)
+        return float(min(side.heights(self.positions).min() for side in sides))
 
     @cached_property
     def resolution(self) -> float:
@@ -172,18 +172,13 @@ class Case:
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """Return the whole case as named arrays, from which `from_arrays` makes the same case."""
-        interface = self.interface
         arrays: dict[str, ArrayLike] = {
-            "nodes": interface.nodes,
-            "slave_segments": interface.slave.faces,
-            "master_segments": interface.master.faces,
-            "z": self.z,
-            "penalty": self.penalty,
-            "seed": self.seed,
-            "name": self.name,
-            "kind": self.kind,
+            "nodes": self.interface.nodes,
+            "slave_segments": self.interface.slave.faces,
+            "master_segments": self.interface.master.faces,
+            **{name: getattr(self, name) for name in ("z", "penalty", "seed", "name", "kind")},
+            **{_PREFIX + name: values for name, values in self.parameters.items()},
         }
-        arrays |= {_PREFIX + name: values for name, values in self.parameters.items()}
         return {name: np.asarray(values) for name, values in arrays.items()}
 
     @classmethod
@@ -242,10 +237,6 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 OWN_MESHES = "own meshes with a known answer"
 
 
-def return_none(place: Any) -> None:
-    """Return None: there are no cases on an interface or a scene."""
-
-
 @dataclass(frozen=True, slots=True)
 class Cases:
     """The source of the cases of a property: random ones, random ones of several kinds, or a list.
@@ -259,17 +250,20 @@ class Cases:
         The function that makes the cases.
     is_list : bool
         Whether they are a list, of which all are judged, whatever the number of examples.
-    on_place : Callable[[Any], Any]
-        Makes the cases on an interface or a scene, in place of the list.
+    on_place : Callable[[Any], Any] | None
+        Makes the cases on an interface or a scene, in place of the list; None if there are none.
     needs : str
         What an interface or a scene must be so that there are cases on it: "a flat interface". A run says it where
         there are none.
+    faces : tuple[int, ...]
+        The numbers of corners of the faces on which cases in space are made; empty for triangles alone.
     """
 
     make: Callable[..., Any]
     is_list: bool = False
-    on_place: Callable[[Any], Any] = return_none
+    on_place: Callable[[Any], Any] | None = None
     needs: str = OWN_MESHES
+    faces: tuple[int, ...] = ()
 
     @classmethod
     def random(cls, make: Callable[..., Any]) -> Cases:
@@ -290,10 +284,7 @@ class Cases:
 
     @classmethod
     def from_list(
-        cls,
-        make: Callable[[], tuple[Case, ...]],
-        on_place: Callable[[Any], Any] = return_none,
-        needs: str = OWN_MESHES,
+        cls, make: Callable[[], tuple[Case, ...]], on_place: Callable[[Any], Any] | None = None, needs: str = OWN_MESHES
     ) -> Cases:
         """Return a list of cases, each with a name of its own; tables and reports call it by that name.
 
@@ -308,35 +299,21 @@ class Cases:
 
     def on_faces(self, faces: tuple[int, ...]) -> Cases:
         """Return the cases on faces with these numbers of corners."""
-        return self if faces == (TRIANGLE,) else replace(self, make=_OnFaces(self.make, faces))
+        return self if faces == (TRIANGLE,) else replace(self, faces=faces)
 
     @property
     def random_source(self) -> str:
-        """The stored name of the function, or an empty string."""
-        return name_of_source(self.make)
+        """The stored name of the function, and the faces, on which the cases are others; empty without a name."""
+        name = name_of_source(self.make)
+        return f"{name} on faces of {' or '.join(map(str, self.faces))} corners" if name and self.faces else name
 
     def __call__(self, place: Any) -> Any:
         """Return the cases on an interface or a scene; on None, the property's own."""
         if not self.is_list:
-            return self.make(place)
-        return self.make() if place is None else self.on_place(place)
-
-
-@dataclass(frozen=True, slots=True)
-class _OnFaces:
-    """A function that makes cases on faces with some numbers of corners."""
-
-    make: Callable[..., Any]
-    faces: tuple[int, ...]
-
-    def __call__(self, place: Any) -> Any:
-        return self.make(place, self.faces)
-
-    @property
-    def random_source(self) -> str:
-        """The stored name of the function, if it has one, and the faces: these are other cases."""
-        name = name_of_source(self.make)
-        return name and f"{name} on faces of {' or '.join(map(str, self.faces))} corners"
+            return self.make(place, self.faces) if self.faces else self.make(place)
+        if place is None:
+            return self.make()
+        return None if self.on_place is None else self.on_place(place)
 
 
 def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function]:
@@ -347,8 +324,7 @@ def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function
     """
 
     def store(function: _Function) -> _Function:
-        function.__dict__["random_source"] = name
-        function.__dict__["needs"] = needs
+        function.__dict__.update(random_source=name, needs=needs)
         return function
 
     return store

@@ -15,7 +15,7 @@ from enum import StrEnum
 
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Outcome, Verdict
+from contactverif.contract.property import FAILED, Outcome, Verdict
 from contactverif.contract.result import Row, Run
 
 _LONGEST_FILE_NAME = 180  # File systems take 255 bytes, and a suffix and the mark of a temporary file are added.
@@ -53,15 +53,14 @@ class Counterexample:
     @property
     def label(self) -> str:
         """The case in a few words, for a reader."""
+        case, words = self.case, str(self.origin)
         if self.origin is Origin.WITNESS:
-            words = f"its witness, the case {self.case.name}"
-        elif self.origin is Origin.EARLIER:
-            words = Origin.EARLIER
-        elif self.case.name:
-            words = f"the case {self.case.name}"
-        else:
-            words = "the smallest case found" if self.row.shrunk else "the first case that clearly fails, not shrunk"
-        return f"{words} ({self.case.kind})" if self.case.kind else words
+            words = f"its witness, the case {case.name}"
+        elif self.origin is not Origin.EARLIER and case.name:
+            words = f"the case {case.name}"
+        elif self.origin is Origin.SHRUNK:
+            words = "the smallest case found"
+        return f"{words} ({case.kind})" if case.kind else words
 
     @property
     def formulation(self) -> str:
@@ -109,8 +108,7 @@ def counterexamples(run: Run) -> dict[str, Counterexample]:
 
 def failing_examples(run: Run) -> list[Counterexample]:
     """Return the counterexamples of all rows that fail or crash, in the order of the run."""
-    failures = (Verdict.FAIL, Verdict.CRASHED)
-    return [example for example in counterexamples(run).values() if example.row.verdict in failures]
+    return [example for example in counterexamples(run).values() if example.row.verdict in FAILED]
 
 
 def counterexample_of(row: Row) -> Outcome | None:
@@ -118,8 +116,7 @@ def counterexample_of(row: Row) -> Outcome | None:
     planned = row.shrunk or row.first
     if planned is not None or row.witness is None:
         return planned
-    failed = row.witness.verdict in (Verdict.FAIL, Verdict.CRASHED)
-    return row.witness if failed or (row.promise is False and row.unexpected) else None
+    return row.witness if row.witness.verdict in FAILED or (row.promise is False and row.unexpected) else None
 
 
 def named_failures(run: Run) -> dict[str, Counterexample]:
@@ -130,9 +127,8 @@ def named_failures(run: Run) -> dict[str, Counterexample]:
     failures = {}
     for row in run.rows:
         for outcome in row.outcomes:
-            failed = outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
             case = outcome.case_or_summary
-            if failed and isinstance(case, Case) and case.name:
+            if outcome.verdict in FAILED and isinstance(case, Case) and case.name:
                 id_ = typeable(f"{row.formulation}.{row.property_id}.{case.name}")
                 failures[id_] = Counterexample(id_, row, outcome)
     return failures

@@ -117,15 +117,9 @@ class SceneArrays:
                 object.__setattr__(self, entry.name, array)
 
     @property
-    def upright(self) -> bool:
-        """True if the axes of all bodies are the global ones."""
-        return bool((self.axes == [1.0, 0.0]).all())
-
-    @property
     def rigid(self) -> BoolArray:
         """The bodies without cells (n_bodies,), of which each node is imposed."""
-        rigid: BoolArray = ~np.isin(np.arange(len(self.axes)), self.body_of_cell)
-        return rigid
+        return ~np.isin(np.arange(len(self.axes)), self.body_of_cell)
 
     def frames(self) -> FloatArray:
         """Return the rotation (n_nodes, 2, 2) from the axes of each node's body to the global ones."""
@@ -139,8 +133,7 @@ class SceneArrays:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> SceneArrays:
         """Return the scene that `to_arrays` made arrays of."""
-        values: dict[str, Any] = {name: array if array.ndim else array.item() for name, array in arrays.items()}
-        return cls(**values)
+        return cls(**{name: array if array.ndim else array.item() for name, array in arrays.items()})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,9 +171,10 @@ class EngineAnswer:
             array = getattr(self, name)
             if array is None and name != "displacements":
                 continue
-            if not isinstance(array, np.ndarray) or array.shape != shape:
-                kind = f"shape {array.shape}" if isinstance(array, np.ndarray) else f"a {type(array).__name__}"
-                return f"{name}: returned {kind}; needed shape {shape}"
+            if not isinstance(array, np.ndarray):
+                return f"{name}: returned a {type(array).__name__}; needed shape {shape}"
+            if array.shape != shape:
+                return f"{name}: returned shape {array.shape}; needed shape {shape}"
             if array.dtype != np.float64:
                 return f"{name}: returned dtype {array.dtype}; needed float64"
         return ""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from traceback import walk_tb
 from types import TracebackType
 from typing import Any
@@ -159,12 +160,10 @@ def unknown_name_error(argument: str, name: str, names: Iterable[str], otherwise
     If none is near, it lists all, or says `otherwise` what is needed.
     """
     every = sorted(names)
-    near = difflib.get_close_matches(name, every, n=3)
-    if near:
-        return MisuseError(argument, repr(name), f"a name that exists; the nearest: {', '.join(near)}")
-    if otherwise:
-        return MisuseError(argument, repr(name), otherwise)
-    return MisuseError(argument, repr(name), f"one of {', '.join(every)}" if every else "a name, but there is none")
+    needed = otherwise or (f"one of {', '.join(every)}" if every else "a name, but there is none")
+    if near := difflib.get_close_matches(name, every, n=3):
+        needed = f"a name that exists; the nearest: {', '.join(near)}"
+    return MisuseError(argument, repr(name), needed)
 
 
 def parse_name(
@@ -187,16 +186,8 @@ def parse_name(
             raise MisuseError(argument, f"{part!r} in {text!r}", form)
         if option in options:
             raise MisuseError(argument, f"{option} twice in {text!r}", "each option once")
-        options[option] = _parse_value(value)
+        options[option] = {"true": True, "false": False}.get(value, value)
+        for number in (float, int):  # An integer stays one.
+            with suppress(ValueError):
+                options[option] = number(value)
     return name, options
-
-
-def _parse_value(text: str) -> bool | int | float | str:
-    if text in ("true", "false"):
-        return text == "true"
-    for number in (int, float):
-        try:
-            return number(text)
-        except ValueError:
-            pass
-    return text

@@ -51,7 +51,8 @@ class Verdict(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-DECIDED = frozenset({Verdict.PASS, Verdict.FAIL, Verdict.CRASHED})  # The verdicts that count as judged.
+FAILED = frozenset({Verdict.FAIL, Verdict.CRASHED})
+DECIDED = FAILED | {Verdict.PASS}  # The verdicts that count as judged.
 Role = Literal["", "foundation", "exact", "comparison"]
 
 

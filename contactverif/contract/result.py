@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
+from itertools import chain
 from math import exp, lgamma, log, log1p
 from operator import add
 
@@ -22,6 +24,7 @@ from contactverif.contract.errors import LONGEST_FACT, clean, name_line, one_lin
 from contactverif.contract.property import (
     CLOSED_CHAIN,
     DECIDED,
+    FAILED,
     CheckedNumber,
     Outcome,
     PropertyInfo,
@@ -132,23 +135,17 @@ def exceeds(count: int, number: int, share: float) -> bool:
     above N p, and falls with n. So all terms behind n add up to at most term × ratio / (1 − ratio). They are left out
     as soon as this is below the roundoff of the sum.
     """
-    if count <= number * share:
-        return False
+    if count <= number * share or not 0 < share < 1:
+        return count > number * share
     total = 0.0
     for n in range(count, number + 1):
-        term = _probability(n, number, share)
+        exponent = n * log(share) + (number - n) * log1p(-share)
+        term = exp(exponent + lgamma(number + 1) - lgamma(n + 1) - lgamma(number - n + 1))
         total += term
-        ratio = (number - n) * share / ((n + 1) * (1 - share)) if share < 1 else 0.0
+        ratio = (number - n) * share / ((n + 1) * (1 - share))
         if term * ratio <= UNIT_ROUNDOFF * total * (1 - ratio):
             break
     return total < BY_CHANCE
-
-
-def _probability(count: int, number: int, share: float) -> float:
-    if not 0 < share < 1:
-        return float(count == number * share)
-    exponent = count * log(share) + (number - count) * log1p(-share)
-    return exp(exponent + lgamma(number + 1) - lgamma(count + 1) - lgamma(number - count + 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,43 +175,28 @@ class Tally:
         verdicts: Counter[Verdict] = Counter()
         reasons: Counter[str] = Counter()
         keys: Counter[CaseKey] = Counter()
-        breach = witness is not None and witness.breach
+        breach = False
         closest: ClosestNumber | None = None
-        for case, outcome in enumerate(outcomes):
-            verdicts[outcome.verdict] += 1
-            idle = outcome.measurement is not None and outcome.measurement.idle
-            keys[outcome.case_or_summary.kind, outcome.verdict, idle] += 1
+        cases: Iterable[tuple[int | None, Outcome]] = enumerate(outcomes)
+        for case, outcome in cases if witness is None else chain(cases, [(None, witness)]):
             breach = breach or outcome.breach
-            if outcome.decided:
-                closest = _closer(closest, info, outcome, case)
-            else:
-                reasons[outcome.reason] += 1
-        if witness is not None and witness.decided:
-            closest = _closer(closest, info, witness, None)
+            if case is not None:
+                verdicts[outcome.verdict] += 1
+                idle = outcome.measurement is not None and outcome.measurement.idle
+                keys[outcome.case_or_summary.kind, outcome.verdict, idle] += 1
+                if not outcome.decided:
+                    reasons[outcome.reason] += 1
+            for number in checked_numbers(info, outcome.measurement) if outcome.decided else ():
+                if closest is None or number.ratio > closest.number.ratio:
+                    closest = ClosestNumber(number, case)
         kinds = dict.fromkeys(info.kinds, CaseCounts())
         # The kinds of the property first; cases of no kind are under the empty word, at the end.
         for (kind, verdict, idle), n in sorted(keys.items(), key=lambda entry: (not entry[0][0], entry[0])):
-            failed = n * (verdict in (Verdict.FAIL, Verdict.CRASHED))
-            is_open = verdict is Verdict.UNDECIDED
+            is_open, failed = verdict is Verdict.UNDECIDED, n * (verdict in FAILED)
             counts = CaseCounts(undecided=n) if is_open else CaseCounts(judged=n, failed=failed, idle=n * idle)
             kinds[kind] = kinds.get(kind, CaseCounts()) + counts
-        return cls(
-            verdicts=verdicts,
-            reasons=dict(reasons.most_common()),
-            counts=total(kinds.values()),
-            kinds=kinds if any(kinds) else {},
-            breach=breach,
-            closest=closest,
-        )
-
-
-def _closer(
-    closest: ClosestNumber | None, info: PropertyInfo, outcome: Outcome, case: int | None
-) -> ClosestNumber | None:
-    for number in checked_numbers(info, outcome.measurement):
-        if closest is None or number.ratio > closest.number.ratio:
-            closest = ClosestNumber(number, case)
-    return closest
+        counts, reasons_in_order = total(kinds.values()), dict(reasons.most_common())
+        return cls(verdicts, reasons_in_order, counts, kinds if any(kinds) else {}, breach, closest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,7 +212,7 @@ class NodalForces:
                 object.__setattr__(self, name, freeze(forces, np.float64))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Row:
     """The result of one formulation on one property.
 
@@ -280,7 +262,6 @@ class Row:
     first: Outcome | None = None
     seconds: float = 0.0
     forces: NodalForces | None = None
-    _tally: Tally | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         clean(self, names=("formulation",), lines=("promised_by", "known", "reason"))
@@ -290,13 +271,10 @@ class Row:
         """The id of the property."""
         return self.info.id
 
-    @property
+    @cached_property
     def tally(self) -> Tally:
         """The counts over all outcomes, computed at the first use."""
-        if self._tally is None:
-            object.__setattr__(self, "_tally", Tally.from_outcomes(self.info, self.outcomes, self.witness))
-        assert self._tally is not None
-        return self._tally
+        return Tally.from_outcomes(self.info, self.outcomes, self.witness)
 
     @property
     def judged(self) -> int:
@@ -332,8 +310,7 @@ class Row:
         share = f"{percent(counts.undecided_share)} of the cases are undecided"
         return f"{share}, of right formulations {percent(usual)}: what is undecided may hide what is wrong"
 
-    def names_of(self, *verdicts: Verdict) -> tuple[str, ...]:
-        """Return the names of the cases with one of these verdicts, where cases have names, in their order."""
+    def _names_of(self, *verdicts: Verdict) -> tuple[str, ...]:
         if not any(self.tally.verdicts.get(verdict, 0) for verdict in verdicts):
             return ()
         cases = (outcome.case_or_summary for outcome in self.outcomes if outcome.verdict in verdicts)
@@ -341,13 +318,13 @@ class Row:
 
     @property
     def failing_names(self) -> tuple[str, ...]:
-        """The names of the cases that fail or crash, where cases have names."""
-        return self.names_of(Verdict.FAIL, Verdict.CRASHED)
+        """The names of the cases that fail or crash, where cases have names, in their order."""
+        return self._names_of(*FAILED)
 
     @property
     def undecided_names(self) -> tuple[str, ...]:
         """The names of the cases that are undecided, where cases have names."""
-        return self.names_of(Verdict.UNDECIDED)
+        return self._names_of(Verdict.UNDECIDED)
 
     @property
     def breach(self) -> bool:
@@ -404,8 +381,7 @@ class Row:
         """The word for the row in tables and pages."""
         if self.unexpected and self.verdict not in (Verdict.CRASHED, Verdict.NOT_JUDGED):
             return Result.BROKEN_PROMISE
-        failed = self.verdict in (Verdict.FAIL, Verdict.CRASHED)
-        if failed and not self.unexpected and (self.promise is False or self.known):
+        if self.verdict in FAILED and not self.unexpected and (self.promise is False or self.known):
             return Result.FAILS_AS_STATED
         if self.omitted:
             return Result.OMITTED
@@ -491,8 +467,7 @@ class Run:
     @property
     def praise(self) -> str:
         """The sentence about a run whose promises are kept; what stayed undecided was not judged."""
-        unasked = {row.formulation for row in self.rows} - {row.formulation for row in self.rows if row.planned}
-        if unasked:
+        if unasked := {row.formulation for row in self.rows} - {row.formulation for row in self.rows if row.planned}:
             return f"Nothing was judged of {', '.join(sorted(unasked))}: no property applies. What was judged is kept."
         names = [f"{row.formulation} {row.property_id}" for row in self.rows if row.result is Result.UNDECIDED]
         if not names:
@@ -509,9 +484,9 @@ class Run:
         """Return the run without all other properties."""
         return replace(self, rows=tuple(row for row in self.rows if row.property_id in property_ids))
 
-    def rows_of(self, formulation: str) -> Iterator[Row]:
+    def rows_of(self, formulation: str) -> list[Row]:
         """Return the rows of a formulation."""
-        return (row for row in self.rows if row.formulation == formulation)
+        return [row for row in self.rows if row.formulation == formulation]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

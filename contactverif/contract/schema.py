@@ -298,13 +298,7 @@ class Group(Mapping[str, Variable]):
 
 
 def numbers(
-    dims: Sequence[str],
-    values: ArrayLike,
-    long_name: str,
-    units: str,
-    comment: str = "",
-    *,
-    fill: float | None = None,
+    dims: Sequence[str], values: ArrayLike, long_name: str, units: str, comment: str = "", *, fill: float | None = None
 ) -> Variable:
     """Return numbers of any dtype; `fill` marks what is not there."""
     return _variable(dims, np.asarray(values), {"long_name": long_name, "units": units}, comment, fill)

@@ -60,7 +60,6 @@ FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time,
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
-_COMPRESSED = ("csr", "csc")
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 
 
@@ -144,9 +143,7 @@ class Subject:
             raise ContractError(f"make: {flaw}")
         plugin = _call_plugin("make", make, penalty=1.0)
         if not callable(getattr(plugin, "residual", None)):
-            names = [
-                name for name in _call_plugin("residual", dir, plugin) if isinstance(name, str) and name != "residual"
-            ]
+            names = [name for name in _call_plugin("residual", dir, plugin) if type(name) is str and name != "residual"]
             near = get_close_matches("residual", names, n=1)
             hint = f"; the nearest name is `{name_line(near[0])}`" if near else ""
             raise ContractError(f"make: returned a {type(plugin).__name__} without a `residual`{hint}")
@@ -238,9 +235,8 @@ class CheckedFormulation:
         if interface.dim not in abilities.dimensions:
             needed = f"{' or '.join(map(str, abilities.dimensions))}, which the formulation takes"
             raise MisuseError("interface", f"nodes with {interface.dim} coordinates", needed)
-        # A kernel may read past the corners of a face that it expects.
-        for side in (interface.slave, interface.master) if interface.dim != PLANE else ():
-            if (corners := side.faces.shape[1]) not in abilities.faces:
+        for side in (interface.slave, interface.master):  # A kernel may read past the corners of a face.
+            if interface.dim != PLANE and (corners := side.faces.shape[1]) not in abilities.faces:
                 needed = f"{' or '.join(map(str, abilities.faces))}, which the formulation takes"
                 raise MisuseError("interface", f"faces with {corners} corners", needed)
         method = _call_plugin("n_multipliers", getattr, self.plugin, "n_multipliers", None)
@@ -288,10 +284,8 @@ class CheckedFormulation:
     def residual(self, interface: Interface, pairing: Pairing | None, z: Array) -> Array:
         """Return the forces (..., n_unknowns) at z (..., n_unknowns); a loop calls a plugin that is not batched."""
         self._check_size(interface, z)
-        takes_batches = self._prefetching is not None or (
-            self._traits.abilities.batched and not self.decides_anew(pairing)
-        )
-        if z.ndim > 1 and not takes_batches:
+        batched = self._traits.abilities.batched and not self.decides_anew(pairing)
+        if z.ndim > 1 and self._prefetching is None and not batched:
             forces = np.empty_like(z)
             for index in np.ndindex(z.shape[:-1]):
                 forces[index] = self.residual(interface, pairing, z[index])
@@ -421,30 +415,29 @@ def copy_entries(verb: str, tangent: Any) -> Any:
     A plugin that fills the arrays of a compressed matrix itself may number a row or a column that is not there. scipy
     would read or write outside of its arrays.
     """
-    try:
-        if tangent.format in _COMPRESSED:
-            return _copy_compressed(tangent)
-        if tangent.format == "bsr":
-            tangent.check_format(full_check=True)
-        return sparse_of_scipy().coo_array(tangent, copy=True)  # It checks the numbers of entries in the other formats.
-    except (IndexError, TypeError, ValueError) as error:
-        raise ContractError(f"{verb}: returned a broken {tangent.format} matrix: {error}") from error
-
-
-def _copy_compressed(tangent: Any) -> Any:
-    """Return a copy of a csr or csc matrix, checked in a third of the time of scipy's full check."""
     kind, size = tangent.format, tangent.shape[0]
-    data, indices, indptr = (np.array(part) for part in (tangent.data, tangent.indices, tangent.indptr))
-    is_usual = data.ndim == indices.ndim == indptr.ndim == 1 and indices.dtype == indptr.dtype in (np.int32, np.int64)
-    if is_usual and len(indptr) == size + 1 and indptr[0] == 0 and indptr[-1] == len(indices) == len(data):
-        matrix = compressed_matrix(kind, size, data, indices, indptr)
-    else:  # scipy makes what is usual of these arrays, or says what does not fit.
-        matrix = getattr(sparse_of_scipy(), f"{kind}_array")((data, indices, indptr), shape=tangent.shape)
-    if (matrix.indptr[1:] < matrix.indptr[:-1]).any():  # A difference might overflow.
-        raise ValueError("indptr must be a non-decreasing sequence")
-    if not 0 <= matrix.indices.min(initial=0) <= matrix.indices.max(initial=0) < size:
-        raise ValueError(f"indices must be < {size} and ≥ 0")
-    return matrix
+    try:
+        if kind == "bsr":
+            tangent.check_format(full_check=True)
+        if kind not in ("csr", "csc"):
+            return sparse_of_scipy().coo_array(tangent, copy=True)  # It checks the numbers of rows and columns.
+        # What follows takes a third of the time of scipy's full check.
+        data, indices, indptr = (np.array(part) for part in (tangent.data, tangent.indices, tangent.indptr))
+        is_usual = data.ndim == indices.ndim == indptr.ndim == 1 and indices.dtype == indptr.dtype in (
+            np.int32,
+            np.int64,
+        )
+        if is_usual and len(indptr) == size + 1 and indptr[0] == 0 and indptr[-1] == len(indices) == len(data):
+            matrix = compressed_matrix(kind, size, data, indices, indptr)
+        else:  # scipy makes what is usual of these arrays, or says what does not fit.
+            matrix = getattr(sparse_of_scipy(), f"{kind}_array")((data, indices, indptr), shape=tangent.shape)
+        if (matrix.indptr[1:] < matrix.indptr[:-1]).any():  # A difference might overflow.
+            raise ValueError("indptr must be a non-decreasing sequence")
+        if not 0 <= matrix.indices.min(initial=0) <= matrix.indices.max(initial=0) < size:
+            raise ValueError(f"indices must be < {size} and ≥ 0")
+        return matrix
+    except (IndexError, TypeError, ValueError) as error:
+        raise ContractError(f"{verb}: returned a broken {kind} matrix: {error}") from error
 
 
 def ask_first(subject: Subject, case: Case, parts: Collection[str]) -> FirstAnswers:

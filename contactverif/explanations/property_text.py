@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import combinations
+from typing import Any
 
 from contactverif.contract.property import Property, Quantity
 from contactverif.contract.subject import Subject
@@ -52,7 +53,7 @@ def known_failures(question: Property) -> str:
         facts.append(f"- **Smallest failing mesh:** {mesh}.")
     elif mistakes:
         facts.append("- **Smallest failing mesh:** the cases are a list, none of which is made smaller.")
-    return "\n".join(["## Known failures\n", *facts]) + "\n"
+    return _lines(["## Known failures\n", *facts])
 
 
 def stated_failures(question: Property, installed: Iterable[object]) -> str:
@@ -72,44 +73,26 @@ def stated_failures(question: Property, installed: Iterable[object]) -> str:
     return f"These formulations state that they fail, each with a witness: {', '.join(failing)}.\n"
 
 
-_VALUES = {
-    "flat": (True,),
-    "normal": (True,),
-    "single": (True,),
-    "overhang": (True,),
-    "tangent": ("exact",),
-    "symmetric": (True,),
-    "conserves_force": (True,),
-    "conserves_moment": (True,),
-    "continuity": ("C0",),
-    "area": ("current", "reference"),
-    "penalty": ("distributed", "nodal"),
-    "enforcement": ("multiplier",),
-    "kinked": (True,),
-    "converges": (True,),
-    "inf_sup": (True,),
-    "locks": (False,),
-    "integrates_linear_gap": (True,),
-    "force_along": ("master normal", "slave normal"),
-    "local": (True,),
-    "unbiased": (True,),
-    "nodes_push": (True,),
-    "translation_stable": (True,),
-    "independent_multipliers": (True,),
-    "published_forces": ({"a1": "1 2 1; 2 2"},),
-}
+_ALWAYS = (
+    "flat normal single overhang kinked symmetric conserves_force conserves_moment converges inf_sup "
+    "integrates_linear_gap local unbiased nodes_push translation_stable"
+)
+_STATEMENTS: tuple[tuple[str, Any], ...] = (  # (name, value) of the traits from which a promise may follow.
+    *((name, True) for name in _ALWAYS.split()),
+    *(("tangent", "exact"), ("continuity", "C0"), ("locks", False), ("area", "current"), ("area", "reference")),
+    *(("penalty", "distributed"), ("penalty", "nodal"), ("enforcement", "multiplier")),
+    ("independent_multipliers", True),
+    *(("force_along", "master normal"), ("force_along", "slave normal"), ("published_forces", {"a1": "1 2 1; 2 2"})),
+)
 
 
 def promised_by(question: Property) -> str:
     """Return in words which traits promise that the property passes; each small set of traits is tried."""
     if question.promise(Traits()):
         return "every formulation, whatever its traits say"
-    names = Traits().by_name().keys()
-    singles = [(name, value) for name, values in _VALUES.items() if name in names for value in values]
-    for sets in (zip(singles), combinations(singles, 2)):
-        hits = [
-            dict(hit) for hit in sets if len(dict(hit)) == len(hit) and question.promise(Traits().revise(**dict(hit)))
-        ]
+    for size in (1, 2):
+        sets = (dict(pairs) for pairs in combinations(_STATEMENTS, size))
+        hits = [each for each in sets if len(each) == size and question.promise(Traits().revise(**each))]
         if hits:
             return " or ".join(" with ".join(f"`{name}={hit[name]!r}`" for name in sorted(hit)) for hit in hits)
     return "no trait"
@@ -136,20 +119,22 @@ def property_text(question: Property) -> str:
         f"# {question.id}\n",
         sentence(plain(question.summary)) + "\n",
         *answers,
-        "\n".join(f"- **{title}:** {words}" for title, words in facts) + "\n",
+        _lines(f"- **{title}:** {words}" for title, words in facts),
         "## Measured numbers\n",
         _tolerances(question.quantities),
         _reasons(question.quantities),
     ]
     symbols = dict.fromkeys(symbol for quantity in question.quantities for symbol in symbols_of(quantity.tolerance))
     if symbols:
-        text.append(
-            "\n".join(["The symbols:\n", *(f"- {each}: {plain(symbol_meanings()[each])}" for each in symbols)]) + "\n"
-        )
+        text.append(_lines(["The symbols:\n", *(f"- {each}: {plain(symbol_meanings()[each])}" for each in symbols)]))
     if question.series:
         names = ", ".join(f"{plain(name)} ({unit})" for name, unit in question.series.items())
         text.append(f"The report also keeps, for each iterate: {names}.\n")
-    return "\n".join(filter(None, [*text, known_failures(question)]))
+    return "\n".join([*text, known_failures(question)])
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "\n".join(lines) + "\n"
 
 
 def _tolerances(quantities: Sequence[Quantity]) -> str:
@@ -158,11 +143,10 @@ def _tolerances(quantities: Sequence[Quantity]) -> str:
     for quantity in quantities:
         sign = "≤" if quantity.sense == "at most" else "≥"
         groups.setdefault((f"{sign} {quantity.tolerance}", quantity.unit), []).append(quantity.name)
-    lines = [
+    return _lines(
         f"- **{plain('; '.join(names))}** {plain(tolerance)} ({'ratio' if unit == '1' else unit})"
         for (tolerance, unit), names in groups.items()
-    ]
-    return "\n".join(lines) + "\n"
+    )
 
 
 def _reasons(quantities: Sequence[Quantity]) -> str:
@@ -179,4 +163,4 @@ def _reasons(quantities: Sequence[Quantity]) -> str:
         for clause, names in owners.items()
         if clause not in everywhere
     ]
-    return "\n".join(["Why these tolerances:\n", *lines]) + "\n"
+    return _lines(["Why these tolerances:\n", *lines])

@@ -1,5 +1,6 @@
 """The parts of a body, and a one-line message for every input that makes no body."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, radians, sin
@@ -49,106 +50,90 @@ def test_a_body_is_a_read_only_copy() -> None:
             getattr(body, name)[0] = 0
 
 
-def changed_attribute(name: str, **entries: Any) -> dict[str, Any]:
-    """Replace some entries of an attribute of the block: {"3,1": 7.0} or {"3": (0, 1)}."""
+def changed(name: str, place: tuple[int, ...], value: Any) -> Any:
+    """Return an attribute of the block of which an entry, or a row, is another."""
     values = getattr(BLOCK, name).copy()
-    for place, value in entries.items():
-        values[tuple(map(int, place[1:].split("_")))] = value
-    return {name: values}
+    values[place] = value
+    return values
 
 
-def with_node(node: tuple[float, float]) -> dict[str, Any]:
-    """One node more than the cells use."""
-    return {
-        "nodes": np.vstack([BLOCK.nodes, node]),
-        **{name: np.vstack([getattr(BLOCK, name), [[0, 0]]]) for name in ("imposed", "load")},
-        "fixed": np.vstack([BLOCK.fixed, [[False, False]]]),
-    }
+def shape_of(values: Any) -> str:
+    return f"shape {np.shape(values)}"
 
 
-NU = r"needed Poisson's ratio above −1 and below 0.5 \(an incompressible body has no stiffness matrix"
-WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "nu 1/2": ({"poisson": 0.5}, f"poisson: found 0.5; {NU}"),
-    "nu -1": ({"poisson": -1.0}, f"poisson: found -1.0; {NU}"),
-    "nu nan": ({"poisson": np.nan}, f"poisson: found nan; {NU}"),
-    "nu none": ({"poisson": None}, f"poisson: found None; {NU}"),
-    "E 0": ({"young": 0.0}, "young: found 0.0; needed Young's modulus > 0"),
-    "E < 0": ({"young": -1e4}, "young: found -10000.0; needed Young's modulus > 0"),
-    "E nan": ({"young": np.nan}, "young: found nan; needed Young's"),
-    "E inf": ({"young": np.inf}, "young: found inf; needed Young's"),
-    "E text": ({"young": "1e4"}, "young: found '1e4'; needed Young's"),
-    "E true": ({"young": True}, "young: found True; needed Young's"),
-    "E two": ({"young": np.array([1.0, 2.0])}, r"young: found array\(\[1., 2.\]\); needed Young's"),
-    "nodes nan": (changed_attribute("nodes", _4_1=np.nan), "nodes: found NaN or infinity; needed finite numbers"),
-    "nodes inf": (changed_attribute("nodes", _4_1=-np.inf), "nodes: found NaN or infinity; needed finite numbers"),
-    "nodes 3d": ({"nodes": np.zeros((9, 3))}, r"nodes: found shape \(9, 3\); needed shape \(n, 2\)"),
-    "nodes flat": ({"nodes": np.zeros(18)}, r"nodes: found shape \(18,\); needed shape \(n, 2\)"),
-    "nodes complex": ({"nodes": BLOCK.nodes * 1j}, "nodes: found dtype complex128; needed float64"),
-    "nodes ragged": ({"nodes": [[0, 1], [2]]}, "nodes: found rows of different lengths; needed an array"),
-    "node in no cell": (with_node((5, 5)), "nodes: found node 9 in no cell; needed every node in a cell"),
-    "clockwise": ({"cells": BLOCK.cells[:, ::-1]}, "cells: found cell 0, which is clockwise, folded or flat; needed"),
-    "one clockwise": (changed_attribute("cells", _2=[3, 6, 7, 4]), "cells: found cell 2, which is clockwise"),
-    "folded": (changed_attribute("nodes", _4=(3.5, 3.5)), "cells: found cell 1, which is clockwise, folded or flat"),
-    "flat": (changed_attribute("nodes", _4=(2.0, 1.0)), "cells: found cell 1, which is clockwise, folded or flat"),
-    "bow tie": (changed_attribute("cells", _0=[0, 1, 3, 4]), "cells: found cell 0, which is clockwise, folded or flat"),
-    "cells float": ({"cells": BLOCK.cells * 1.0}, "cells: found dtype float64; needed int64"),
-    "cells of 5": ({"cells": np.zeros((2, 5), int)}, r"cells: found shape \(2, 5\); needed shape \(n, 4\)"),
-    "cells flat": ({"cells": np.arange(4)}, r"cells: found shape \(4,\); needed shape \(n, 4\)"),
-    "cells ragged": ({"cells": [[0, 1, 4, 3], [1, 2, 5]]}, "cells: found rows of different lengths; needed an array"),
-    "cells text": ({"cells": "quads"}, r"cells: found shape \(\); needed shape \(n, 4\)"),
-    "cells beyond": (changed_attribute("cells", _3_2=9), "cells: found node number 9; needed numbers from 0 to 8"),
-    "cells below": (changed_attribute("cells", _3_2=-1), "cells: found node number -1; needed numbers from 0 to 8"),
-    "cell twice": (
-        {"cells": np.vstack([BLOCK.cells, BLOCK.cells[2:3]])},
-        "cells: found two cells on the same side of an edge; needed cells that do not overlap",
-    ),
-    "reversed": (
-        {"contact": BLOCK.contact[:, ::-1]},
-        "contact: found the edge from node 1 to node 0; needed edges of the boundary, each with the body on its left",
-    ),
-    "inside": ({"contact": [[0, 1], [3, 4]]}, "contact: found the edge from node 3 to node 4; needed edges of the b"),
-    "no edge": ({"contact": [[0, 4]]}, "contact: found the edge from node 0 to node 4; needed edges of the boundary"),
-    "no contact": ({"contact": np.zeros((0, 2), int)}, "contact: found no edges; needed the edges that may touch"),
-    "edge twice": (
-        {"contact": [[0, 1], [1, 2], [0, 1]]},
-        "contact: found two edges that begin or end at one node; needed each edge once",
-    ),
-    "contact beyond": ({"contact": [[0, 99]]}, "contact: found node number 99; needed numbers from 0 to 8"),
-    "contact float": ({"contact": [[0.0, 1.0]]}, "contact: found dtype float64; needed int64"),
-    "contact cells": ({"contact": [[0, 1, 2]]}, r"contact: found shape \(1, 3\); needed shape \(n, 2\)"),
-    "fixed as numbers": ({"fixed": np.ones((9, 2))}, "fixed: found dtype float64; needed bool"),
-    "fixed short": ({"fixed": BLOCK.fixed[:3]}, r"fixed: found shape \(3, 2\); needed shape \(9, 2\)"),
-    "imposed short": ({"imposed": np.zeros(9)}, r"imposed: found shape \(9,\); needed shape \(9, 2\)"),
-    "imposed nan": (changed_attribute("imposed", _7_1=np.nan), "imposed: found NaN or infinity; needed finite"),
-    "imposed on a free one": (
-        changed_attribute("imposed", _1_1=0.1),
-        "imposed: found a displacement of a free component; needed 0 where nothing is fixed",
-    ),
-    "load short": ({"load": np.zeros((9, 1))}, r"load: found shape \(9, 1\); needed shape \(9, 2\)"),
-    "load inf": (changed_attribute("load", _1_1=np.inf), "load: found NaN or infinity; needed finite"),
-    "load text": ({"load": np.full((9, 2), "a")}, "load: found dtype <U1; needed float64"),
-    "long axis": ({"axis": (1.0, 1e-5)}, r"axis: found \(1.0, 1e-05\); needed a unit vector"),
-    "no axis": ({"axis": (0.0, 0.0)}, r"axis: found \(0.0, 0.0\); needed a unit vector"),
-    "axis of 3": ({"axis": (1.0, 0.0, 0.0)}, r"axis: found shape \(3,\); needed shape \(2,\)"),
-    "start": ({"start": (0.0, np.nan)}, "start: found NaN or infinity; needed finite"),
-    "start of 1": ({"start": [0.0]}, r"start: found shape \(1,\); needed shape \(2,\)"),
+def dtype_of(values: Any) -> str:
+    return f"dtype {np.asarray(values).dtype}"
+
+
+def rows(name: str, found: str | Callable[[Any], str], needed: str, *values: Any) -> list[tuple[dict[str, Any], str]]:
+    """Return the changes and the messages of wrong values of one attribute."""
+    return [
+        ({name: value}, f"punch: {name}: found {found if isinstance(found, str) else found(value)}; needed {needed}")
+        for value in values
+    ]
+
+
+NU = "Poisson's ratio above −1 and below 0.5 (an incompressible body has no stiffness matrix in displacements)"
+INFINITE, CONVEX = "NaN or infinity", "convex, counter-clockwise"
+RAGGED, BOUNDARY = "rows of different lengths", "edges of the boundary, each with the body on its left"
+WITH_A_NODE: dict[str, Any] = {  # One node more than the cells use.
+    **{name: np.vstack([getattr(BLOCK, name), [[0, 0]]]) for name in ("imposed", "load")},
+    "fixed": np.vstack([BLOCK.fixed, [[False, False]]]),
+    "nodes": np.vstack([BLOCK.nodes, (5, 5)]),
 }
+WRONG = [
+    *rows("poisson", repr, NU, 0.5, -1.0, np.nan, None),
+    *rows("young", repr, "Young's modulus > 0", 0.0, -1e4, np.nan, np.inf, "1e4", True, np.array([1.0, 2.0])),
+    *rows("nodes", shape_of, "shape (n, 2)", np.zeros((9, 3)), np.zeros(18)),
+    *rows("cells", shape_of, "shape (n, 4)", np.zeros((2, 5), int), np.arange(4), "quads"),
+    *rows("contact", shape_of, "shape (n, 2)", [[0, 1, 2]]),
+    *rows("fixed", shape_of, "shape (9, 2)", BLOCK.fixed[:3]),
+    *rows("imposed", shape_of, "shape (9, 2)", np.zeros(9)),
+    *rows("load", shape_of, "shape (9, 2)", np.zeros((9, 1))),
+    *rows("axis", shape_of, "shape (2,)", (1.0, 0.0, 0.0)),
+    *rows("start", shape_of, "shape (2,)", [0.0]),
+    *rows("nodes", dtype_of, "float64", BLOCK.nodes * 1j),
+    *rows("load", dtype_of, "float64", np.full((9, 2), "a")),
+    *rows("cells", dtype_of, "int64", BLOCK.cells * 1.0),
+    *rows("contact", dtype_of, "int64", [[0.0, 1.0]]),
+    *rows("fixed", dtype_of, "bool", np.ones((9, 2))),
+    *rows("nodes", INFINITE, "finite numbers", changed("nodes", (4, 1), np.nan), changed("nodes", (4, 1), -np.inf)),
+    *rows("imposed", INFINITE, "finite numbers", changed("imposed", (7, 1), np.nan)),
+    *rows("load", INFINITE, "finite numbers", changed("load", (1, 1), np.inf)),
+    *rows("start", INFINITE, "finite numbers", (0.0, np.nan)),
+    *rows("nodes", RAGGED, "an array", [[0, 1], [2]]),
+    *rows("cells", RAGGED, "an array", [[0, 1, 4, 3], [1, 2, 5]]),
+    *rows("axis", str, "a unit vector", (1.0, 1e-5), (0.0, 0.0)),
+    (WITH_A_NODE, "punch: nodes: found node 9 in no cell; needed every node in a cell"),
+    *rows("cells", "cell 0, which is clockwise, folded or flat", CONVEX, BLOCK.cells[:, ::-1]),
+    *rows("cells", "cell 0, which is clockwise, folded or flat", CONVEX, changed("cells", (0,), [0, 1, 3, 4])),
+    *rows("cells", "cell 2, which is clockwise, folded or flat", CONVEX, changed("cells", (2,), [3, 6, 7, 4])),
+    *(
+        (change, f"punch: cells: found cell 1, which is clockwise, folded or flat; needed {CONVEX}")
+        for change in ({"nodes": changed("nodes", (4,), place)} for place in ((3.5, 3.5), (2.0, 1.0)))
+    ),
+    *rows("cells", "node number 9", "numbers from 0 to 8", changed("cells", (3, 2), 9)),
+    *rows("cells", "node number -1", "numbers from 0 to 8", changed("cells", (3, 2), -1)),
+    *rows("contact", "node number 99", "numbers from 0 to 8", [[0, 99]]),
+    *rows(
+        "cells",
+        "two cells on the same side of an edge",
+        "cells that do not overlap",
+        np.vstack([BLOCK.cells, BLOCK.cells[2:3]]),
+    ),
+    *rows("contact", "the edge from node 1 to node 0", BOUNDARY, BLOCK.contact[:, ::-1]),
+    *rows("contact", "the edge from node 3 to node 4", BOUNDARY, [[0, 1], [3, 4]]),
+    *rows("contact", "the edge from node 0 to node 4", BOUNDARY, [[0, 4]]),
+    *rows("contact", "no edges", "the edges that may touch something", np.zeros((0, 2), int)),
+    *rows("contact", "two edges that begin or end at one node", "each edge once", [[0, 1], [1, 2], [0, 1]]),
+    *rows("imposed", "a displacement of a free component", "0 where nothing is fixed", changed("imposed", (1, 1), 0.1)),
+]
 
 
-def only_line(error: pytest.ExceptionInfo[MisuseError]) -> str:
-    """Return the message, which has one line and says what was found and what is needed."""
-    line = str(error.value)
-    assert "\n" not in line
-    assert ": found " in line
-    assert "; needed " in line
-    return line
-
-
-@pytest.mark.parametrize(("attributes", "message"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("attributes", "message"), WRONG)
 def test_wrong_bodies(attributes: dict[str, Any], message: str) -> None:
-    with pytest.raises(MisuseError, match=f"^punch: {message}") as error:
+    with pytest.raises(MisuseError, match=f"^{re.escape(message)}[^\n]*$"):
         replace(BLOCK, name="punch", **attributes)
-    only_line(error)
 
 
 def test_an_axis_may_be_a_rounding_too_long() -> None:
@@ -160,43 +145,37 @@ def unit_block(x: Any = (0, 1), y: Any = (0, 1), *, contact: str = "top", young:
     return block(Rectangle(x, y, young=young), contact=contact, placing=Placing(**placing))
 
 
-WRONG_BLOCKS: dict[str, tuple[Callable[[], Body], str]] = {
-    "descending": (lambda: unit_block([0, 2, 1]), r"block: x: found \[0.0, 2.0, 1.0\]; needed at l"),
-    "one line": (lambda: unit_block(y=[3]), r"block: y: found \[3.0\]; needed at least two ascending"),
-    "equal": (lambda: unit_block([0, 0]), r"block: x: found \[0.0, 0.0\]; needed at least two"),
-    "nan": (lambda: unit_block([0, np.nan]), r"block: x: found \[0.0, nan\]; needed at least two"),
-    "inf": (lambda: unit_block([0, np.inf]), r"block: x: found \[0.0, inf\]; needed at least two"),
-    "text": (lambda: unit_block("ab"), "block: x: found dtype <U2; needed numbers"),
-    "a grid": (lambda: unit_block([[0, 1]]), r"block: x: found shape \(1, 2\); needed shape \(n,\)"),
-    "side": (lambda: unit_block(contact="left"), "block: contact: found 'left'; needed 'bottom' or 'top'"),
-    "axis": (lambda: unit_block(axis=(1, 1)), r"block: axis: found \(1.0, 1.0\); needed a"),
-    "axis of 3": (lambda: unit_block(axis=(1, 0, 0)), r"block: axis: found shape \(3,\); needed shape \(2,\)"),
-    "shift": (lambda: unit_block(shift=(1,)), r"block: shift: found shape \(1,\); needed shape \(2,\)"),
-    "material": (lambda: unit_block(young=0), "block: young: found 0; needed Young's"),
-    "one point": (lambda: rigid_surface([[0, 0]]), "rigid: contact: found no edges; needed the edges that may touch"),
-    "in line": (lambda: rigid_surface([0, 1, 2]), r"rigid: points: found shape \(3,\); needed shape \(n, 2\)"),
-    "ragged": (lambda: rigid_surface([[0, 1], [2]]), "rigid: points: found rows of different lengths; needed an array"),
-    "words": (lambda: rigid_surface("abc"), "rigid: points: found dtype <U3; needed numbers"),
-    "move": (
-        lambda: rigid_surface([[0, 0], [1, 0]], displacement=(1, 2, 3)),
-        r"rigid: displacement: found shape \(3,\); needed shape \(2,",
-    ),
-    "nowhere": (
-        lambda: rigid_surface([[0, 0], [1, 0]], displacement=(np.nan, 0)),
-        "rigid: imposed: found NaN or infinity; needed",
-    ),
-    "loose": (
-        lambda: Body([[0, 0], [1, 0]], np.zeros((0, 4), int), [[0, 1]]),  # type: ignore[arg-type]
+LINE = [[0, 0], [1, 0]]
+WRONG_BLOCKS: list[tuple[Callable[[], Body], str]] = [
+    (lambda: unit_block([0, 2, 1]), "block: x: found [0.0, 2.0, 1.0]; needed at least two ascending"),
+    (lambda: unit_block(y=[3]), "block: y: found [3.0]; needed at least two ascending"),
+    (lambda: unit_block([0, 0]), "block: x: found [0.0, 0.0]; needed at least two"),
+    (lambda: unit_block([0, np.nan]), "block: x: found [0.0, nan]; needed at least two"),
+    (lambda: unit_block([0, np.inf]), "block: x: found [0.0, inf]; needed at least two"),
+    (lambda: unit_block("ab"), "block: x: found dtype <U2; needed numbers"),
+    (lambda: unit_block([[0, 1]]), "block: x: found shape (1, 2); needed shape (n,)"),
+    (lambda: unit_block(contact="left"), "block: contact: found 'left'; needed 'bottom' or 'top'"),
+    (lambda: unit_block(axis=(1, 1)), "block: axis: found (1.0, 1.0); needed a"),
+    (lambda: unit_block(axis=(1, 0, 0)), "block: axis: found shape (3,); needed shape (2,)"),
+    (lambda: unit_block(shift=(1,)), "block: shift: found shape (1,); needed shape (2,)"),
+    (lambda: unit_block(young=0), "block: young: found 0; needed Young's"),
+    (lambda: rigid_surface([[0, 0]]), "rigid: contact: found no edges; needed the edges that may touch"),
+    (lambda: rigid_surface([0, 1, 2]), "rigid: points: found shape (3,); needed shape (n, 2)"),
+    (lambda: rigid_surface([[0, 1], [2]]), "rigid: points: found rows of different lengths; needed an array"),
+    (lambda: rigid_surface("abc"), "rigid: points: found dtype <U3; needed numbers"),
+    (lambda: rigid_surface(LINE, displacement=(1, 2, 3)), "rigid: displacement: found shape (3,); needed shape (2,"),
+    (lambda: rigid_surface(LINE, displacement=(np.nan, 0)), "rigid: imposed: found NaN or infinity; needed"),
+    (
+        lambda: Body(np.array(LINE), np.zeros((0, 4), int), np.array([[0, 1]])),
         "body: fixed: found a free node of a rigid body; needed every component of every node fixed",
     ),
-}
+]
 
 
-@pytest.mark.parametrize(("make", "message"), WRONG_BLOCKS.values(), ids=WRONG_BLOCKS)
+@pytest.mark.parametrize(("make", "message"), WRONG_BLOCKS)
 def test_wrong_blocks(make: Callable[[], Body], message: str) -> None:
-    with pytest.raises(MisuseError, match=f"^{message}") as error:
+    with pytest.raises(MisuseError, match=f"^{re.escape(message)}[^\n]*$"):
         make()
-    only_line(error)
 
 
 @pytest.mark.parametrize("contact", ["bottom", "top"])

@@ -6,14 +6,7 @@ from foreign_texts import TEXTS, hidden_characters
 
 from contactverif import Case, Finding, Interface, Measurement, MisuseError, Quantity, Subject
 from contactverif.contract.counterexample import case_id, typeable
-from contactverif.contract.errors import (
-    LONGEST_LINE,
-    LONGEST_NAME,
-    describe_error,
-    name_line,
-    one_line,
-    printable,
-)
+from contactverif.contract.errors import LONGEST_LINE, LONGEST_NAME, describe_error, name_line, one_line, printable
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 

@@ -84,32 +84,29 @@ def test_nodes_of_both_sides_may_coincide() -> None:
     assert interface(moved_nodes(3, 2, 0)).nodes[2].tolist() == [2, 0]
 
 
-SURFACES = {
-    "flat list": ([0, 1], r"segments: found an array of shape \(2,\); needed shape \(n_segments, 2\)"),
-    "five nodes": ([[0, 1, 2, 3, 4]], r"segments: found an array of shape \(1, 5\)"),
-    "empty": (np.empty((0, 2), dtype=int), r"segments: found an array of shape \(0, 2\); needed .* n_segments ≥ 1"),
-    "ragged": ([[0, 1], [2]], "segments: found rows of different lengths; needed an array"),
-    "floats": ([[0.0, 1.0]], "segments: found dtype float64; needed integer node numbers"),
-    "booleans": ([[False, True]], "segments: found dtype bool; needed integer node numbers"),
-    "negative": ([[0, -1]], "segments: found node number -1; needed node numbers ≥ 0"),
-    "loop": ([[0, 1], [2, 2]], "segments: found segment 1 that begins and ends at node 2; needed two nodes"),
-    "fork": ([[0, 1], [1, 2], [1, 3]], "segments: found segments 1, 2 that all begin at node 1; needed chains"),
-    "join": ([[0, 2], [1, 2], [2, 3]], "segments: found segments 0, 1 that all end at node 2; needed chains"),
-    "one against the other": ([[0, 1], [2, 1]], r"segments: .* end at node 1; needed chains: .*body on the left"),
-    "negative corner": ([[0, 1, -1]], "faces: found node number -1; needed node numbers ≥ 0"),
-    "corner twice": (
-        [[0, 1, 2], [1, 3, 1]],
-        r"faces: found face 1 with the corners \[1, 3, 1\]; needed different corners",
-    ),
-    "edge of three": ([[0, 1, 2], [1, 0, 3], [0, 1, 4]], r"faces: found faces 0, 1, 2 on the edge \[0, 1\]; needed a"),
-    "turned": (
+SURFACES = [
+    ([0, 1], r"segments: found an array of shape \(2,\); needed shape \(n_segments, 2\)"),
+    ([[0, 1, 2, 3, 4]], r"segments: found an array of shape \(1, 5\)"),
+    (np.empty((0, 2), dtype=int), r"segments: found an array of shape \(0, 2\); needed .* n_segments ≥ 1"),
+    ([[0, 1], [2]], "segments: found rows of different lengths; needed an array"),
+    ([[0.0, 1.0]], "segments: found dtype float64; needed integer node numbers"),
+    ([[False, True]], "segments: found dtype bool; needed integer node numbers"),
+    ([[0, -1]], "segments: found node number -1; needed node numbers ≥ 0"),
+    ([[0, 1], [2, 2]], "segments: found segment 1 that begins and ends at node 2; needed two nodes"),
+    ([[0, 1], [1, 2], [1, 3]], "segments: found segments 1, 2 that all begin at node 1; needed chains"),
+    ([[0, 2], [1, 2], [2, 3]], "segments: found segments 0, 1 that all end at node 2; needed chains"),
+    ([[0, 1], [2, 1]], r"segments: .* end at node 1; needed chains: .*body on the left"),
+    ([[0, 1, -1]], "faces: found node number -1; needed node numbers ≥ 0"),
+    ([[0, 1, 2], [1, 3, 1]], r"faces: found face 1 with the corners \[1, 3, 1\]; needed different corners"),
+    ([[0, 1, 2], [1, 0, 3], [0, 1, 4]], r"faces: found faces 0, 1, 2 on the edge \[0, 1\]; needed a"),
+    (
         [[0, 1, 2], [0, 1, 3]],
         r"faces: found faces 0 and 1, which both run along the edge \[0, 1\]; needed corners counter-clockwise",
     ),
-}
+]
 
 
-@pytest.mark.parametrize(("segments", "message"), SURFACES.values(), ids=SURFACES)
+@pytest.mark.parametrize(("segments", "message"), SURFACES)
 def test_wrong_surfaces(segments: object, message: str) -> None:
     with pytest.raises(MisuseError, match=message):
         Surface(segments)  # type: ignore[arg-type]
@@ -127,63 +124,57 @@ def pair(slave: np.ndarray, faces: list[list[int]]) -> Interface:
     return Interface.from_faces(slave, faces, BELOW, [[0, 1, 2, 3]])
 
 
-INTERFACES: dict[str, tuple[Callable[[], Interface], str]] = {
-    "nan": (lambda: interface(moved_nodes(1, np.nan, 0)), r"nodes: found node 1 at \(nan, 0.0\); needed finite coord"),
-    "infinity": (lambda: interface(moved_nodes(4, 0, -np.inf)), r"nodes: found node 4 at \(0.0, -inf\)"),
-    "three coordinates": (
+INTERFACES: list[tuple[Callable[[], Interface], str]] = [
+    (lambda: interface(moved_nodes(1, np.nan, 0)), r"nodes: found node 1 at \(nan, 0.0\); needed finite coord"),
+    (lambda: interface(moved_nodes(4, 0, -np.inf)), r"nodes: found node 4 at \(0.0, -inf\)"),
+    (
         lambda: interface(np.zeros((5, 3))),
         "slave: found faces of 2 corners and nodes with 3 coordinates; needed segments in the plane",
     ),
-    "four coordinates": (lambda: interface(np.zeros((5, 4))), r"nodes: found an array of shape \(5, 4\); needed shape"),
-    "flat": (lambda: interface(np.zeros(10)), r"nodes: found an array of shape \(10,\)"),
-    "ragged": (lambda: Interface([[0, 0], [1]], surface((0, 1)), surface((2, 3))), "nodes: found rows of different"),  # type: ignore[arg-type]
-    "complex": (lambda: interface(NODES * 1j), "nodes: found dtype complex128; needed real numbers"),
-    "text": (lambda: interface(NODES.astype(str)), "nodes: found dtype <U32; needed real numbers"),
-    "no surface": (lambda: Interface(NODES, [[0, 1]], surface((3, 4))), "slave: found a list; needed a Surface"),  # type: ignore[arg-type]
-    "zero length": (lambda: interface(moved_nodes(1, 0, 0)), "slave: found segment 0 of zero length; needed two diff"),
-    "zero length of the master": (lambda: interface(moved_nodes(4, 2, 1)), "master: found segment 0 of zero length"),
-    "coincident": (
+    (lambda: interface(np.zeros((5, 4))), r"nodes: found an array of shape \(5, 4\); needed shape"),
+    (lambda: interface(np.zeros(10)), r"nodes: found an array of shape \(10,\)"),
+    (lambda: Interface([[0, 0], [1]], surface((0, 1)), surface((2, 3))), "nodes: found rows of different"),  # type: ignore[arg-type]
+    (lambda: interface(NODES * 1j), "nodes: found dtype complex128; needed real numbers"),
+    (lambda: interface(NODES.astype(str)), "nodes: found dtype <U32; needed real numbers"),
+    (lambda: Interface(NODES, [[0, 1]], surface((3, 4))), "slave: found a list; needed a Surface"),  # type: ignore[arg-type]
+    (lambda: interface(moved_nodes(1, 0, 0)), "slave: found segment 0 of zero length; needed two diff"),
+    (lambda: interface(moved_nodes(4, 2, 1)), "master: found segment 0 of zero length"),
+    (
         lambda: interface(moved_nodes(2, 0, 0)),
         r"slave: found coincident nodes 0, 2 at \(0.0, 0.0\); needed one node a place on each surface",
     ),
-    "minus zero": (lambda: interface(moved_nodes(2, -0.0, 0)), "slave: found coincident nodes 0, 2"),
-    "master first": (
+    (lambda: interface(moved_nodes(2, -0.0, 0)), "slave: found coincident nodes 0, 2"),
+    (
         lambda: interface(NODES, surface((3, 4)), surface((0, 1), (1, 2))),
         "slave: found nodes 3, 4; needed the first node numbers, 0 … 1, each used",
     ),
-    "unused slave node": (lambda: interface(NODES, surface((0, 2))), "slave: found nodes 0, 2; needed the first node"),
-    "unused last node": (
+    (lambda: interface(NODES, surface((0, 2))), "slave: found nodes 0, 2; needed the first node"),
+    (
         lambda: interface(np.vstack([NODES, [[7, 7]]])),
         "master: found nodes 3, 4; needed all node numbers behind the slave's, 3 … 5, each used",
     ),
-    "node of both": (lambda: interface(NODES, None, surface((2, 3), (3, 4))), "master: found nodes 2, 3, 4; needed"),
-    "too few nodes": (lambda: interface(NODES[:4]), "master: found nodes 3, 4; needed all node numbers .* 3 … 3"),
-    "chain of one point": (lambda: Interface.from_chains([[0, 0]], NODES), r"slave: found an array of shape \(1, 2\)"),
-    "chain of text": (lambda: Interface.from_chains(NODES, [["a", "b"]] * 3), "nodes: found dtype <U32; needed real"),
-    "ragged chain": (lambda: Interface.from_chains(NODES, [[0, 0], [1]]), "master: found rows of different lengths"),
-    "moved to nowhere": (lambda: PAIR.at(PAIR.nodes[:3]), "master: found nodes 3, 4, 5, 6; needed"),
-    "no area": (lambda: pair(LINE, [[0, 1, 2]]), "slave: found face 0 of no area; needed corners"),
-    "dart": (lambda: pair(DART, [[0, 1, 2, 3]]), "slave: found face 0, a quadrilateral that is not convex"),
-    "points of a plane": (
-        lambda: pair(SQUARE[:, :2], TRIANGLES),
-        r"slave: found an array of shape \(4, 2\); needed shape \(n_po",
-    ),
-    "coincident in space": (
+    (lambda: interface(NODES, None, surface((2, 3), (3, 4))), "master: found nodes 2, 3, 4; needed"),
+    (lambda: interface(NODES[:4]), "master: found nodes 3, 4; needed all node numbers .* 3 … 3"),
+    (lambda: Interface.from_chains([[0, 0]], NODES), r"slave: found an array of shape \(1, 2\)"),
+    (lambda: Interface.from_chains(NODES, [["a", "b"]] * 3), "nodes: found dtype <U32; needed real"),
+    (lambda: Interface.from_chains(NODES, [[0, 0], [1]]), "master: found rows of different lengths"),
+    (lambda: PAIR.at(PAIR.nodes[:3]), "master: found nodes 3, 4, 5, 6; needed"),
+    (lambda: pair(LINE, [[0, 1, 2]]), "slave: found face 0 of no area; needed corners"),
+    (lambda: pair(DART, [[0, 1, 2, 3]]), "slave: found face 0, a quadrilateral that is not convex"),
+    (lambda: pair(SQUARE[:, :2], TRIANGLES), r"slave: found an array of shape \(4, 2\); needed shape \(n_po"),
+    (
         lambda: pair(np.vstack([SQUARE, SQUARE[:1]]), [[0, 2, 1], [4, 3, 2]]),
         r"slave: found coincident nodes 0, 4 at \(0.0, 0.0, 0.0\)",
     ),
-    "faces in the plane": (
+    (
         lambda: Interface(SQUARE[:, :2], Surface([[0, 1, 2]]), Surface([[3, 4, 5]])),
         "slave: found faces of 3 corners and nodes with 2 coordinates; needed segments in the plane",
     ),
-    "unused in space": (
-        lambda: pair(np.vstack([SQUARE, [[9.0, 9, 9]]]), TRIANGLES),
-        "master: found nodes 5, 6, 7, 8; needed",
-    ),
-}
+    (lambda: pair(np.vstack([SQUARE, [[9.0, 9, 9]]]), TRIANGLES), "master: found nodes 5, 6, 7, 8; needed"),
+]
 
 
-@pytest.mark.parametrize(("make", "message"), INTERFACES.values(), ids=INTERFACES)
+@pytest.mark.parametrize(("make", "message"), INTERFACES)
 def test_wrong_interfaces(make: Callable[[], Interface], message: str) -> None:
     with pytest.raises(MisuseError, match=message):
         make()
