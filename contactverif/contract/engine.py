@@ -133,7 +133,8 @@ class SceneArrays:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> SceneArrays:
         """Return the scene that `to_arrays` made arrays of."""
-        return cls(**{name: array if array.ndim else array.item() for name, array in arrays.items()})
+        values: dict[str, Any] = {name: array if array.ndim else array.item() for name, array in arrays.items()}
+        return cls(**values)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

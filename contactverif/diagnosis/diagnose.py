@@ -10,7 +10,7 @@ from contactverif.contract.arrays import Array, FloatArray, dense
 from contactverif.contract.errors import ContractError
 from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation, Subject
-from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state
+from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residual_of
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
@@ -64,10 +64,8 @@ def _diagnose_scale(subject: Subject) -> str:
 def _scaled_forces(subject: Subject, factor: float) -> FloatArray:
     """Return the forces (n_unknowns,) on a mesh of another size, over the square of its size."""
     case = flat_state().case
-    interface, z = case.interface.at(case.interface.nodes * factor), case.z * factor
-    formulation = subject.for_interface(interface, case.penalty)
-    forces: FloatArray = formulation.residual(interface, formulation.pair(interface, z), z)
-    return forces / factor**2  # A force is ε̂ |g| times a length.
+    interface = case.interface.at(case.interface.nodes * factor)
+    return residual_of(subject, interface, case.z * factor) / factor**2  # A force is ε̂ |g| times a length.
 
 
 def _diagnose_memory(subject: Subject) -> str:

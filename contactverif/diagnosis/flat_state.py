@@ -6,6 +6,7 @@ inside the master, and no two segments are alike, so that each mistake has a pat
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -42,6 +43,11 @@ class FlatState:
     n_slave_nodes: int  # The slave nodes come first.
 
     @property
+    def sides(self) -> tuple[slice, slice]:
+        """The nodes of the slave, and those of the master."""
+        return slice(self.n_slave_nodes), slice(self.n_slave_nodes, None)
+
+    @property
     def exact(self) -> FloatArray:
         """The exact size (n_nodes,) of the force on each node."""
         exact: FloatArray = self.pieces.sum(axis=0)
@@ -50,8 +56,7 @@ class FlatState:
     @property
     def along(self) -> FloatArray:
         """The places (n_nodes,) of the nodes along the interface."""
-        along: FloatArray = self.case.positions[:, 0]
-        return along
+        return self.case.positions[:, 0]
 
 
 def flat_state(
@@ -87,11 +92,15 @@ def flat_state(
     return FlatState(case, pieces, ends[:-1], np.diff(ends), segments, nodes, n_slave)
 
 
+def residual_of(subject: Subject, interface: Interface, z: FloatArray) -> FloatArray:
+    """Return the forces (n_unknowns,) of a formulation with the penalty of the flat states."""
+    formulation = subject.for_interface(interface, PENALTY)
+    return formulation.residual(interface, formulation.pair(interface, z), z)
+
+
 def pushes_of(subject: Subject, state: FlatState) -> FloatArray:
     """Return the forces (n_nodes, 2) that push the surfaces apart: positive along y on both sides if all is right."""
-    formulation, case = subject.for_case(state.case), state.case
-    pairing = formulation.pair(case.interface, case.z)
-    forces: FloatArray = -formulation.residual(case.interface, pairing, case.z).reshape(-1, 2)
+    forces: FloatArray = -residual_of(subject, state.case.interface, state.case.z).reshape(-1, 2)
     sides = np.where(np.arange(len(forces)) < state.n_slave_nodes, 1.0, -1.0)
     return forces * sides[:, None]
 
@@ -105,3 +114,9 @@ def equal(a: FloatArray, b: FloatArray) -> BoolArray:
 def same(a: FloatArray, b: FloatArray) -> bool:
     """Return whether all numbers are the same, over the largest of the second list."""
     return bool(equal(a, b).all())
+
+
+def listed(name: str, numbers: Iterable[object]) -> str:
+    """Return what has these numbers, in words: `slave node 1`, or `slave nodes 1, 2`."""
+    words = [*map(str, numbers)]
+    return f"{name}{'s' * (len(words) > 1)} {', '.join(words)}"

@@ -24,7 +24,9 @@ from contactverif.diagnosis.flat_state import (
     FlatState,
     equal,
     flat_state,
+    listed,
     pushes_of,
+    residual_of,
     same,
 )
 
@@ -45,28 +47,27 @@ _POWERS = range(16, 4, -1)
 _OPEN = {0: np.array([-1.0, 0.0, 1.0, 1.0]), len(SLAVE) - 2: np.array([1.0, 1.0, 0.0, -1.0])}
 
 
-def diagnose_forces(subject: Subject, *, in_full: bool = True) -> str:
+def diagnose_forces(subject: Subject, *, in_full: bool) -> str:
     """Return what is wrong with the forces on a flat interface; empty where they are right, or no rule knows them.
 
     Not `in_full`, nothing is said of forces that merely are not the consistent ones: a formulation that does not
     promise the patch test may have them.
     """
-    rules, patch = subject.traits.rules, subject.traits.promises.patch
+    return next(filter(None, _patterns(subject, in_full)), "")
+
+
+def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
+    rules, promises = subject.traits.rules, subject.traits.promises
     if rules.enforcement != "penalty":
-        return ""
-    if text := _find_lost_places(subject):
-        return text
-    if rules.penalty == "nodal" or patch.flat is False:
-        return ""  # Other forces than the consistent ones are right there.
-    return next(filter(None, _patterns(subject, in_full=in_full)), "")
-
-
-def _patterns(subject: Subject, *, in_full: bool) -> Iterator[str]:
+        return
+    yield _find_lost_places(subject)
+    if rules.penalty == "nodal" or promises.patch.flat is False:
+        return  # Other forces than the consistent ones are right there.
     yield _diagnose_digits(subject)
     yield _diagnose_law(subject)
     state = flat_state()
     forces = pushes_of(subject, state)
-    yield _uniform_pattern(state, forces, in_full=in_full)
+    yield from _uniform_patterns(state, forces, in_full)
     if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
         yield "the forces have a part along the surface, where both normals are the same"
     state = flat_state(slope=1.0)
@@ -75,31 +76,31 @@ def _patterns(subject: Subject, *, in_full: bool) -> Iterator[str]:
         yield _exchange(state, pushes, 0) or _exchange(state, pushes, 1)
     for places, words in ((FINE, "finer"), (COARSE, "coarser")):
         state = flat_state(places=places)
-        if text := _uniform_pattern(state, pushes_of(subject, state), in_full=in_full):
+        for text in filter(None, _uniform_patterns(state, pushes_of(subject, state), in_full)):
             yield f"on a slave that is {words} than its master: {text}"
     yield _diagnose_turned(subject)
     for number, depths in _OPEN.items():
         pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
         if free := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
-            nodes = f"slave node{'s' * (len(free) > 1)} {', '.join(map(str, free))}"
-            yield f"where slave segment {number} is open, nothing pushes {nodes}, which penetrate"
-    if subject.traits.promises.conserves_force:
+            yield f"where slave segment {number} is open, nothing pushes {listed('slave node', free)}, which penetrate"
+    if promises.conserves_force:
         yield _diagnose_balance(subject)
 
 
-def _uniform_pattern(state: FlatState, forces: FloatArray, *, in_full: bool) -> str:
-    """Return the pattern of the forces of a uniform penetration; empty if they are right."""
+def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> Iterator[str]:
+    """Yield the patterns of the forces of a uniform penetration; none if they are right."""
     pushes, n = forces[:, 1], state.n_slave_nodes
     if not forces.any():
-        return "there is no force at all where the surfaces penetrate"
+        yield "there is no force at all where the surfaces penetrate"
     if same(pushes, state.exact):
-        return ""
-    text = next(filter(None, _plain_patterns(state, pushes)), "")
-    if not text and in_full:
-        text = next(filter(None, _patterns_of_pieces(state, pushes)), "")
-    if not text and same(pushes[:n], np.full(n, PENALTY * DEPTH)):
-        text = "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
-    return text or (_side_pattern(state, pushes) if in_full else "")
+        return
+    yield from _plain_patterns(state, pushes)
+    if in_full:
+        yield from _patterns_of_pieces(state, pushes)
+    if same(pushes[:n], np.full(n, PENALTY * DEPTH)):
+        yield "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
+    if in_full:
+        yield _side_pattern(state, pushes)
 
 
 def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
@@ -138,15 +139,15 @@ def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
         parts += [state.pieces[numbers == segment].sum(axis=0) for segment in np.unique(numbers)]
     alike = [np.abs(part - pushes) <= SAME * np.abs(exact).max() for part in parts]
     if (np.any(alike, axis=0) & (pushes != 0))[~equal(pushes, exact)].all():
-        several = "nodes that belong to several pieces"
-        yield f"{several} have the force of one alone: the others are overwritten, and not added"
+        owners = "nodes that belong to several pieces"
+        yield f"{owners} have the force of one alone: the others are overwritten, and not added"
     yield _piece_factors(state, pushes)
     halves = np.zeros(len(pushes))
     np.add.at(halves, state.ends[1], state.pieces[:, n:].sum(axis=1)[:, None] / 2)
     if same(pushes[:n], exact[:n]) and same(pushes[n:], halves[n:]):
         yield "both nodes of a master segment take half of its force, wherever it acts: the shape functions are ½"
     rules = [np.polynomial.legendre.leggauss(n_points) for n_points in range(1, _MOST_POINTS + 1)]
-    for side, ends, nodes in zip(("slave", "master"), state.ends, (slice(None, n), slice(n, None)), strict=True):
+    for side, ends, nodes in zip(("slave", "master"), state.ends, state.sides, strict=True):
         for places, weights in rules:
             forces = np.zeros(len(pushes))
             for start, length, of_piece in zip(state.starts, state.lengths, ends, strict=True):
@@ -172,7 +173,7 @@ def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
 
 def _exchange(state: FlatState, pushes: FloatArray, side: int) -> str:
     """Return whether the two shape functions of each segment of a side, 0 or 1, are exchanged."""
-    ends, nodes = state.ends[side], (slice(state.n_slave_nodes), slice(state.n_slave_nodes, None))[side]
+    ends, nodes = state.ends[side], state.sides[side]
     swapped = np.zeros(len(pushes))
     np.add.at(swapped, ends[:, ::-1], np.take_along_axis(state.pieces, ends, axis=1))
     if not same(pushes[nodes], swapped[nodes]):
@@ -199,8 +200,8 @@ def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
     name = ("slave", "master")[side]
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
-        listed = f"{name} segment{'s' * (len(missed) > 1)} {', '.join(map(str, missed))}"
-        return f"{listed} {'is' if len(missed) == 1 else 'are'} left out{_ends(missed, len(segments))}"
+        are = "is" if len(missed) == 1 else "are"
+        return f"{listed(f'{name} segment', missed)} {are} left out{_ends(missed, len(segments))}"
     words = ", ".join(f"{name} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
     ends = _ends(segments[wrong].tolist(), len(segments))
     return f"segments have forces of another size: {words} the exact one, all others right{ends}"
@@ -237,8 +238,7 @@ def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
 
 def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
     """Return on which side the forces are wrong, and whether their sum is."""
-    n = state.n_slave_nodes
-    slave, master = ((pushes[nodes], state.exact[nodes], state.along[nodes]) for nodes in (slice(n), slice(n, None)))
+    slave, master = ((pushes[nodes], state.exact[nodes], state.along[nodes]) for nodes in state.sides)
     if same(*slave[:2]):
         return "the forces on the slave are right, those on the master are not" + _total(*master[:2])
     total = _total(*slave[:2])
@@ -315,8 +315,7 @@ def _diagnose_turned(subject: Subject) -> str:
     for degrees, x, y in ((0, 1, 0), (90, 0, 1), (180, -1, 0), (270, 0, -1)):
         turn = np.array([[x, y], [-y, x]], dtype=np.float64)  # So it takes rows to rows, without any rounding.
         turned, z = interface.at(interface.nodes @ turn), (positions @ turn).reshape(-1)
-        formulation = subject.for_interface(turned, state.case.penalty)
-        forces = formulation.residual(turned, formulation.pair(turned, z), z).reshape(-1, 2) @ turn.T
+        forces = residual_of(subject, turned, z).reshape(-1, 2) @ turn.T
         expected = forces if expected is None else expected
         if not same(forces, expected):
             words = "are reversed" if same(forces, -expected) else "do not turn with it"

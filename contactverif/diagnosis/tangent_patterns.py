@@ -15,7 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, dense
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state
+from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state, listed
 
 DEPTHS = tuple(2.0**-power for power in (5, 6, 7, 8))
 # Central differences of a step of 2^-20 of forces that are smooth over 1 err by less, over the largest entry.
@@ -152,9 +152,7 @@ def _wrong_nodes(pair: Tangents, axis: int) -> str:
     unknowns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=axis) > SAME * pair.scale)
     nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
     sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
-    return " and ".join(
-        f"{side} node{'s' * (len(part) > 1)} {', '.join(map(str, part))}" for side, part in sides.items() if len(part)
-    )
+    return " and ".join(listed(f"{side} node", part) for side, part in sides.items() if len(part))
 
 
 def _one_part(pair: Tangents) -> str:
@@ -172,8 +170,8 @@ def _one_part(pair: Tangents) -> str:
     # A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
     powers = {name: power for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER}
     if len(powers) != 1:
-        listed = " and ".join(f"{name[0]}–{name[1]}" for name in powers)
-        return f"entries in {listed} are wrong (n along the normal, t along the surface)" if powers else ""
+        names = " and ".join(f"{name[0]}–{name[1]}" for name in powers)
+        return f"entries in {names} are wrong (n along the normal, t along the surface)" if powers else ""
     ((name, power),) = powers.items()
     errors, n = pair.errors[blocks[name]], pair.n_slave // 2
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.

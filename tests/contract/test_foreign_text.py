@@ -1,5 +1,7 @@
 """Foreign text: what is spelled out, what is cut, and which classes hold none."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from foreign_texts import TEXTS, hidden_characters
@@ -71,14 +73,10 @@ def test_an_exception_whose_message_cannot_be_read_is_described_all_the_same() -
     assert describe_error(ValueError("x" * 20_000_000)).endswith("xxx… (20000000 characters)")
 
 
-def _case(name: str) -> Case:
-    interface = Interface.from_chains(slave=[[0, 0], [1, 0]], master=[[2, 0], [-1, 0]])
-    return Case(interface, np.zeros(8), parameters={name: np.zeros(1)}, name=name, kind=name)
-
-
 @texts
 def test_cases_and_results_hold_clean_text(text: str) -> None:
-    case = _case(text)
+    interface = Interface.from_chains(slave=[[0, 0], [1, 0]], master=[[2, 0], [-1, 0]])
+    case = Case(interface, np.zeros(8), parameters={text: np.zeros(1)}, name=text, kind=text)
     measurement = Measurement(undecided=text, broken=text, finding=Finding(text, remark=text))
     outcome = Outcome(case, Verdict.FAIL, text, measurement)
     info = PropertyInfo("id", "family", text, (Quantity("q", text, text),))
@@ -86,9 +84,8 @@ def test_cases_and_results_hold_clean_text(text: str) -> None:
     run = Run((row,), (NotLoaded(text, text),), {text: {}}, {text: text}, (text,))
     words = [case.name, case.kind, *case.parameters, measurement.undecided, measurement.broken]
     words += [str(measurement.finding), outcome.reason, outcome.summary.name, info.summary, info.quantities[0].reason]
-    words.append(row.formulation)
-    words += [row.known, row.reason, *run.provided, *run.provenance, *run.provenance.values(), *run.opposite_signs]
-    words += [run.not_loaded[0].formulation, run.not_loaded[0].reason]
+    words += [row.formulation, row.known, row.reason, run.not_loaded[0].formulation, run.not_loaded[0].reason]
+    words += [*run.provided, *run.provenance, *run.provenance.values(), *run.opposite_signs]
     for word in words:
         assert not hidden_characters(word)
         assert "\n" not in word
@@ -98,25 +95,18 @@ def test_cases_and_results_hold_clean_text(text: str) -> None:
 @pytest.mark.parametrize("name", ["escape", "control", "bidirectional", "unseen", "surrogate", "lines", "long"])
 def test_names_that_others_refer_to_are_refused(name: str) -> None:
     text = TEXTS[name]
-    with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):
-        Quantity(text, "", "")
-    with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):
-        PropertyInfo(text, "family", "", ())
-    with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):
-        PropertyInfo("id", "family", "", (), kinds=(text,))
-
-
-class _Silent:
-    def __init__(self, *, penalty: float) -> None:
-        self.penalty = penalty
-
-    def residual(self, interface: object, pairing: object, z: np.ndarray) -> np.ndarray:
-        return np.zeros_like(z)
+    for make in (
+        lambda: Quantity(text, "", ""),
+        lambda: PropertyInfo(text, "family", "", ()),
+        lambda: PropertyInfo("id", "family", "", (), kinds=(text,)),
+    ):
+        with pytest.raises(MisuseError, match="needed at most 200 characters that can be shown"):
+            make()
 
 
 @texts
 def test_the_name_of_a_formulation_is_clean(text: str) -> None:
-    name = Subject(text, _Silent).name
+    name = Subject(text, lambda *, penalty: SimpleNamespace(residual=np.zeros_like)).name
     assert not hidden_characters(name)
     assert len(name) < LONGEST_NAME + 30
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from contactverif import Case, Interface, MisuseError, Rules, Subject, Surface, Traits
+from contactverif import Case, Interface, MisuseError, Surface
 
 PAIR = Interface.from_chains([[0, 0], [1, 0], [3, 0]], [[4, 0], [2, 0], [1.5, 0.5], [-1, 0]])
 
@@ -289,14 +289,3 @@ def test_a_case_in_space_has_heights_areas_and_faces_in_its_lengths() -> None:
     again = Case.from_arrays(case.to_arrays())
     assert again.interface.master.faces.tolist() == [[4, 5, 6, 7]]
     assert again.z.tobytes() == case.z.tobytes()
-
-
-def test_a_nodal_penalty_is_the_stiffness_of_the_area_of_a_node() -> None:
-    class Nodal:
-        traits = Traits(rules=Rules(penalty="nodal"))
-
-        def residual(self, interface: Interface, pairing: object, z: np.ndarray) -> np.ndarray:
-            return 0 * z
-
-    case = Case(SOLID, SOLID.nodes.reshape(-1), penalty=8.0)
-    assert Subject("nodal", lambda *, penalty: Nodal()).penalty(case) == pytest.approx(8.0 * 2 / 4)

@@ -44,26 +44,31 @@ def measurement(
     return Measurement(numbers, **more)  # type: ignore[arg-type]
 
 
-def test_a_pass_has_no_reason() -> None:
-    assert judge(QUESTION, measurement()) == (Verdict.PASS, "")
-    assert judge(QUESTION, measurement(1.0, 1.9)) == (Verdict.PASS, "")
-
-
-def test_a_failure_says_value_and_tolerance() -> None:
-    assert judge(QUESTION, measurement(1.5)) == (Verdict.FAIL, "defect 1.5, at most 1")
-    assert judge(QUESTION, measurement(slope=1.5)) == (Verdict.FAIL, "slope 1.5, at least 1.9")
-    assert judge(QUESTION, measurement(1.5, 1.5)) == (Verdict.FAIL, "defect 1.5, at most 1; slope 1.5, at least 1.9")
-
-
-def test_a_breach_that_no_number_tells() -> None:
-    assert judge(QUESTION, measurement(broken="changed its input")) == (Verdict.FAIL, "changed its input")
-    assert judge(QUESTION, measurement(2.0, broken="changed its input"))[1].startswith("changed its input; defect 2")
-
-
-def test_a_doubt_excuses_a_failure_and_spoils_no_pass() -> None:
-    assert judge(QUESTION, measurement(1.5, undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
-    assert judge(QUESTION, measurement(undecided="a kink")) == (Verdict.PASS, "")
-    assert judge(QUESTION, measurement(broken="it printed", undecided="a kink")) == (Verdict.UNDECIDED, "a kink")
+@pytest.mark.parametrize(
+    ("measured", "verdict", "reason"),
+    [
+        (measurement(), Verdict.PASS, ""),
+        (measurement(1.0, 1.9), Verdict.PASS, ""),
+        (measurement(1.5), Verdict.FAIL, "defect 1.5, at most 1"),
+        (measurement(slope=1.5), Verdict.FAIL, "slope 1.5, at least 1.9"),
+        (measurement(1.5, 1.5), Verdict.FAIL, "defect 1.5, at most 1; slope 1.5, at least 1.9"),
+        # A breach that no number tells.
+        (measurement(broken="changed its input"), Verdict.FAIL, "changed its input"),
+        (measurement(2.0, broken="changed its input"), Verdict.FAIL, "changed its input; defect 2, at most 1"),
+        # A doubt excuses a failure, and spoils no pass.
+        (measurement(1.5, undecided="a kink"), Verdict.UNDECIDED, "a kink"),
+        (measurement(undecided="a kink"), Verdict.PASS, ""),
+        (measurement(broken="it printed", undecided="a kink"), Verdict.UNDECIDED, "a kink"),
+        # A failure stands whatever the other tolerance.
+        (measurement(2.0, tolerances=(1.0, nan)), Verdict.FAIL, "defect 2, at most 1"),
+        (measurement(broken="it printed", tolerances=(nan, nan)), Verdict.FAIL, "it printed"),
+        # A quantity may be left unmeasured.
+        (Measurement([MOST.check(0.5, 1.0)]), Verdict.PASS, ""),
+        (Measurement([MOST.check(2.0, 1.0)]), Verdict.FAIL, "defect 2, at most 1"),
+    ],
+)
+def test_numbers_make_a_verdict_and_its_reason(measured: Measurement, verdict: Verdict, reason: str) -> None:
+    assert judge(QUESTION, measured) == (verdict, reason)
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf, np.float64(nan)])
@@ -86,16 +91,6 @@ def test_a_tolerance_that_is_not_finite_passes_nothing_and_accuses_nobody(value:
     assert judge(QUESTION, of_slope) == (Verdict.UNDECIDED, f"the tolerance of slope is {tolerance}")
     assert MOST.check(value, tolerance).ratio == inf
     assert LEAST.check(value, tolerance).ratio == inf
-
-
-def test_a_failure_stands_whatever_the_other_tolerance() -> None:
-    assert judge(QUESTION, measurement(2.0, tolerances=(1.0, nan))) == (Verdict.FAIL, "defect 2, at most 1")
-    assert judge(QUESTION, measurement(broken="it printed", tolerances=(nan, nan))) == (Verdict.FAIL, "it printed")
-
-
-def test_a_quantity_may_be_left_unmeasured() -> None:
-    assert judge(QUESTION, Measurement([MOST.check(0.5, 1.0)])) == (Verdict.PASS, "")
-    assert judge(QUESTION, Measurement([MOST.check(2.0, 1.0)]))[0] is Verdict.FAIL
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from contactverif.plugins.registry import load_formulation
 PAIR = Interface.from_chains([[0, 0], [1, 0], [4, 0]], [[4, 0], [-2, 0]])
 Z = PAIR.nodes.reshape(-1)
 CASE = Case(PAIR, Z, penalty=10.0)
+SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]])
 BATCH = np.stack([Z, Z + 1, 2 * Z, Z - 1, Z, 3 * Z]).reshape(2, 3, -1)
 
 
@@ -51,8 +53,8 @@ def subject(**parts: Any) -> Subject:
 def answer_to(verb: str, **parts: Any) -> Any:
     """Return the checked answer to the verb by springs with some parts replaced."""
     guarded = subject(**parts).for_case(CASE)
-    pairing = guarded.pair(PAIR, Z) if verb != "pair" else None
-    return guarded.pair(PAIR, Z) if verb == "pair" else getattr(guarded, verb)(PAIR, pairing, Z)
+    pairing = guarded.pair(PAIR, Z)
+    return pairing if verb == "pair" else getattr(guarded, verb)(PAIR, pairing, Z)
 
 
 def always(answer: Any) -> Callable[..., Any]:
@@ -78,17 +80,20 @@ def test_a_correct_plugin() -> None:
 def test_the_penalty_in_the_kind_of_the_formulation() -> None:
     assert subject().penalty(CASE) == 10
     assert subject(traits=Traits(rules=Rules(penalty="distributed"))).penalty(CASE) == 10
-    assert subject(traits=Traits(rules=Rules(penalty="nodal"))).penalty(CASE) == 20  # mean slave segment: 2
+    nodal = subject(traits=Traits(rules=Rules(penalty="nodal")))
+    assert nodal.penalty(CASE) == 20  # mean slave segment: 2
+    faces = Interface.from_faces(SQUARE, [[0, 2, 1], [0, 3, 2]], SQUARE - [0, 0, 1], [[0, 1, 2, 3]])
+    in_space = Case(faces, faces.nodes.reshape(-1), penalty=8.0)
+    assert nodal.penalty(in_space) == pytest.approx(8.0 * 2 / 4)  # the area over the number of slave nodes
     assert subject().with_penalty(7).residual(PAIR, None, Z).tolist() == (7 * Z).tolist()
 
 
 def test_a_residual_alone_is_a_plugin() -> None:
-    class Least:
-        def residual(self, interface: Interface, pairing: None, z: Any) -> Any:
-            assert pairing is None
-            return -z
+    def residual(interface: Interface, pairing: None, z: Any) -> Any:
+        assert pairing is None
+        return -z
 
-    least = Subject("least", lambda *, penalty: Least())
+    least = Subject("least", lambda *, penalty: SimpleNamespace(residual=residual))
     assert least.provides == frozenset()
     assert least.traits == Traits()
     guarded = least.for_case(CASE)
@@ -278,13 +283,6 @@ def test_one_bad_state_of_a_batch() -> None:
             guarded.residual(PAIR, None, BATCH)
 
 
-class Misspelt:
-    """A plugin whose method has another name."""
-
-    def residuals(self, interface: Interface, pairing: Pairing, z: Any) -> Any:
-        return z
-
-
 def springs_with(**parts: Any) -> Callable[..., Any]:
     return lambda *, penalty: Springs(penalty, **parts)
 
@@ -294,7 +292,11 @@ def springs_with(**parts: Any) -> Callable[..., Any]:
     [
         (raising, PluginError, "make: ZeroDivisionError: by nothing"),
         (lambda: Springs(1.0), ContractError, r"make: found <lambda>\(\) \(.*\); needed <lambda>\(\*, penalty\)"),
-        (lambda *, penalty: Misspelt(), ContractError, "without a `residual`; the nearest name is `residuals`"),
+        (
+            lambda *, penalty: SimpleNamespace(residuals=0),
+            ContractError,
+            "without a `residual`; the nearest name is `residuals`",
+        ),
         (lambda *, penalty: None, ContractError, "make: returned a NoneType without a `residual`"),
         (springs_with(residual=Z), ContractError, "make: returned a Springs without a `residual`"),
         (springs_with(traits={"tangent": "exact"}), ContractError, "traits: found a dict; needed"),
@@ -328,33 +330,17 @@ def test_a_factory_that_fails_for_the_penalty_of_the_case() -> None:
     ],
 )
 def test_multipliers_and_the_trait_go_together(enforcement: Any, count: Any, message: str) -> None:
-    class Counting:
-        traits = Traits(rules=Rules(enforcement=enforcement))
-
-        def n_multipliers(self, interface: Interface) -> Any:
-            return count
-
-        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
-            return z
-
-    guarded = Subject("counting", lambda *, penalty: Counting()).with_penalty(1.0)
+    counting = subject(traits=Traits(rules=Rules(enforcement=enforcement)), n_multipliers=always(count))
     with pytest.raises(ContractError, match=re.escape(message)):
-        guarded.n_multipliers(PAIR)
+        counting.with_penalty(1.0).n_multipliers(PAIR)
 
 
 def test_multipliers_are_counted_once_an_interface() -> None:
-    class Restless:
-        traits = Traits(rules=Rules(enforcement="multiplier"))
-        count = 0
-
-        def n_multipliers(self, interface: Interface) -> int:
-            self.count += 1
-            return self.count
-
-        def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
-            return z
-
-    guarded = Subject("restless", lambda *, penalty: Restless()).with_penalty(1.0)
+    counts = iter((1, 2, 3))
+    restless = subject(
+        traits=Traits(rules=Rules(enforcement="multiplier")), n_multipliers=lambda interface: next(counts)
+    )
+    guarded = restless.with_penalty(1.0)
     assert [guarded.n_multipliers(PAIR) for _ in range(3)] == [1, 1, 1]
     assert guarded.n_multipliers(PAIR.swap_roles()) == 2
 
