@@ -1,27 +1,20 @@
-"""The errors of a solved scene whose exact solution is known, measured in one way for all formulations.
+"""A solved scene, and its errors where the exact solution is known, measured in one way for all formulations.
 
-- `force_error`: nodal forces of one surface, sqrt(Σ|F_i − F_i^exact|²/m_i) over sqrt(Σ|F_i^exact|²/m_i), m_i = ∫N_i ds.
-- `pressure_error`: reported pressures, the root of the mean of (p − p^exact)² with the plugin's own weights.
-- `best_pressure_error`: what `pressure_error` would be of the best linear pressure on the mesh.
-- `displacement_error`: displacements of a surface, sqrt(∫|u_h − u^exact|² ds) over sqrt(∫|u^exact|² ds).
-- `fit_rate`: the power of h by which the errors on several meshes fall.
-
-Rules for the next editor: nothing here knows a scene. The exact field is a function of places (n, 2), in the reference
-or in the current configuration, whichever the positions are that come with it. A field that is not smooth inside a
-segment needs more `parts`.
+An exact field is a function of places (n, 2), in the reference or in the current configuration, whichever the positions
+are that come with it. A field that is not smooth inside a segment needs more `parts`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg
 
-from contactverif.contract.arrays import FloatArray, IntArray, freeze
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.errors import MisuseError, one_line
@@ -35,7 +28,8 @@ Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), o
 
 # A pressure may end inside a segment with a vertical tangent: so many parts leave 1e-3 of its error.
 _PARTS_OF_EDGE = 32
-GAUSS_POINTS = 6  # On each part of a segment: exact for a field of degree 10 times a shape function.
+# On each part of a segment, from −1 to 1: exact for a field of degree 10 times a shape function.
+_ABSCISSAS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +104,7 @@ def traction_forces(surface: Surface, positions: FloatArray, traction: Field, pa
 
 
 def force_error(forces: FloatArray, exact: FloatArray, integrals: FloatArray) -> float:
-    """Return E_F, the error of nodal forces (n_nodes, 2) over the exact ones, dimensionless.
+    """Return E_F = sqrt(Σ|F_i − F_i^exact|²/m_i) / sqrt(Σ|F_i^exact|²/m_i) of nodal forces (n_nodes, 2), dimensionless.
 
     The integrals are m_i = ∫N_i ds (n_nodes,). Nodes where it is 0 do not count, so that those of one surface select
     it.
@@ -133,11 +127,14 @@ def pressure_error(solution: Solution, exact: Field, scale: float) -> float | No
     points = solution.points
     if points is None or points.on_master.any():
         return None
+    places, weights = points.position, points.weight
+    pressures = np.where(points.active, points.pressure, 0.0)
     if solution.nodal:
-        places, pressures, weights = _pressures_of_nodal_forces(solution, points)
-    else:
-        places, weights = points.position, points.weight
-        pressures = np.where(points.active, points.pressure, 0.0)
+        surface, positions, n = solution.interface.slave, solution.state.positions, solution.interface.n_slave_nodes
+        named = points.slave_segment >= 0
+        nodes = surface.segments[points.slave_segment[named], (points.c[named] > 0).astype(np.int64)]
+        places, weights = positions[:n], shape_integrals(surface, positions)[:n]
+        pressures = np.bincount(nodes, weights=pressures[named], minlength=n) / weights
     counted = weights > 0
     if not counted.any():
         return np.inf
@@ -167,7 +164,7 @@ def best_pressure_error(surface: Surface, positions: FloatArray, exact: Field, s
 def displacement_error(
     surface: Surface, positions: FloatArray, displacements: FloatArray, exact: Field, parts: int = 1
 ) -> float:
-    """Return the L2 error of the displacements of a surface over the L2 norm of the exact ones.
+    """Return sqrt(∫|u_h − u^exact|² ds) / sqrt(∫|u^exact|² ds) of the displacements of a surface.
 
     Positions (n_nodes, 2) and the places of the exact field are those of the reference. Displacements (n_nodes, 2) are
     interpolated linearly. Each segment is divided into equal parts.
@@ -196,31 +193,10 @@ def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | Floa
 
 def _quadrature(surface: Surface, positions: FloatArray, parts: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return shares of a segment (n_points,), places (n_segments, n_points, 2) and weights (n_segments, n_points)."""
-    share, weights = _rule(parts)
+    share = ((np.arange(parts)[:, None] + (_ABSCISSAS + 1) / 2) / parts).reshape(-1)
     first, second = positions[surface.segments[:, 0]], positions[surface.segments[:, 1]]
     places = first[:, None] + share[:, None] * (second - first)[:, None]
-    return share, places, surface.lengths(positions)[:, None] * weights
-
-
-@cache
-def _rule(parts: int) -> tuple[FloatArray, FloatArray]:
-    """Return shares of a segment that is divided into equal parts, and their weights."""
-    abscissas, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    share = ((np.arange(parts)[:, None] + (abscissas + 1) / 2) / parts).reshape(-1)
-    return freeze(share, np.float64), freeze(np.tile(weights / (2 * parts), parts), np.float64)
-
-
-def _pressures_of_nodal_forces(solution: Solution, points: ContactPoints) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places (n_slave_nodes, 2), pressures F_i/m_i and weights m_i (n_slave_nodes,) of reported nodal forces."""
-    surface, positions = solution.interface.slave, solution.state.positions
-    n_nodes = solution.interface.n_slave_nodes
-    named = points.slave_segment >= 0
-    ends: IntArray = (points.c[named] > 0).astype(np.int64)
-    numbers = surface.segments[points.slave_segment[named], ends]
-    reported = np.where(points.active, points.pressure, 0.0)[named]
-    forces = np.bincount(numbers, weights=reported, minlength=n_nodes)
-    integrals = shape_integrals(surface, positions)[:n_nodes]
-    return positions[:n_nodes], forces / integrals, integrals
+    return share, places, surface.lengths(positions)[:, None] * np.tile(_GAUSS_WEIGHTS / (2 * parts), parts)
 
 
 # Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
@@ -257,23 +233,12 @@ def solve_in_tries(
     The arguments are those of `solve_for_accuracy`. With `solution_only`, calls are saved, see `solve`. Where one
     difference confirms the tangent that did not help, it stands for differences of each unknown.
     """
-    ways = (True, False) if "tangent" in formulation.provides else (True,)
-    traces = []
-    for use_tangent in ways:
-        trace = solve(
-            scene,
-            formulation,
-            start=start,
-            tolerance=BALANCED,
-            difference_step=step,
-            use_tangent=use_tangent,
-            any_matrix=not use_tangent,
-            solution_only=solution_only,
-        )
-        traces.append(trace)
-        if trace.converged:
-            break
-    return tuple(traces)
+    options: dict[str, Any] = {"start": start, "tolerance": BALANCED, "difference_step": step}
+    options["solution_only"] = solution_only
+    trace = solve(scene, formulation, **options)
+    if trace.converged or "tangent" not in formulation.provides:
+        return (trace,)
+    return trace, solve(scene, formulation, use_tangent=False, any_matrix=True, **options)
 
 
 def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -> Solution:
@@ -301,14 +266,5 @@ def solve_by_engine(
     except MisuseError as error:
         return Solution.from_displacements(scene, np.zeros_like(scene.interface.nodes), str(error)), None
     answer = pose.restore(subject.solve(pose.arrays))
-    return engine_solution(scene, answer), answer
-
-
-def engine_solution(scene: Scene, answer: EngineAnswer) -> Solution:
-    """Return the solution of a scene that an answer is, which `Pose.restore` returned.
-
-    Its forces are those that the condensed bodies need for the displacements of the interface's nodes, so that the
-    cells of the code do not matter.
-    """
     no_solution = "" if answer.converged else f"did not converge: {one_line(answer.message) or 'no words about it'}"
-    return Solution.from_displacements(scene, answer.displacements[scene.nodes_in_reach], no_solution)
+    return Solution.from_displacements(scene, answer.displacements[scene.nodes_in_reach], no_solution), answer

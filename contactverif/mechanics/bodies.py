@@ -1,7 +1,7 @@
 """Bodies: a rectangle of quadrilaterals, a rigid surface, and a mesh of scikit-fem with named boundaries.
 
-The first two are drawn upright, in a plane of their own, and then placed: rotated, shifted and scaled. `Body` checks
-whatever can be wrong with a body; what is lost once it is made is checked here, by the name of the argument.
+`Body` checks whatever can be wrong with a body; what is lost once it is made is checked here, by the name of the
+argument.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import skfem
 from numpy.typing import ArrayLike
 
-from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, as_floats, freeze
+from contactverif.contract.arrays import FloatArray, IntArray, as_floats, freeze
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 
@@ -133,7 +133,13 @@ def block(
     >>> scene.interface.n_slave_nodes, scene.n_free
     (3, 8)
     """
-    x, y = _grid_lines(f"{name}: x", rectangle.x), _grid_lines(f"{name}: y", rectangle.y)
+    grid = []
+    for word, values in (("x", rectangle.x), ("y", rectangle.y)):
+        lines = as_floats(f"{name}: {word}", values, (-1,))
+        if len(lines) < 2 or not (np.isfinite(lines).all() and (np.diff(lines) > 0).all()):
+            raise MisuseError(f"{name}: {word}", f"{lines.tolist()}", "at least two ascending coordinates")
+        grid.append(lines)
+    x, y = grid
     axis = as_floats(f"{name}: axis", placing.axis, (2,))
     as_floats(f"{name}: shift", placing.shift, (2,))
     if contact not in ("bottom", "top"):
@@ -215,17 +221,8 @@ def rigid_surface(
     )
 
 
-def _grid_lines(argument: str, values: ArrayLike) -> FloatArray:
-    """Return ascending coordinates (n,) as floats, checked."""
-    coordinates = as_floats(argument, values, (-1,))
-    if len(coordinates) < 2 or not (np.isfinite(coordinates).all() and (np.diff(coordinates) > 0).all()):
-        raise MisuseError(argument, f"{coordinates.tolist()}", "at least two ascending coordinates")
-    return coordinates
-
-
 @lru_cache(maxsize=256)
 def _cells_of_grid(n_rows: int, n_columns: int) -> IntArray:
-    """Return the cells (n_cells, 4) of a rectangle with so many rows and columns of nodes."""
     return freeze(grid_cells(np.arange(n_rows * n_columns).reshape(n_rows, n_columns)), np.int64)
 
 
@@ -305,37 +302,17 @@ def body_from_mesh(
     points, cells = np.asarray(mesh.p).T, np.asarray(mesh.t).T
     cells = turn_counter_clockwise(points, cells)
     edges = {tag: _edges(mesh, cells, tag) for tag in dict.fromkeys([contact, *supports, *pressures])}
-    fixed, imposed = _supports(points, edges, supports, displacements)
-    load = _loads(points, edges, pressures)
-    return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
-
-
-def _supports(
-    points: FloatArray,
-    edges: Mapping[str, IntArray],
-    supports: Mapping[str, str],
-    displacements: Mapping[str, tuple[float, float]],
-) -> tuple[BoolArray, FloatArray]:
-    """Return which components are fixed, and the displacements imposed there, both (n_nodes, 2)."""
-    fixed, imposed = np.zeros(points.shape, bool), np.zeros(points.shape)
+    fixed, imposed, load = np.zeros(points.shape, bool), np.zeros(points.shape), np.zeros(points.shape)
     for tag, direction in supports.items():
         components = {"along": [0], "across": [1], "both": [0, 1]}.get(direction)
         if components is None:
             raise MisuseError(f"supports[{tag!r}]", repr(direction), "'along', 'across' or 'both'")
-        nodes = np.unique(edges[tag])
         displacement = _check_displacement(tag, displacements.get(tag, (0.0, 0.0)), components)
-        for component in components:
-            fixed[nodes, component] = True
-            imposed[nodes, component] = displacement[component]
+        place = np.unique(edges[tag])[:, None], components
+        fixed[place], imposed[place] = True, displacement[components]
     if unsupported := set(displacements) - set(supports):
         needed = "a boundary that supports name"
         raise MisuseError(f"displacements[{min(unsupported)!r}]", "no supports there", needed)
-    return fixed, imposed
-
-
-def _loads(points: FloatArray, edges: Mapping[str, IntArray], pressures: Mapping[str, float]) -> FloatArray:
-    """Return the nodal forces (n_nodes, 2) of pressures on boundaries."""
-    load = np.zeros(points.shape)
     for tag, pressure in pressures.items():
         if np.ndim(pressure) != 0 or np.asarray(pressure).dtype.kind not in "fiu":
             raise MisuseError(f"pressures[{tag!r}]", repr(pressure), "a number")
@@ -343,18 +320,17 @@ def _loads(points: FloatArray, edges: Mapping[str, IntArray], pressures: Mapping
         along = points[second] - points[first]
         for end in (first, second):
             np.add.at(load, end, pressure / 2 * np.column_stack([-along[:, 1], along[:, 0]]))
-    return load
+    return Body(points, cells, edges[contact], young, poisson, fixed, imposed, load, name=name)
 
 
 def _check_displacement(tag: str, values: Any, components: list[int]) -> FloatArray:
-    """Return the displacement (2,) of a boundary, checked: 0 where nothing is fixed."""
     try:
         displacement = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
         displacement = np.zeros(0)
     if displacement.shape != (2,):
         raise MisuseError(f"displacements[{tag!r}]", repr(values), "two numbers, along and across")
-    if displacement[[component for component in (0, 1) if component not in components]].any():
+    if np.delete(displacement, components).any():
         raise MisuseError(f"displacements[{tag!r}]", "a displacement of a free component", "0 where nothing is fixed")
     return displacement
 

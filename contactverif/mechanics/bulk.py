@@ -40,6 +40,34 @@ _MOTIONS = ("move along its first axis", "move along its second axis", "turn")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Matrices:
+    """The matrices that follow from mesh, material and supports of a body; loads have no part in them."""
+
+    unknowns: IntArray  # (n,) The free components on the contact boundary.
+    interior: IntArray  # All others that are free.
+    whole: Any  # (2 n_nodes, 2 n_nodes) The stiffness matrix.
+    across: Any  # (n_interior, n) The part of it that couples the interior with the unknowns.
+    # Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
+    solve: Callable[[FloatArray], FloatArray]
+    influence: Callable[[FloatArray], FloatArray]  # From the unknowns (n,) to their effect on the interior.
+    condensed: FloatArray  # (n, n) The condensed stiffness, symmetric.
+    gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
+
+
+_NONE, _NO_MATRIX = np.zeros(0, np.int64), np.zeros((0, 0))
+_RIGID = _Matrices(
+    _NONE,
+    _NONE,
+    _NO_MATRIX,
+    _NO_MATRIX,
+    _NO_MATRIX.__matmul__,
+    _NO_MATRIX.__matmul__,
+    _NO_MATRIX,
+    np.zeros((0, 1, 4, 2)),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CondensedBody:
     """A body condensed onto its contact boundary. S q − g are the forces that contact must supply.
 
@@ -47,13 +75,19 @@ class CondensedBody:
     """
 
     body: Body
-    unknowns: IntArray  # (n,) The free components on the contact boundary: 2 × node + component, in the body's axes.
-    stiffness: FloatArray  # (n, n) The condensed stiffness S, symmetric, force per length.
     load: FloatArray  # (n,) The condensed load g, a force, of nodal forces and of imposed displacements.
-    _interior: IntArray
     _particular: FloatArray  # (2 n_nodes,): the displacements if all unknowns are 0.
-    _influence: Callable[[FloatArray], FloatArray]  # From the unknowns (n,) to their effect on the interior.
-    _gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
+    _matrices: _Matrices
+
+    @property
+    def unknowns(self) -> IntArray:
+        """The free components (n,) on the contact boundary: 2 × node + component, in the body's axes."""
+        return self._matrices.unknowns
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """The condensed stiffness S (n, n), symmetric, force per length."""
+        return self._matrices.condensed
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return the displacements (n_nodes, 2) of all nodes, a length each, in global axes.
@@ -61,7 +95,7 @@ class CondensedBody:
         `q` (n,) are the unknowns, and `factor` is the share of loads and imposed displacements.
         """
         u = factor * self._particular
-        u[self._interior] += self._influence(q)
+        u[self._matrices.interior] += self._matrices.influence(q)
         u[self.unknowns] = q
         return u.reshape(-1, 2) @ self.body.frame.T
 
@@ -72,11 +106,9 @@ class CondensedBody:
         are those of `displacements`.
         """
         u = (self.displacements(q, factor) @ self.body.frame)[self.body.cells]  # (n_cells, n_corners, 2)
-        gradient = np.einsum("eqad,eac->eqcd", self._gradients, u)
-        strain = np.stack(
-            [gradient[..., 0, 0], gradient[..., 1, 1], gradient[..., 0, 1] + gradient[..., 1, 0]], axis=-1
-        )
-        return strain @ elasticity(self.body).T
+        gradient = np.einsum("eqad,eac->eqcd", self._matrices.gradients, u)
+        shear = gradient[..., 0, 1] + gradient[..., 1, 0]
+        return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1) @ elasticity(self.body).T
 
 
 def elasticity(body: Body) -> FloatArray:
@@ -144,10 +176,7 @@ def condense(body: Body) -> CondensedBody:
     """
     imposed = body.imposed.reshape(-1)
     if body.rigid:
-        none, unknowns = np.zeros((0, 0)), free_on_contact(body)
-        interior = np.zeros(0, np.int64)
-        gradients = np.zeros((0, 1, 4, 2))
-        return CondensedBody(body, unknowns, none, np.zeros(0), interior, imposed, none.__matmul__, gradients)
+        return CondensedBody(body, np.zeros(0), imposed, _RIGID)
     corners = body.nodes[body.cells] - body.nodes[body.cells[:, :1]]
     arrays = (corners, body.cells, body.fixed, body.contact_nodes, body.axis)
     key = (body.cells.shape, body.young, body.poisson, *(array.tobytes() for array in arrays))
@@ -158,31 +187,8 @@ def condense(body: Body) -> CondensedBody:
     response = matrices.solve(forces[matrices.interior])
     particular = imposed.copy()
     particular[matrices.interior] = response
-    return CondensedBody(
-        body,
-        matrices.unknowns,
-        matrices.condensed,
-        forces[matrices.unknowns] - matrices.across.T @ response,
-        matrices.interior,
-        particular,
-        matrices.influence,
-        matrices.gradients,
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Matrices:
-    """The matrices that follow from mesh, material and supports of an elastic body; loads have no part in them."""
-
-    unknowns: IntArray  # The free components on the contact boundary.
-    interior: IntArray  # All others that are free.
-    whole: Any  # (2 n_nodes, 2 n_nodes) The stiffness matrix.
-    across: Any  # (n_interior, n) The part of it that couples the interior with the unknowns.
-    # Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
-    solve: Callable[[FloatArray], FloatArray]
-    influence: Callable[[FloatArray], FloatArray]  # From the unknowns (n,) to their effect on the interior.
-    condensed: FloatArray  # (n, n) The condensed stiffness, symmetric.
-    gradients: FloatArray  # (n_cells, n_points, n_corners, 2) The gradients of the shape functions.
+    load = forces[matrices.unknowns] - matrices.across.T @ response
+    return CondensedBody(body, load, particular, matrices)
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,26 +253,23 @@ def _interior_solver(body: Body, matrix: Any) -> tuple[Callable[[FloatArray], Fl
     order = None
     if not matrix.shape[0]:
         return lambda forces: forces, order
+    actual = "a part that hangs neither on a support nor on the contact boundary"
+    loose_part = MisuseError(f"{body.name}: cells", actual, "one connected mesh, or supports for each part")
     if sparse.issparse(matrix):
         try:
             factors = splu(matrix.tocsc(), **_SYMMETRIC)
         except RuntimeError:  # The matrix is exactly singular.
-            raise _loose_part_error(body) from None
+            raise loose_part from None
         pivots, order = np.abs(factors.U.diagonal()[factors.perm_c]), np.argsort(factors.perm_c)
         solve: Callable[[FloatArray], FloatArray] = factors.solve
     else:
         factor, info = lapack.dpotrf(matrix, lower=1)
         if info != 0:
-            raise _loose_part_error(body)
+            raise loose_part
         pivots, solve = factor.diagonal() ** 2, lambda forces: lapack.dpotrs(factor, forces, lower=1)[0]
     if not (pivots > _PIVOT_FLOOR * matrix.diagonal()).all():
-        raise _loose_part_error(body)
+        raise loose_part
     return solve, order
-
-
-def _loose_part_error(body: Body) -> MisuseError:
-    actual = "a part that hangs neither on a support nor on the contact boundary"
-    return MisuseError(f"{body.name}: cells", actual, "one connected mesh, or supports for each part")
 
 
 def loose_modes(body: Body) -> list[str]:
@@ -293,6 +296,5 @@ def loose_modes(body: Body) -> list[str]:
     sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])
     # Motions are numbers without dimension, of order 1: resistance below the floor is roundoff.
     free = motions[sizes <= _RESISTANCE_FLOOR * max(sizes.max(), 1.0)]
-    return [
-        words for words, part in zip(_MOTIONS, free.T, strict=True) if len(free) and np.abs(part).max() > _MOTION_FLOOR
-    ]
+    parts = zip(_MOTIONS, np.abs(free).T, strict=True)
+    return [words for words, part in parts if part.max(initial=0.0) > _MOTION_FLOOR]

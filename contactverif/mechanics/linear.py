@@ -9,7 +9,6 @@ worse than none, because it looks like a solution.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,8 +27,6 @@ RANK_ROUNDOFF = 8.0
 _FAR_FROM_SINGULAR = 2.0**-20
 # A whole system has the pattern of its bodies, which is symmetric, and then this ordering fills less.
 _LARGE, _ORDERING = 10_000, {"permc_spec": "MMD_AT_PLUS_A"}
-
-Solver = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,10 +90,20 @@ def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArra
     """Return the shortest solution and the number of multipliers that are not unique.
 
     The solution is None if positions are not unique, or if constraints contradict one another. Positions that bodies
-    and open contact hold are eliminated first, since singular values of so much less take a small part of the time.
+    and open contact hold are eliminated first, since singular values of so much less take a small part of the time: all
+    positions or none, because the singular vectors of a stiffness near to singular are needed.
     """
     full = dense(matrix)
-    n, condition, solve, solve_transposed = _eliminate(full[:n_positions, :n_positions])
+    stiffness = full[:n_positions, :n_positions]
+    factors, pivots, info = lapack.dgetrf(stiffness)
+    condition = lapack.dgecon(factors, np.abs(stiffness).sum(axis=0).max())[0] if info == 0 and len(stiffness) else 0.0
+    eliminated = condition > _FAR_FROM_SINGULAR
+    n, condition = (n_positions, float(np.float32(condition))) if eliminated else (0, 1.0)  # As in `_factorise`.
+
+    def solve(forces: FloatArray, transposed: int = 0) -> FloatArray:
+        answer = lapack.dgetrs(factors, pivots, forces, trans=transposed)[0] if eliminated else np.array(forces)
+        return np.asarray(answer)
+
     effect, particular = solve(full[:n, n:]), solve(right[:n])  # On positions, of multipliers and of the right side
     left, values, right_vectors = linalg.svd(full[n:, n:] - full[n:, :n] @ effect)
     zero = RANK_ROUNDOFF * len(right) * UNIT_ROUNDOFF / condition  # As a share of the largest value
@@ -107,7 +114,7 @@ def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArra
     blur = zero * values[0] / values[rank - 1]  # Error of singular vectors.
     null, contradicting = right_vectors[rank:].T, left[:, rank:]
     moving = np.abs(np.concatenate([effect @ null, null])[:n_positions]).max(initial=0.0)
-    contradicting = np.concatenate([-solve_transposed(full[n:, :n].T @ contradicting), contradicting])
+    contradicting = np.concatenate([-solve(full[n:, :n].T @ contradicting, 1), contradicting])
     contradiction = np.abs(contradicting.T @ right)
     rounding = np.abs(contradicting.T) @ floor + blur * np.abs(right).max(initial=0.0)
     if moving > blur or (contradiction > rounding).any():
@@ -117,57 +124,29 @@ def _shortest(matrix: Any, right: FloatArray, n_positions: int, floor: FloatArra
     return np.concatenate([particular - effect @ last, last]), deficiency
 
 
-def _eliminate(stiffness: FloatArray) -> tuple[int, float, Solver, Solver]:
-    """Return how many positions can be eliminated, the condition of their stiffness, and its two solvers.
-
-    They are all positions or none: the stiffness (n, n) is far from singular, or its singular vectors are needed.
-    """
-    factors, pivots, info = lapack.dgetrf(stiffness)
-    condition = lapack.dgecon(factors, np.abs(stiffness).sum(axis=0).max())[0] if info == 0 and len(stiffness) else 0.0
-    if condition <= _FAR_FROM_SINGULAR:
-        return 0, 1.0, np.array, np.array
-
-    def solve(right: FloatArray) -> FloatArray:
-        solution: FloatArray = lapack.dgetrs(factors, pivots, right)[0]
-        return solution
-
-    def solve_transposed(right: FloatArray) -> FloatArray:
-        solution: FloatArray = lapack.dgetrs(factors, pivots, right, trans=1)[0]
-        return solution
-
-    return len(stiffness), float(np.float32(condition)), solve, solve_transposed  # As in `_factorise`.
-
-
 def _factorise(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
-    """Return the solution, None if there is none, and an estimate of 1/cond in single precision.
+    """Return the solution, None if there is none, and an estimate of 1/cond, 0 then.
 
-    The last digits of LAPACK's estimate depend on where its workspace lies in memory, and so change from run to run.
+    It is in single precision: the last digits of LAPACK's estimate depend on where its workspace lies in memory, and so
+    change from run to run.
     """
-    step, condition = (_solve_dense if isinstance(matrix, np.ndarray) else _solve_sparse)(matrix, right)
-    return step, float(np.float32(condition))
-
-
-def _solve_dense(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
-    if not len(right):
-        return right, 1.0
-    if not np.isfinite(matrix).all():
-        return None, 0.0
-    factors, pivots, info = lapack.dgetrf(matrix)
-    if info > 0:
-        return None, 0.0
-    condition, _ = lapack.dgecon(factors, np.abs(matrix).sum(axis=0).max())
-    step, _ = lapack.dgetrs(factors, pivots, right)
-    return step, float(condition)
-
-
-def _solve_sparse(matrix: Any, right: FloatArray) -> tuple[FloatArray | None, float]:
+    if isinstance(matrix, np.ndarray):
+        if not len(right):
+            return right, 1.0
+        if not np.isfinite(matrix).all():
+            return None, 0.0
+        factors, pivots, info = lapack.dgetrf(matrix)
+        if info > 0:
+            return None, 0.0
+        condition = lapack.dgecon(factors, np.abs(matrix).sum(axis=0).max())[0]
+        return lapack.dgetrs(factors, pivots, right)[0], float(np.float32(condition))
     try:
         factors = splu(matrix.tocsc(), **_ORDERING if len(right) > _LARGE else {})
     except RuntimeError:  # The matrix is exactly singular.
         return None, 0.0
     step = factors.solve(right)
     inverse_norm = _estimate_inverse_norm(factors, matrix.shape[0], right, step)
-    return step, float(1 / (abs(matrix).sum(axis=0).max() * inverse_norm))
+    return step, float(np.float32(1 / (abs(matrix).sum(axis=0).max() * inverse_norm)))
 
 
 def _estimate_inverse_norm(factors: Any, n: int, right: FloatArray, step: FloatArray) -> float:

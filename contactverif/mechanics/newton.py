@@ -8,7 +8,7 @@ is recorded, `End` says how the iteration ended, and only a plugin that breaks t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -176,6 +176,7 @@ class _Iterate:
 
     u: FloatArray
     pairings: Pairing | None
+    forces: FloatArray
     changes: int
     factors: float
     residuals: float
@@ -184,33 +185,6 @@ class _Iterate:
     energies: float = np.nan
     conditions: float = np.nan
     deficiencies: int = 0
-
-
-@dataclass(slots=True)
-class Record:
-    """The trace of a solution that is still running."""
-
-    iterates: list[_Iterate] = field(default_factory=list)
-    forces: FloatArray = field(default_factory=lambda: np.zeros(0))
-
-    def trace(self, scene: Scene, end: End) -> Trace:
-        """Return the trace of the iterates so far."""
-
-        def column(name: str) -> list[Any]:
-            return [getattr(iterate, name) for iterate in self.iterates]
-
-        reals = ("u", "factors", "residuals", "energies", "floors", "roundings", "conditions")
-        arrays: dict[str, Any] = {name: freeze(np.array(column(name)), np.float64) for name in reals}
-        arrays |= {name: freeze(column(name), np.int64) for name in ("changes", "deficiencies")}
-        forces = freeze(self.forces, np.float64)
-        return Trace(scene, end, pairings=tuple(column("pairings")), forces=forces, **arrays)
-
-
-def _largest_rounding(residual: FloatArray, floor: FloatArray) -> float:
-    """Return the largest ratio of an entry of the residual (n,) to what roundoff may cause in it."""
-    with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
-        roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
-    return float(roundings.max(initial=0.0))
 
 
 MAX_ITERATIONS = 40
@@ -287,9 +261,8 @@ def solve(
     for name, number in (("load_steps", load_steps), ("iterations", iterations)):
         if number < 1:
             raise MisuseError(name, f"{number}", "at least 1")
-    any_matrix = any_matrix or solution_only
-    system = System(scene, formulation, use_tangent=use_tangent, difference_step=difference_step, any_matrix=any_matrix)
-    record, keep_matrix = Record(), solution_only and not system.n_multipliers
+    system = System(scene, formulation, 1.0, use_tangent, difference_step, any_matrix or solution_only)
+    keep_matrix = solution_only and not system.n_multipliers
     u = scene.start / load_steps if start is None else np.array(start, dtype=np.float64)
     if u.shape not in ((scene.n_free,), (system.size,)):
         behind = f", or ({system.size},) with multipliers" if system.n_multipliers else ""
@@ -297,43 +270,56 @@ def solve(
     if not np.isfinite(u).all():
         raise MisuseError("start", "NaN or infinity", "finite numbers")
     u = np.append(u, np.zeros(system.size - len(u)))
-    end = End.CONVERGED
+    iterates: list[_Iterate] = []
     for number in range(1, load_steps + 1):
         system.factor = number / load_steps
-        end, u = _load_step(system, record, u, iterations, tolerance, keep_matrix)
+        end, further = _load_step(system, u, iterations, tolerance, keep_matrix)
+        iterates += further
         if end is not End.CONVERGED:
             break
-    return record.trace(scene, end)
+        u = iterates[-1].u
+    return _trace(scene, end, iterates)
+
+
+def _trace(scene: Scene, end: End, iterates: list[_Iterate]) -> Trace:
+    def column(name: str) -> list[Any]:
+        return [getattr(iterate, name) for iterate in iterates]
+
+    reals = ("u", "factors", "residuals", "energies", "floors", "roundings", "conditions")
+    arrays: dict[str, Any] = {name: freeze(np.array(column(name)), np.float64) for name in reals}
+    arrays |= {name: freeze(column(name), np.int64) for name in ("changes", "deficiencies")}
+    forces = freeze(iterates[-1].forces if iterates else np.zeros(0), np.float64)
+    return Trace(scene, end, pairings=tuple(column("pairings")), forces=forces, **arrays)
 
 
 def _load_step(
-    system: System, record: Record, u: FloatArray, iterations: int, tolerance: float, keep_matrix: bool
-) -> tuple[End, FloatArray]:
-    """Iterate from u (n,) at the system's load factor; return how that ended and the last iterate."""
-    iterates: list[_Iterate] = []  # Those of this load step.
+    system: System, u: FloatArray, iterations: int, tolerance: float, keep_matrix: bool
+) -> tuple[End, list[_Iterate]]:
+    """Iterate from u (n,) at the system's load factor; return how that ended and the iterates."""
+    iterates: list[_Iterate] = []
     before: Pairing | None = None
     contact: Any = None
     last: Any = None
     n_free, floor = system.scene.n_free, np.zeros(system.size)
     size = float(np.abs(system.scene.interface.nodes).max())
-    for iteration in range(iterations + 1):
+    while True:
         if not np.isfinite(u).all() or np.abs(u[:n_free]).max(initial=0.0) > DIVERGENCE_FACTOR * size:
-            return End.DIVERGED, u  # No plugin is called for such a state.
+            return End.DIVERGED, iterates  # No plugin is called for such a state.
         pairing, tangent = system.pair(u), None
         comparable: Any = 1.0
-        share = tolerance * (iteration > 0)
+        share = tolerance if iterates else 0.0
         if share > 0 or keep_matrix:  # The last iterate needs no tangent, nor does one that keeps the matrix.
             forces = system.forces(u, pairing)
         else:
-            forces, tangent = system.forces_and_tangent(u, pairing)
-        record.forces, residual = forces, system.balance(u, forces)
-        balanced = system.is_balanced(residual, forces, share)
+            ((forces, tangent),) = system.forces_and_tangents([u], pairing)
+        residual = system.balance(u, forces)
+        balanced = False  # Without any contact force nothing is balanced.
+        if share > 0 and not system.n_multipliers:
+            largest = float(np.abs(system.transformation.T @ forces).max(initial=0.0))
+            balanced = largest > 0 and bool(np.abs(residual).max(initial=0.0) <= share * largest)
         # The matrix is kept while a residual is small enough against the last one of this load step.
-        keeps = (
-            keep_matrix
-            and bool(iterates)
-            and (_largest_rounding(residual, floor) <= iterates[-1].roundings / KEPT_FALL)
-        )
+        keeps = keep_matrix and bool(iterates)
+        keeps = keeps and _largest_rounding(residual, floor) <= iterates[-1].roundings / KEPT_FALL
         if not balanced:
             if not keeps:
                 contact = system.contact_stiffness(u, pairing, tangent)
@@ -342,6 +328,7 @@ def _load_step(
         iterate = _Iterate(
             u,
             pairing,
+            forces,
             _count_changes(pairing, before),
             system.factor,
             residuals=float(np.abs(comparable * residual).max(initial=0.0)),
@@ -349,12 +336,11 @@ def _load_step(
             roundings=_largest_rounding(residual, floor),
         )
         iterates.append(iterate)
-        record.iterates.append(iterate)
         end = End.CONVERGED if balanced else _end(iterates, n_free, keeps=keeps)
+        if end is None and len(iterates) > iterations:
+            end = End.EXHAUSTED
         if end is not None:
-            return end, u
-        if iteration == iterations:
-            return End.EXHAUSTED, u
+            return end, iterates
         step = system.step(matrix, -residual, floor)
         if step.change is None and last is not None and iterate.roundings <= NEAR_CONVERGENCE:
             # Near the solution of a tie, where the residual is some units of its floor, roundoff decides who faces
@@ -364,10 +350,16 @@ def _load_step(
             last = matrix
         iterate.conditions, iterate.deficiencies = step.condition, step.deficiency
         if step.change is None:
-            return End.SINGULAR, u
+            return End.SINGULAR, iterates
         iterate.energies = abs(float(step.change @ residual))
         u, before = u + step.change, pairing
-    raise AssertionError("the loop returns")
+
+
+def _largest_rounding(residual: FloatArray, floor: FloatArray) -> float:
+    """Return the largest ratio of an entry of the residual (n,) to what roundoff may cause in it."""
+    with np.errstate(divide="ignore"):  # An entry without any term has no roundoff: only zero is converged.
+        roundings = np.divide(np.abs(residual), floor, where=residual != 0, out=0 * floor)
+    return float(roundings.max(initial=0.0))
 
 
 def _end(iterates: list[_Iterate], n_free: int, *, keeps: bool) -> End | None:

@@ -4,8 +4,7 @@ Symbols: q are the unknowns of a scene, the free components of the nodes on the 
 and g the load of the bodies, condensed onto q; z are the positions of the interface's nodes.
 
 A body that no other can reach is no part of the interface and has none of the unknowns, so nothing of it is visited
-while contact is solved. A case that holds a scene gives the same scene back to the last bit. Whatever a code is spared,
-such as inclined axes, is undone here, so that its answer is measured on the scene itself.
+while contact is solved. A case that holds a scene gives the same scene back to the last bit.
 """
 
 from __future__ import annotations
@@ -45,22 +44,15 @@ def pack_bodies(bodies: Sequence[Body], slave: Sequence[int]) -> dict[str, Float
     """Return all bodies in a few arrays of floats, whose integers are exact; a triangle has −1 for its fourth node."""
     counts = [len(body.nodes) for body in bodies]
     first = np.cumsum([0, *counts[:-1]]).tolist()
-    contact = [body.contact + start for body, start in zip(bodies, first, strict=True)]
-    cells = np.full((sum(len(body.cells) for body in bodies), 4), -1.0)
-    row = 0
-    for body, start in zip(bodies, first, strict=True):
-        n_cells, n_corners = body.cells.shape
-        cells[row : row + n_cells, :n_corners] = body.cells + start
-        row += n_cells
-
-    def stack(*names: str) -> dict[str, FloatArray]:
-        return {name: np.vstack([getattr(body, name) for body in bodies]).astype(np.float64) for name in names}
-
+    corners = [body.cells + start for body, start in zip(bodies, first, strict=True)]
+    parts: dict[str, list[Any]] = {
+        "nodes": [body.nodes for body in bodies],
+        "cells": [np.hstack([part, np.full((len(part), 4 - part.shape[1]), -1)]) for part in corners],
+        "contact": [body.contact + start for body, start in zip(bodies, first, strict=True)],
+        **{name: [getattr(body, name) for body in bodies] for name in ("fixed", "imposed", "load")},
+    }
     return {
-        **stack("nodes"),
-        "cells": cells,
-        "contact": np.vstack(contact).astype(np.float64),
-        **stack("fixed", "imposed", "load"),
+        **{name: np.vstack(arrays).astype(np.float64) for name, arrays in parts.items()},
         "count": np.array(counts, dtype=np.float64),
         "is_slave": np.array([index in slave for index in range(len(bodies))], dtype=np.float64),
         **{name: np.array([getattr(body, name) for body in bodies]) for name in ("young", "poisson", "axis", "start")},
@@ -202,14 +194,19 @@ class Scene:
         Two bodies can reach each other if the boxes around their contact boundaries meet. Each box is widened by its
         own diagonal, and holds both the reference and the first guess.
         """
-        boxes = [_box_in_reach(body) for body in self.bodies]
-
-        def meet(first: int, second: int) -> bool:
-            (low, high), (other_low, other_high) = boxes[first], boxes[second]
-            return bool((low <= other_high).all() and (other_low <= high).all())
-
-        slaves = tuple(body for body in self.slave if any(meet(body, other) for other in self.master))
-        masters = tuple(body for body in self.master if any(meet(body, other) for other in self.slave))
+        boxes = []
+        for body in self.bodies:
+            nodes = body.nodes[body.contact_nodes]
+            moves = body.start if not body.rigid else body.imposed[body.contact_nodes].mean(axis=0)
+            places = np.vstack([nodes, nodes + body.frame @ moves])
+            low, high = places.min(axis=0), places.max(axis=0)
+            diagonal = np.linalg.norm(high - low)
+            boxes.append((low - diagonal, high + diagonal))
+        lows, highs = np.array(boxes).swapaxes(0, 1)
+        meet = (lows[:, None] <= highs).all(axis=2)
+        meet &= meet.T
+        slaves = tuple(body for body in self.slave if meet[body, list(self.master)].any())
+        masters = tuple(body for body in self.master if meet[body, list(self.slave)].any())
         if not slaves:
             raise MisuseError("bodies", "no slave within reach of a master", "bodies that can touch")
         return slaves + masters
@@ -307,8 +304,7 @@ class Scene:
     @cached_property
     def start(self) -> FloatArray:
         """The first guess (n_free,) of q."""
-        pairs = zip(self._reached, self.unknowns, strict=True)
-        return np.concatenate([body.start[unknowns % 2] for body, unknowns in pairs])
+        return np.concatenate([b.start[part % 2] for b, part in zip(self._reached, self.unknowns, strict=True)])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return the current positions z (n_unknowns,) of the interface's nodes, a length each."""
@@ -411,8 +407,15 @@ class Scene:
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""
         unknowns = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
-        condensed = enumerate(map(condense, self.bodies))
-        return [(body, unknowns[n] if n in unknowns else _solve_alone(body, factor)) for n, body in condensed]
+        condensed = tuple(map(condense, self.bodies))
+        for number, body in enumerate(condensed):
+            if number not in unknowns and len(body.unknowns):
+                stiffnesses, modes = linalg.eigh(body.stiffness)
+                if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
+                    actual = "not enough to hold a body that can touch nothing"
+                    raise MisuseError(f"supports of {body.body.name}", actual, "supports against every motion")
+                unknowns[number] = modes @ (modes.T @ (factor * body.load) / stiffnesses)
+        return [(body, unknowns.get(number, np.zeros(0))) for number, body in enumerate(condensed)]
 
 
 def has_bodies(case: Case) -> bool:
@@ -453,27 +456,6 @@ def scene_of(case: Case) -> Scene:
     scene = Scene(bodies, slave, master, case.penalty, facts, case.name)
     _remember(case, scene)
     return scene
-
-
-def _box_in_reach(body: Body) -> tuple[FloatArray, FloatArray]:
-    nodes, frame = body.nodes[body.contact_nodes], body.frame
-    moves = body.start if not body.rigid else body.imposed[body.contact_nodes].mean(axis=0)
-    places = np.vstack([nodes, nodes + frame @ moves])
-    low, high = places.min(axis=0), places.max(axis=0)
-    diagonal = np.linalg.norm(high - low)
-    return low - diagonal, high + diagonal
-
-
-def _solve_alone(condensed: CondensedBody, factor: float) -> FloatArray:
-    """Return the unknowns (n,) of a body that touches nothing."""
-    if not len(condensed.unknowns):
-        return np.zeros(0)
-    stiffnesses, modes = linalg.eigh(condensed.stiffness)
-    if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
-        actual = "not enough to hold a body that can touch nothing"
-        raise MisuseError(f"supports of {condensed.body.name}", actual, "supports against every motion")
-    alone: FloatArray = modes @ (modes.T @ (factor * condensed.load) / stiffnesses)
-    return alone
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,29 +1,28 @@
 """The equations of a scene and a formulation: residual, derivative, and what roundoff alone may do to the residual.
 
 With multipliers the unknowns u are those of the scene, q, and the multipliers behind them; the system is a saddle
-point. Each number comes from the scene or from the formulation, and nothing decides here how an iteration goes on.
-
-The derivative of contact forces by central differences takes a difference for each unknown. Two matrices are cheaper:
-the formulation's own tangent, and differences along which all nodes move at once that are too far apart to act on the
-same node. Neither can be trusted. But one more difference, along a random direction in which all unknowns move, shows
-an error in any entry.
+point. Where contact forces are differentiated, a difference for each unknown is the derivative. Two matrices are
+cheaper: the formulation's own tangent, and differences along which all nodes move at once that are too far apart to act
+on the same node. Neither can be trusted, but one more difference, along a random direction in which all unknowns move,
+shows an error in any entry.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray, dense
+from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.errors import ContractError
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.subject import CheckedFormulation, lazy
-from contactverif.mechanics import linear
+from contactverif.mechanics.linear import Step, solve_step
 from contactverif.mechanics.scene import Scene
 
 # An error of a matrix by this share of its rows makes each iterate of Newton's method a million times better.
@@ -52,12 +51,16 @@ class Differences:
         """Return differences with smaller steps, if forces have a kink within these: where contact begins, for one.
 
         With ρ the roundoff of positions over the step, the steps are ρ^¼ or √ρ times as large. Where these have kinks,
-        too, the steps stay.
+        too, the steps stay. Without a kink, forces change along the random direction as they do against it.
         """
         forces, rounding = self.forces(self.z), UNIT_ROUNDOFF * float((self.sizes / self.steps)[0])
         for power in (0.0, 0.25, 0.5):
             smaller = replace(self, steps=self.steps * rounding**power)
-            if not smaller._has_kink(forces):
+            _, before, after = smaller._probe
+            change = np.abs(after - before).max(initial=0.0)
+            rounded = float((smaller.sizes / smaller.steps)[0]) * change + np.abs(forces).max(initial=0.0)
+            bend = np.abs(before - 2 * forces + after).max(initial=0.0)  # Four forces, each of which is rounded.
+            if not bend > KINK * change + 4 * ROUNDOFF_FACTOR * UNIT_ROUNDOFF * rounded:
                 return smaller
         return self
 
@@ -72,9 +75,12 @@ class Differences:
         Nodes move at once if no node is within `reach` of two of them. None if that is no less work than `by_unknown`.
         """
         positions = self.z.reshape(-1, 2)
-        distances = np.linalg.norm(positions[:, None] - positions[None], axis=-1)
-        groups = _colours(distances <= 2 * reach)
-        n_groups, n_nodes = int(groups.max()) + 1, len(positions)
+        n_nodes, distances = len(positions), np.linalg.norm(positions[:, None] - positions[None], axis=-1)
+        groups = np.full(n_nodes, -1)
+        for node, near in enumerate(distances <= 2 * reach):
+            others = groups[near]
+            groups[node] = np.setdiff1d(np.arange(len(others) + 1), others)[0]
+        n_groups = int(groups.max()) + 1
         if 2 * n_groups > n_nodes:
             return None
         shifts = np.zeros((n_groups, 2, n_nodes, 2))
@@ -92,30 +98,18 @@ class Differences:
         The change of a force may differ from that of the matrix by `AGREEMENT` of its terms, and by roundoff. A force
         along an inclined normal is rounded in both of its components.
         """
-        (before, after), terms = self._ends, abs(matrix)
+        (direction, before, after), terms = self._probe, abs(matrix)
         rounded = terms @ self.sizes + np.maximum(np.abs(before), np.abs(after))
-        allowed = AGREEMENT * (terms @ np.abs(self._direction)) + ROUNDOFF_FACTOR * UNIT_ROUNDOFF * rounded
+        allowed = AGREEMENT * (terms @ np.abs(direction)) + ROUNDOFF_FACTOR * UNIT_ROUNDOFF * rounded
         allowed[: self.n_positions] = allowed[: self.n_positions].reshape(-1, 2).max(axis=1).repeat(2)
-        return bool((np.abs(matrix @ self._direction - (after - before) / 2) <= allowed).all())
-
-    def _has_kink(self, forces: FloatArray) -> bool:
-        """Return whether forces, given (n,) at z, change otherwise along the random direction than against it."""
-        before, after = self._ends
-        change = np.abs(after - before).max(initial=0.0)
-        rounded = float((self.sizes / self.steps)[0]) * change + np.abs(forces).max(initial=0.0)
-        bend = np.abs(before - 2 * forces + after).max(initial=0.0)  # Four forces, each of which is rounded.
-        return bool(bend > KINK * change + 4 * ROUNDOFF_FACTOR * UNIT_ROUNDOFF * rounded)
-
-    @cached_property
-    def _direction(self) -> FloatArray:
-        """A direction (n,) in which every unknown moves, by half a step to a step."""
-        random = np.random.default_rng(_SEED)
-        return np.asarray(self.steps * random.uniform(0.5, 1.0, len(self.z)) * random.choice([-1.0, 1.0], len(self.z)))
+        return bool((np.abs(matrix @ direction - (after - before) / 2) <= allowed).all())
 
     @lazy
-    def _ends(self) -> FloatArray:
-        """Return the forces (2, n) at z less the direction, and at z plus it."""
-        return self.forces(np.stack([self.z - self._direction, self.z + self._direction]))
+    def _probe(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return a direction (n,), half a step to a step of every unknown, and the forces against it and along it."""
+        random, n = np.random.default_rng(_SEED), len(self.z)
+        direction: FloatArray = self.steps * random.uniform(0.5, 1.0, n) * random.choice([-1.0, 1.0], n)
+        return direction, *self.forces(np.stack([self.z - direction, self.z + direction]))
 
     def _along(self, shifts: FloatArray) -> FloatArray:
         """Return half the change (k, n) of the forces from z − shift to z + shift, for each shift of (k, n)."""
@@ -123,21 +117,12 @@ class Differences:
         return np.asarray((forces[: len(shifts)] - forces[len(shifts) :]) / 2)
 
 
-def _colours(neighbours: BoolArray) -> IntArray:
-    """Return a number (n,) for each node, so that two neighbours never have the same; low ones are taken first."""
-    colours = np.full(len(neighbours), -1)
-    for node, near in enumerate(neighbours):
-        others = colours[near]
-        colours[node] = np.setdiff1d(np.arange(len(others) + 1), others)[0]
-    return colours
-
-
 @dataclass(slots=True)
 class System:
     """The equations S q − g + R(z(u)) = 0 of a scene and a formulation.
 
     S is the stiffness of the bodies, g their load, and R the contact forces on the unknowns. The scene's symbols are
-    those of `contactverif.mechanics.scene`.
+    those of `contactverif.mechanics.scene`; each method takes the unknowns u (n,).
     """
 
     scene: Scene
@@ -160,8 +145,12 @@ class System:
         scene, count = self.scene, self.formulation.n_multipliers(self.scene.interface)
         self.n_multipliers, self.transformation, self.stiffness = count, scene.transformation, scene.stiffness
         if count:
-            self.transformation = _add_diagonal(scene.transformation, 1.0, count)
-            self.stiffness = _add_diagonal(scene.stiffness, 0.0, count)
+            self.transformation, self.stiffness = (
+                linalg.block_diag(matrix, value * np.eye(count))
+                if isinstance(matrix, np.ndarray)
+                else sparse.csr_array(sparse.block_diag([matrix, value * sparse.eye_array(count)]))
+                for matrix, value in ((self.transformation, 1.0), (self.stiffness, 0.0))
+            )
         self._sizes = abs(self.transformation).T, abs(scene.stiffness)
 
     @property
@@ -170,32 +159,28 @@ class System:
         return self.scene.n_free + self.n_multipliers
 
     def state(self, u: FloatArray) -> FloatArray:
-        """Return the state z that a formulation gets at the unknowns u (n,): positions, then multipliers."""
+        """Return the state z that a formulation gets: positions, then multipliers."""
         n_free = self.scene.n_free
         return np.concatenate([self.scene.positions(u[:n_free], self.factor), u[n_free:]])
 
     def pair(self, u: FloatArray) -> Pairing | None:
-        """Return the pairing at the unknowns u (n,), None if the formulation has none."""
+        """Return the pairing, None if the formulation has none."""
         return self.formulation.pair(self.scene.interface, self.state(u))
 
     def forces(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
-        """Return the residual of the formulation alone, (n_unknowns + n_multipliers,), at the unknowns u (n,)."""
+        """Return the residual of the formulation alone, (n_unknowns + n_multipliers,)."""
         return self.formulation.residual(self.scene.interface, pairing, self.state(u))
 
     def tangent(self, u: FloatArray, pairing: Pairing | None) -> Any:
-        """Return the derivative of `forces` at the unknowns u (n,); differences where it must not ask for a tangent."""
+        """Return the derivative of `forces`; differences where it must not ask for a tangent."""
         if self._asks_tangent:
             return self.formulation.tangent(self.scene.interface, pairing, self.state(u))
         return self._differences(pairing, self.state(u))
 
-    def forces_and_tangent(self, u: FloatArray, pairing: Pairing | None) -> tuple[FloatArray, Any]:
-        """Return `forces` and `tangent` at the unknowns u (n,), in one call where that is offered."""
-        return self.forces_and_tangents([u], pairing)[0]
-
     def forces_and_tangents(
         self, states: Sequence[FloatArray], pairing: Pairing | None
     ) -> list[tuple[FloatArray, Any]]:
-        """Return `forces` and `tangent` at each of some unknowns u (n,), in one call where that is offered."""
+        """Return `forces` and `tangent` at each of some unknowns u, in one call where that is offered."""
         if not (self._asks_tangent and "residual_and_tangent" in self.formulation.provides):
             return [(self.forces(u, pairing), self.tangent(u, pairing)) for u in states]
         interface = self.scene.interface
@@ -206,37 +191,22 @@ class System:
         return self.use_tangent and "tangent" in self.formulation.provides
 
     def residual(self, u: FloatArray, pairing: Pairing | None) -> FloatArray:
-        """Return the residual (n,) at the unknowns u (n,): forces out of balance, then constraint rows."""
+        """Return the residual (n,): forces out of balance, then constraint rows."""
         return self.balance(u, self.forces(u, pairing))
 
     def balance(self, u: FloatArray, forces: FloatArray) -> FloatArray:
-        """Return the residual (n,) at the unknowns u (n,) where the formulation returns these forces."""
+        """Return the residual (n,) where the formulation returns these forces."""
         n_free = self.scene.n_free
         residual: FloatArray = self.transformation.T @ forces
         residual[:n_free] += self.scene.bulk_forces(u[:n_free], self.factor)
         return residual
-
-    def is_balanced(self, residual: FloatArray, forces: FloatArray, tolerance: float) -> bool:
-        """Return whether a residual (n,) is at most `tolerance` of the largest contact force; False with multipliers.
-
-        Without any contact force nothing is balanced. `forces` are those of the formulation at the same unknowns.
-        """
-        if self.n_multipliers or tolerance == 0:
-            return False
-        largest = float(np.abs(self.transformation.T @ forces).max(initial=0.0))
-        return bool(largest > 0 and np.abs(residual).max(initial=0.0) <= tolerance * largest)
 
     def matrix(self, u: FloatArray, pairing: Pairing | None) -> tuple[Any, FloatArray]:
         """Return the derivative (n, n) of the residual, and the part (n,) of it that roundoff alone may cause.
 
         The residual of a formulation without a tangent is differentiated on the frozen pairing.
         """
-        return self.assemble(u, pairing, *self.forces_and_tangent(u, pairing))
-
-    def assemble(
-        self, u: FloatArray, pairing: Pairing | None, forces: FloatArray, tangent: Any
-    ) -> tuple[Any, FloatArray]:
-        """Return what `matrix` does, with the `forces` and the `tangent` at the unknowns u (n,)."""
+        ((forces, tangent),) = self.forces_and_tangents([u], pairing)
         contact = self.contact_stiffness(u, pairing, tangent)
         return self.stiffness + contact, self.floor(u, contact, forces)
 
@@ -270,13 +240,13 @@ class System:
         floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
         return floor
 
-    def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> linear.Step:
+    def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> Step:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""
-        return linear.solve_step(matrix, right, self.scene.n_free, floor)
+        return solve_step(matrix, right, self.scene.n_free, floor)
 
     def _differences(self, pairing: Pairing | None, z: FloatArray) -> Any:
         """Return the derivative (n_unknowns, n_unknowns) of the contact forces at z, by central differences."""
-        interface = self.scene.interface
+        interface, formulation = self.scene.interface, self.formulation
         positions, multipliers = z[: interface.n_unknowns], z[interface.n_unknowns :]
         lengths = [side.lengths(positions.reshape(-1, 2)) for side in (interface.slave, interface.master)]
         shortest, largest = min(part.min() for part in lengths), float(np.abs(positions).max())
@@ -286,28 +256,15 @@ class System:
         if len(multipliers):  # The residual is linear in them: a step of their size, or of the bodies' stiffness.
             size = np.abs(multipliers).max() or (abs(self.scene.stiffness).max() if self.scene.n_free else 0.0)
             steps[len(positions) :] = sizes[len(positions) :] = size or 1.0
-        residual = partial(self.formulation.residual, interface, pairing)
+        residual = partial(formulation.residual, interface, pairing)
         differences = Differences(residual, z, steps, sizes, len(positions))
-        if self.any_matrix:
-            differences = differences.away_from_kinks()
-            for matrix in self._guesses(differences, pairing, REACH * sum(part.max() for part in lengths)):
-                if matrix is not None and differences.confirm(matrix):
-                    return matrix
-        return differences.by_unknown()
-
-    def _guesses(self, differences: Differences, pairing: Pairing | None, reach: float) -> Iterator[Any]:
-        """Yield cheap matrices that may be the derivative: the formulation's tangent, then one by groups."""
-        if "tangent" in self.formulation.provides:
-            try:
-                yield self.formulation.tangent(self.scene.interface, pairing, differences.z)
-            except ContractError:
-                yield None  # A tangent that breaks the contract is no fault of the forces.
-        if not self.n_multipliers:
-            yield differences.by_groups(reach)
-
-
-def _add_diagonal(matrix: Any, value: float, count: int) -> Any:
-    """Return a matrix, dense or sparse, with so many equal diagonal entries behind it."""
-    if isinstance(matrix, np.ndarray):
-        return linalg.block_diag(matrix, value * np.eye(count))
-    return sparse.csr_array(sparse.block_diag([matrix, value * sparse.eye_array(count)]))
+        if not self.any_matrix:
+            return differences.by_unknown()
+        differences, matrix = differences.away_from_kinks(), None
+        if "tangent" in formulation.provides:
+            with suppress(ContractError):  # A tangent that breaks the contract is no fault of the forces.
+                matrix = formulation.tangent(interface, pairing, z)
+        if matrix is not None and differences.confirm(matrix):
+            return matrix
+        groups = None if len(multipliers) else differences.by_groups(REACH * sum(part.max() for part in lengths))
+        return groups if groups is not None and differences.confirm(groups) else differences.by_unknown()

@@ -19,8 +19,8 @@ from unittest.mock import patch
 import numpy as np
 
 from contactverif import Case, Property, Subject, judge_case, load_formulation, load_properties
-from contactverif.mechanics import bulk
-from contactverif.mechanics.newton import Record, Trace
+from contactverif.mechanics import bulk, newton
+from contactverif.mechanics.newton import Trace
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
 from contactverif.sampling.draw import draw_cases
 
@@ -57,7 +57,7 @@ def count_all() -> Iterator[Counts]:
     """Count assemblies, factorisations, scenes and solutions while the context lasts."""
     counts = Counts()
     assemble, factorise, prepare = bulk.assemble_stiffness, bulk._interior_solver, bulk._factorise
-    bodies, finish = Scene.__dict__["condensed_bodies"], Record.trace
+    bodies, finish = Scene.__dict__["condensed_bodies"], newton._trace
     condense = bodies.func
 
     def count_assembly(*arguments: Any) -> Any:
@@ -76,8 +76,8 @@ def count_all() -> Iterator[Counts]:
         counts.scenes[id(scene)] = scene
         return condense(scene)
 
-    def count_solution(record: Record, *arguments: Any) -> Trace:
-        trace = finish(record, *arguments)
+    def count_solution(*arguments: Any) -> Trace:
+        trace = finish(*arguments)
         counts.traces.append(trace)
         return trace
 
@@ -86,7 +86,7 @@ def count_all() -> Iterator[Counts]:
         stack.enter_context(patch.object(bulk, "_interior_solver", count_factorisation))
         stack.enter_context(patch.object(bulk, "_factorise", count_part))
         stack.enter_context(patch.object(bodies, "func", count_scene))
-        stack.enter_context(patch.object(Record, "trace", count_solution))
+        stack.enter_context(patch.object(newton, "_trace", count_solution))
         yield counts
 
 
