@@ -311,7 +311,7 @@ def _load_step(
         if share > 0 or keep_matrix:  # The last iterate needs no tangent, nor does one that keeps the matrix.
             forces = system.forces(u, pairing)
         else:
-            ((forces, tangent),) = system.forces_and_tangents([u], pairing)
+            forces, tangent = system.forces_and_tangent(u, pairing)
         residual = system.balance(u, forces)
         balanced = False  # Without any contact force nothing is balanced.
         if share > 0 and not system.n_multipliers:

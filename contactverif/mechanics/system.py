@@ -177,6 +177,10 @@ class System:
             return self.formulation.tangent(self.scene.interface, pairing, self.state(u))
         return self._differences(pairing, self.state(u))
 
+    def forces_and_tangent(self, u: FloatArray, pairing: Pairing | None) -> tuple[FloatArray, Any]:
+        """Return `forces` and `tangent`, in one call where that is offered."""
+        return self.forces_and_tangents([u], pairing)[0]
+
     def forces_and_tangents(
         self, states: Sequence[FloatArray], pairing: Pairing | None
     ) -> list[tuple[FloatArray, Any]]:
@@ -206,7 +210,12 @@ class System:
 
         The residual of a formulation without a tangent is differentiated on the frozen pairing.
         """
-        ((forces, tangent),) = self.forces_and_tangents([u], pairing)
+        return self.assemble(u, pairing, *self.forces_and_tangent(u, pairing))
+
+    def assemble(
+        self, u: FloatArray, pairing: Pairing | None, forces: FloatArray, tangent: Any
+    ) -> tuple[Any, FloatArray]:
+        """Return what `matrix` does, with the `forces` and the `tangent` at the unknowns u."""
         contact = self.contact_stiffness(u, pairing, tangent)
         return self.stiffness + contact, self.floor(u, contact, forces)
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
 import pytest
+from pressed_blocks import ALL, LEANING, in_triangles
 from subjects import Changed, load_subject
 
 from contactverif import Body, Case, Interface, MisuseError, Subject, Surface, oracle
@@ -21,9 +21,6 @@ from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, two_blocks
 from contactverif_nts import nts_force, walk
 
-ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
-LEANING = (cos(radians(17.3)), sin(radians(17.3)))
-
 
 def press_blocks(**more: Any) -> Scene:
     """Two blocks whose meshes do not match, pressed together; leaning, off the origin."""
@@ -31,10 +28,6 @@ def press_blocks(**more: Any) -> Scene:
     master = Rectangle([0, 2, 3, 4], [-3, -1, 0], young=3.0, poisson=0.2)
     usual: dict[str, Any] = {"penalty": 10.0, "pressure": 0.5, "placing": Placing(LEANING, (1.0, -2.0), 2.0)}
     return two_blocks(slave, master, **usual | more)
-
-
-def in_triangles(body: Body) -> Body:
-    return replace(body, cells=np.vstack([body.cells[:, [0, 1, 2]], body.cells[:, [0, 2, 3]]]))
 
 
 def three_bodies() -> Scene:
@@ -49,12 +42,16 @@ def three_bodies() -> Scene:
     return Scene((left, master, right), slave=(0, 2), master=(1,), penalty=7.0)
 
 
+def change_bodies(change: Callable[[Body], Body], count: int = 2) -> Scene:
+    """Return the pressed blocks, the first of which are changed."""
+    scene = press_blocks()
+    return replace(scene, bodies=(*map(change, scene.bodies[:count]), *scene.bodies[count:]))
+
+
 SCENES: dict[str, Callable[[], Scene]] = {
     "quadrilaterals": press_blocks,
-    "triangles": lambda: replace(press_blocks(), bodies=tuple(map(in_triangles, press_blocks().bodies))),
-    "triangles on quadrilaterals": lambda: replace(
-        press_blocks(), bodies=(in_triangles(press_blocks().bodies[0]), press_blocks().bodies[1])
-    ),
+    "triangles": lambda: change_bodies(in_triangles),
+    "triangles on quadrilaterals": lambda: change_bodies(in_triangles, 1),
     "rigid floor": lambda: press_blocks(rigid_master=True),
     "rigid both": lambda: Scene(
         (rigid_surface([[0, 0], [1, 0], [3, 0]], displacement=(0, -0.5)), rigid_surface([[4, 0], [-1, 0]])),
@@ -68,20 +65,19 @@ every_scene = pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 
 def bits(arrays: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
     """Return arrays in a form that can be compared bit by bit."""
-    comparable = {}
-    for name, values in arrays.items():
-        array = np.asarray(values)
-        comparable[name] = (array.dtype, array.shape, array.tobytes())
-    return comparable
+    return {name: (array.dtype, array.shape, array.tobytes()) for name, array in map_arrays(arrays)}
+
+
+def map_arrays(arrays: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    return [(name, np.asarray(values)) for name, values in arrays.items()]
 
 
 ATTRIBUTES = ("nodes", "cells", "contact", "young", "poisson", "fixed", "imposed", "load", "axis", "start")
 
 
-def same_body(body: Body, other: Body) -> bool:
-    return bits({name: getattr(body, name) for name in ATTRIBUTES}) == bits(
-        {name: getattr(other, name) for name in ATTRIBUTES}
-    )
+def same_body(*bodies: Body) -> bool:
+    first, second = (bits({name: getattr(body, name) for name in ATTRIBUTES}) for body in bodies)
+    return first == second
 
 
 @every_scene
@@ -178,16 +174,11 @@ def test_the_first_guess() -> None:
 # --- forces against exact ones ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [
-        press_blocks(),
-        press_blocks(rigid_master=True),
-        press_blocks(placing=Placing()),
-        *map(catalogue.make_scene, catalogue.BLOCKS),
-    ],
-    ids=lambda scene: scene.name or "pressed",
-)
+PRESSED = [press_blocks(**more) for more in ({}, {"rigid_master": True}, {"placing": Placing()})]
+PRESSED += map(catalogue.make_scene, catalogue.BLOCKS)
+
+
+@pytest.mark.parametrize("scene", PRESSED, ids=lambda scene: scene.name or "pressed")
 @pytest.mark.parametrize("factor", [1.0, 0.5])
 def test_bulk_forces_of_the_exact_solution_are_the_consistent_ones(scene: Scene, factor: float) -> None:
     """Uniform pressure: what contact must bring is p ∫ N along the normal, from rationals."""
@@ -195,13 +186,9 @@ def test_bulk_forces_of_the_exact_solution_are_the_consistent_ones(scene: Scene,
     q = factor * exact_unknowns(scene, p, scene.penalty)
     n_slave, frame = interface.n_slave_nodes, scene.bodies[0].frame
     along = interface.nodes @ frame[:, 0]  # rounded once more: 4 u X of a length
-    weights = oracle.uniform_pressure_weights(interface, along)
-    expected = (
-        factor * p * weights[:, None] * np.where(np.arange(len(weights)) < n_slave, 1.0, -1.0)[:, None] * (frame[:, 1])
-    )
-    supported = np.zeros(len(weights), bool)
-    if scene.bodies[1].rigid:
-        supported[n_slave:] = True  # supports take it
+    weights, on_slave = oracle.uniform_pressure_weights(interface, along), np.arange(len(along)) < n_slave
+    expected = factor * p * np.where(on_slave, weights, -weights)[:, None] * frame[:, 1]
+    supported = ~on_slave & scene.bodies[1].rigid  # supports take it
     forces = scene.nodal_forces(q, factor)
     assert not forces[supported].any()
     terms = np.abs(scene.stiffness) @ np.abs(q) + factor * np.abs(scene.load)
@@ -231,6 +218,10 @@ ROLES = "bodies: found slave {} and master {} of {} bodies; needed each body eit
 PREVENTION = "; needed fixed components that prevent it (contact without friction does not)"
 
 
+ONE_SUPPORT = replace(LOOSE, name="punch", fixed=np.arange(32).reshape(-1, 2) == 31)
+SLIDES = f"it can move along its first axis{PREVENTION}"
+
+
 @pytest.mark.parametrize(
     ("bodies", "slave", "master", "message"),
     [
@@ -241,23 +232,13 @@ PREVENTION = "; needed fixed components that prevent it (contact without frictio
         ((SLAVE, MASTER), (0, 1), (), "bodies: found no master; needed at least one of both"),
         ((SLAVE, MASTER), (), (0, 1), "bodies: found no slave; needed at least one of both"),
         ((), (), (), "bodies: found no slave; needed at least one of both"),
-        (
-            (LOOSE, MASTER),
-            (0,),
-            (1,),
-            f"supports of slave: found no supports: it can move along its first axis{PREVENTION}",
-        ),
-        (
-            (replace(LOOSE, name="punch", fixed=np.arange(32).reshape(-1, 2) == 31), MASTER),
-            (0,),
-            (1,),
-            f"supports of punch: found supports: it can move along its first axis{PREVENTION}",
-        ),
+        ((LOOSE, MASTER), (0,), (1,), f"supports of slave: found no supports: {SLIDES}"),
+        ((ONE_SUPPORT, MASTER), (0,), (1,), f"supports of punch: found supports: {SLIDES}"),
         (
             (SLAVE, replace(MASTER, fixed=MASTER.fixed & [False, True])),
             (0,),
             (1,),
-            f"supports of master: found supports: it can move along its first axis{PREVENTION}",
+            f"supports of master: found supports: {SLIDES}",
         ),
     ],
 )
@@ -276,14 +257,10 @@ def test_bodies_that_cannot_meet() -> None:
 
 
 def test_a_body_out_of_reach_that_nothing_holds() -> None:
-    far = block(
-        Rectangle([100, 101, 103], [0, 1, 2]), contact="bottom", pressure=0.5, name="far"
-    )  # contact alone would hold it
-    scene = Scene((SLAVE, MASTER, far), slave=(0, 2))
-    with pytest.raises(
-        MisuseError,
-        match=r"^supports of far: found not enough to hold a body that can touch nothing; needed supports against",
-    ):
+    far = block(Rectangle([100, 101, 103], [0, 1, 2]), contact="bottom", pressure=0.5, name="far")
+    scene = Scene((SLAVE, MASTER, far), slave=(0, 2))  # contact alone would hold it
+    message = r"^supports of far: found not enough to hold a body that can touch nothing; needed supports against"
+    with pytest.raises(MisuseError, match=message):
         scene.stresses(scene.start)
 
 
@@ -336,23 +313,12 @@ def test_a_far_body_changes_no_bit_of_a_solution(name: str, role: str) -> None:
         assert pairing is not None
         tangent = formulation.tangent(case.interface, pairing, case.z).tocoo()
         residual = formulation.residual(case.interface, pairing, case.z)
-        answers.append(
-            bits(
-                {
-                    "nodes": case.interface.nodes,
-                    "slave": case.interface.slave.segments,
-                    "master": case.interface.master.segments,
-                    "z": case.z,
-                    "residual": residual,
-                    **{f"pairing {key}": values for key, values in pairing.items()},
-                    **{f"tangent {key}": getattr(tangent, key) for key in ("row", "col", "data")},
-                }
-            )
-        )
+        surfaces = {"slave": case.interface.slave.segments, "master": case.interface.master.segments}
+        arrays = {"nodes": case.interface.nodes, **surfaces, "z": case.z, "residual": residual, **pairing}
+        arrays |= {f"tangent {key}": getattr(tangent, key) for key in ("row", "col", "data")}
         trace = newton.solve(scene, formulation, iterations=8)
         fields = ("q", "factors", "residuals", "energies", "floors", "changes", "conditions")
-        answers[-1] |= bits({key: getattr(trace, key) for key in fields})
-        answers[-1]["end"] = (trace.end,)
+        answers.append((bits(arrays | {key: getattr(trace, key) for key in fields}), trace.end))
         counts.append(calls)
     assert answers[0] == answers[1]
     assert counts[0] == counts[1]
@@ -447,9 +413,7 @@ def test_no_distance_to_far_segments_of_an_interface_is_evaluated(
 @pytest.mark.parametrize("name", ["vts-ppt", "mortar-lm"])
 @pytest.mark.parametrize("triangles", [False, True])
 def test_a_whole_scene_has_the_solution_of_the_condensed_one(name: str, triangles: bool) -> None:
-    scene = press_blocks()
-    if triangles:
-        scene = replace(scene, bodies=tuple(map(in_triangles, scene.bodies)))
+    scene = SCENES["triangles" if triangles else "quadrilaterals"]()
     whole, subject = WholeScene.of_scene(scene), load_subject(name)
     assert whole.n_free > scene.n_free
     formulation = subject.for_case(scene.case())

@@ -1,6 +1,6 @@
 """Print the error of nodal forces on four Hertz meshes: codes beside the formulation of ours with the same method.
 
-    python tests/engines/hertz_beside_codes.py kratos=PYTHON ngsolve=PYTHON
+    python evidence/hertz_beside_codes.py kratos=PYTHON ngsolve=PYTHON
 
 `NAME=PYTHON` is the interpreter that has a code; without it the code is left out. CalculiX needs the program `ccx`.
 """
