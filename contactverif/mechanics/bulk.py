@@ -54,17 +54,8 @@ class _Matrices:
     gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
 
 
-_NONE, _NO_MATRIX = np.zeros(0, np.int64), np.zeros((0, 0))
-_RIGID = _Matrices(
-    _NONE,
-    _NONE,
-    _NO_MATRIX,
-    _NO_MATRIX,
-    _NO_MATRIX.__matmul__,
-    _NO_MATRIX.__matmul__,
-    _NO_MATRIX,
-    np.zeros((0, 1, 4, 2)),
-)
+_NONE, _EMPTY = np.zeros(0, np.int64), np.zeros((0, 0))
+_RIGID = _Matrices(_NONE, _NONE, _EMPTY, _EMPTY, _EMPTY.dot, _EMPTY.dot, _EMPTY, np.zeros((0, 1, 4, 2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

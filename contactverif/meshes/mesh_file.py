@@ -53,7 +53,16 @@ def read_interface(path: str | Path, *, slave: str, master: str, flip: bool = Fa
         interface = read_interface("punch.msh", slave="punch", master="base")
     """
     sides = read_sides(path, slave=slave, master=master, flip=flip, plane_only=False)
-    interface = _renumber(sides.points, sides.slave, sides.master)
+    used = [np.unique(side) for side in (sides.slave, sides.master)]
+    argument = "--slave"
+    try:
+        first = Surface(np.searchsorted(used[0], sides.slave))
+        argument = "--master"
+        second = Surface(np.searchsorted(used[1], sides.master) + len(used[0]))
+        interface = Interface(sides.points[np.concatenate(used)], first, second)
+    except MisuseError as error:
+        option = f"--{error.argument}" if error.argument in ("slave", "master") else argument
+        raise MisuseError(option, error.found, error.needed) from error
     check_facing(interface)
     sys.stderr.write(sides.mesh.warnings)
     return interface
@@ -80,8 +89,8 @@ def read_sides(path: str | Path, *, slave: str, master: str, flip: bool, plane_o
     if in_space and plane_only:
         raise MisuseError("--mesh", "faces in space", "lines in a plane: bodies in space are not solved")
     points = mesh.points if in_space else _planar(mesh)
-    members = _faces if in_space else _lines
-    sides = {option: members(mesh, groups, option, name) for option, name in (("--slave", slave), ("--master", master))}
+    names = {"--slave": slave, "--master": master}
+    sides = {option: _members(mesh, groups, option, name, in_space=in_space) for option, name in names.items()}
     shared = np.intersect1d(sides["--slave"], sides["--master"])
     if len(shared):
         actual = f"a node of the slave surface too, at {describe_place(points, shared[0])}"
@@ -111,15 +120,15 @@ def check_facing(interface: Interface) -> None:
     if slave is None or master is None or slave @ master < 0:
         return
     words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in (slave, master)]
+    if interface.dim == 2:
+        seen, cells, elements = "with its body on the left of its lines", "2-D", "lines"
+        turn = "; or turn the lines of one group in the mesher (Gmsh: a minus sign before its curves)"
+    else:
+        seen, cells, elements, turn = "seen from outside its body", "volume", "faces", ""
     needed = (
-        "surfaces that face each other, each with its body on the left of its lines. Keep the 2-D cells in the file, "
-        "they tell the side; or turn the lines of one group in the mesher (Gmsh: a minus sign before its curves); or "
-        "give --flip where only one surface has cells beside it (it turns the lines without cells, and both surfaces "
-        "where neither or each has cells)"
-        if interface.dim == 2
-        else "surfaces that face each other, each seen from outside its body. Keep the volume cells in the file, they "
-        "tell the side; or give --flip where only one surface has cells beside it (it turns the faces without cells, "
-        "and both surfaces where neither or each has cells)"
+        f"surfaces that face each other, each {seen}. Keep the {cells} cells in the file, they tell the side{turn}; or "
+        f"give --flip where only one surface has cells beside it (it turns the {elements} without cells, and both "
+        "surfaces where neither or each has cells)"
     )
     actual = f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other"
     raise MisuseError("--mesh", actual, needed)
@@ -157,44 +166,42 @@ def _planar(mesh: PlainMesh) -> FloatArray:
     return points[:, :2]
 
 
-def _members(
-    mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str, types: tuple[str, ...]
-) -> tuple[list[str], IntArray]:
-    """Return the types of the cells in a group, and the nodes of those of one of `types`, in the order of the file."""
+def _members(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str, *, in_space: bool) -> IntArray:
+    """Return the nodes of the lines of a group, in space of its faces (n, n_corners), in the order of the file."""
     if name not in groups:
         raise unknown_group_error(mesh, groups, argument, name)
     kinds = kinds_in(mesh, groups[name])
-    kind = next((kind for kind in kinds if kind in types), "")
+    kind = next((kind for kind in kinds if kind in (("triangle", "quad") if in_space else ("line",))), "")
     parts = [
         np.where(members[:, None] < 0, block.data[:, ::-1], block.data)[members != 0]
         for block, members in zip(mesh.cells, groups[name], strict=True)
         if block.type == kind
     ]
-    return kinds, np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.int64)
-
-
-def _lines(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
-    """Return the nodes (n_lines, 2) of the lines of a group, in the order of the file."""
-    kinds, lines = _members(mesh, groups, argument, name, ("line",))
-    higher = [kind for kind in kinds if kind != "line" and kind.startswith(("line", "VTK_LAGRANGE_CURVE"))]
-    if higher:
+    elements = np.concatenate(parts) if parts else np.empty((0, 2), dtype=np.int64)
+    listed = f"{name!r} with elements {', '.join(kinds) or 'none'}"
+    if in_space:
+        if len(kinds) != 1 or not len(elements):
+            needed = (
+                "triangles alone or quadrilaterals alone, at first order (Gmsh: recombine a whole surface, or none)"
+            )
+            raise MisuseError(argument, listed, needed)
+        if len(np.unique(np.sort(elements, axis=1), axis=0)) < len(elements):
+            raise MisuseError(argument, "the same face twice", "each face once")
+        return elements
+    if higher := [kind for kind in kinds if kind != "line" and kind.startswith(("line", "VTK_LAGRANGE_CURVE"))]:
         actual = f"{name!r} with elements {', '.join(higher)}"
         raise MisuseError(argument, actual, "2-node lines (mesh at first order)")
-    if not len(lines):
-        actual = f"{name!r} with elements {', '.join(kinds) or 'none'}, no lines"
+    if not len(elements):
         needed = "a group of 2-node lines (by its number, where a group of cells has the same name)"
-        raise MisuseError(argument, actual, needed)
-    return lines
+        raise MisuseError(argument, f"{listed}, no lines", needed)
+    return elements
 
 
 def corners_of_cells(mesh: PlainMesh) -> list[IntArray]:
     """Return the corners (n_cells, n_corners) of the cells of each block of 2-D cells, in the order of the file."""
-    blocks = [block for block in mesh.cells if block.dim == 2]
+    counts = [(block, block.type.lower()) for block in mesh.cells if block.dim == 2]
     # Corners come first, nodes on edges last.
-    return [
-        block.data[:, : 3 if "triangle" in block.type.lower() else 4 if "quad" in block.type.lower() else None]
-        for block in blocks
-    ]
+    return [block.data[:, : 3 if "triangle" in kind else 4 if "quad" in kind else None] for block, kind in counts]
 
 
 def _directed_edges(mesh: PlainMesh, points: FloatArray) -> IntArray:
@@ -275,20 +282,6 @@ def _neighbours_of_lines(argument: str, lines: IntArray, points: FloatArray) -> 
     ]
 
 
-def _renumber(points: FloatArray, slave: IntArray, master: IntArray) -> Interface:
-    """Return the interface on nodes of its own, slave nodes first; errors name the options of the command line."""
-    used = [np.unique(side) for side in (slave, master)]
-    argument = "--slave"
-    try:
-        first = Surface(np.searchsorted(used[0], slave))
-        argument = "--master"
-        second = Surface(np.searchsorted(used[1], master) + len(used[0]))
-        return Interface(points[np.concatenate(used)], first, second)
-    except MisuseError as error:
-        option = f"--{error.argument}" if error.argument in ("slave", "master") else argument
-        raise MisuseError(option, error.found, error.needed) from error
-
-
 def describe_place(points: FloatArray, node: int) -> str:
     """Return the position of a node in words."""
     return f"({', '.join(f'{part:g}' for part in points[node])})"
@@ -304,17 +297,6 @@ def _is_in_space(mesh: PlainMesh, groups: dict[str, Group], name: str) -> bool:
     used = np.unique(np.concatenate([block.data.reshape(-1) for block in mesh.cells]))
     extent = np.ptp(mesh.points[used], axis=0)
     return bool(extent[2] > FLAT * extent.max())
-
-
-def _faces(mesh: PlainMesh, groups: dict[str, Group], argument: str, name: str) -> IntArray:
-    """Return the corners (n_faces, 3 or 4) of the faces of a group, in the order of the file."""
-    kinds, faces = _members(mesh, groups, argument, name, ("triangle", "quad"))
-    if len(kinds) != 1 or not len(faces):
-        needed = "triangles alone or quadrilaterals alone, at first order (Gmsh: recombine a whole surface, or none)"
-        raise MisuseError(argument, f"{name!r} with elements {', '.join(kinds) or 'none'}", needed)
-    if len(np.unique(np.sort(faces, axis=1), axis=0)) < len(faces):
-        raise MisuseError(argument, "the same face twice", "each face once")
-    return faces
 
 
 def _neighbours_of_faces(argument: str, points: FloatArray, faces: IntArray) -> list[list[tuple[int, bool]]]:

@@ -115,7 +115,17 @@ def _whole(name: str, parts: list[PackedArray]) -> list[IntArray]:
 
 def pack_mesh(path: str) -> bytes:
     """Return a mesh file as bytes, in a child process; one that meshio cannot read is a ValueError."""
-    mesh, warnings = _read(Path(path))
+    output, errors = StringIO(), StringIO()
+    try:
+        with open(path, "rb") as stream:
+            is_gmsh = stream.read(1) == b"$"  # Ansys uses the suffix .msh too, and meshio would try that first.
+        # What Python itself warns of tells of meshio's code and not of the file.
+        with redirect_stdout(output), redirect_stderr(errors), catch_warnings(action="ignore"):
+            mesh: Any = meshio.read(path, file_format="gmsh" if is_gmsh else None)
+    except SystemExit as error:  # meshio prints and exits if a reader gives up.
+        raise ValueError(output.getvalue() + errors.getvalue()) from error
+    except ImportError as error:
+        raise ValueError(f"its format needs the package {error.name}, which is not installed") from error
     stored = _PackedMesh(
         points=PackedArray.pack(mesh.points, "points"),
         cells=[(block.type, block.dim, PackedArray.pack(block.data, block.type)) for block in mesh.cells],
@@ -133,24 +143,9 @@ def pack_mesh(path: str) -> bytes:
         field_data={  # Gmsh stores the number and the dimension of a name here.
             name: (int(value[0]), int(value[1])) for name, value in mesh.field_data.items() if np.shape(value) == (2,)
         },
-        warnings=warnings[:_LONGEST_WARNING],
+        warnings=errors.getvalue()[:_LONGEST_WARNING],
     )
     return msgspec.msgpack.encode(stored)
-
-
-def _read(path: Path) -> tuple[Any, str]:
-    """Return what meshio reads, and what it prints meanwhile."""
-    output, warnings = StringIO(), StringIO()
-    try:
-        with path.open("rb") as stream:
-            is_gmsh = stream.read(1) == b"$"  # Ansys uses the suffix .msh too, and meshio would try that first.
-        # What Python itself warns of tells of meshio's code and not of the file.
-        with redirect_stdout(output), redirect_stderr(warnings), catch_warnings(action="ignore"):
-            return meshio.read(path, file_format="gmsh" if is_gmsh else None), warnings.getvalue()
-    except SystemExit as error:  # meshio prints and exits if a reader gives up.
-        raise ValueError(output.getvalue() + warnings.getvalue()) from error
-    except ImportError as error:
-        raise ValueError(f"its format needs the package {error.name}, which is not installed") from error
 
 
 Group = list[IntArray]  # For each block of cells in the file: 0 no member, 1 a member, −1 a member to be reversed.
@@ -165,30 +160,22 @@ def groups_of(mesh: PlainMesh) -> dict[str, Group]:
         name: [np.isin(every, part).astype(np.int64) for every, part in zip(numbers, sets, strict=True)]
         for name, sets in mesh.cell_sets.items()
     }
-    numbered = _tagged_cells(mesh)
-    for name, (number, dim) in mesh.field_data.items():
-        group = numbered.get(str(number), [np.zeros(len(block), dtype=np.int64) for block in mesh.cells])
-        _include(named, name, [part * (block.dim == dim) for block, part in zip(mesh.cells, group, strict=True)])
-        # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
-        _include(numbered, str(number), named[name])
-    return numbered | named
-
-
-def _tagged_cells(mesh: PlainMesh) -> dict[str, Group]:
-    """Return the groups that the cell data number, by number as text."""
-    groups: dict[str, Group] = {}
+    numbered: dict[str, Group] = {}
     n_cells = sum(map(len, mesh.cells))
     for key, parts in mesh.cell_data.items():
         tags = sorted({int(tag) for values in parts for tag in np.unique(values)} - {0})
         if len(tags) * n_cells > MOST_MEMBERS:
             raise MisuseError("--mesh", f"{len(tags)} groups of {n_cells} cells", "fewer groups")
         for tag in tags:
-            group = [np.asarray(values == tag, dtype=np.int64) for values in parts]
-            if key == "gmsh:physical" and tag < 0:  # In Gmsh, a negative number reverses the lines of a curve.
-                _include(groups, str(-tag), [-part for part in group])
-            else:
-                _include(groups, str(tag), group)
-    return groups
+            # In Gmsh, a negative number reverses the lines of a curve.
+            sign = -1 if key == "gmsh:physical" and tag < 0 else 1
+            _include(numbered, str(sign * tag), [np.asarray(values == tag, dtype=np.int64) * sign for values in parts])
+    for name, (number, dim) in mesh.field_data.items():
+        group = numbered.get(str(number), [np.zeros(len(block), dtype=np.int64) for block in mesh.cells])
+        _include(named, name, [part * (block.dim == dim) for block, part in zip(mesh.cells, group, strict=True)])
+        # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
+        _include(numbered, str(number), named[name])
+    return numbered | named
 
 
 def _include(groups: dict[str, Group], name: str, group: Group) -> None:

@@ -62,6 +62,10 @@ class Views:
     n_slave_nodes: int
     arrays: dict[str, Array]  # The arrays of segments and neighbours, (n_segments, 2) or (n, n_segments, 2).
 
+    def describe(self, row: int) -> str:
+        """Return which part of the interface an element is."""
+        return "the interface" if self.labels[row] < 0 else f"slave segment {self.labels[row]}"
+
     @property
     def shape(self) -> tuple[int, ...]:
         """The numbers of slave nodes, master nodes, slave segments and master segments."""
@@ -72,24 +76,6 @@ class Views:
         """Return some of the elements, selected by mask (n,)."""
         arrays = {name: array if array.ndim == 2 else array[selection] for name, array in self.arrays.items()}
         return Views(self.places[selection], self.labels[selection], self.nodes[selection], self.n_slave_nodes, arrays)
-
-
-def _arguments_of(shape: tuple[int, ...], n_props: int, n_decisions: int, *, pairs: bool) -> list[Argument]:
-    n_slave, n_master, n_slave_segments, n_master_segments = shape
-    n_nodes, size = n_slave + n_master, 2 * (n_slave + n_master)
-    arguments = [
-        Argument("view", (ctypes.sizeof(_View) // 4,), "integer"),
-        Argument("reference", (n_nodes, 2)),
-        Argument("x", (n_nodes, 2)),
-        *(Argument(name, (n_slave_segments, 2), "integer") for name in ("slave", "slave_neighbours")),
-        *(Argument(name, (n_master_segments, 2), "integer") for name in ("master", "master_neighbours")),
-        Argument("props", (n_props,)),
-        Argument("decisions", (n_decisions,), "integer", not pairs),
-    ]
-    if not pairs:
-        outputs = {"residual": (size,), "tangent": (size, size)}
-        arguments += [Argument(name, output, is_input=False) for name, output in outputs.items()]
-    return arguments
 
 
 def find_windows(interface: Interface, x: FloatArray) -> dict[str, IntArray]:
@@ -113,8 +99,12 @@ def find_windows(interface: Interface, x: FloatArray) -> dict[str, IntArray]:
     windows = []
     for number, (first, last) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
         segments, is_closed = chains[every[number] % len(chains)]
-        if is_closed:
-            windows.append(segments[_window_on_ring(places[element == number], len(segments))])
+        if is_closed:  # From the first to the last of the places, around the largest gap between them.
+            ordered, length = np.unique(places[element == number]), len(segments)
+            gaps = np.diff(ordered, append=ordered[0] + length)
+            widest = int(np.argmax(gaps))
+            start, count = ordered[(widest + 1) % len(ordered)] - 1, min(length - gaps[widest] + 3, length)
+            windows.append(segments[(start + np.arange(count)) % length])
         else:
             windows.append(segments[max(first - 1, 0) : last + 2])
     starts, segments = np.cumsum([0, *map(len, windows)]), np.concatenate(windows)
@@ -130,16 +120,6 @@ def _find_nearest(x: FloatArray, slave: IntArray, master: IntArray, tree: Tree, 
             v = PointOnSegment(node(x, slave[s, 0]), node(x, slave[s, 1]), places[i])
             nearest[s, i] = max(nearest_segment(v, x, master, order, boxes), 0)
     return nearest
-
-
-def _window_on_ring(places: IntArray, length: int) -> IntArray:
-    """Return the places on a closed chain from the first to the last of some, and one more on each side."""
-    ordered = np.unique(places)
-    gaps = np.diff(ordered, append=ordered[0] + length)  # The largest of them is outside.
-    widest = int(np.argmax(gaps))
-    first, n_segments = ordered[(widest + 1) % len(ordered)] - 1, min(length - gaps[widest] + 3, length)
-    window: IntArray = (first + np.arange(n_segments)) % length
-    return window
 
 
 def segment_views(interface: Interface, pairing: Any) -> list[Views]:
@@ -159,24 +139,17 @@ def segment_views(interface: Interface, pairing: Any) -> list[Views]:
                 nodes.append(master.segments[segments[:, -1:], 1])
             number = np.arange(width)
             neighbours = np.tile(np.column_stack([number - 1, number + 1]), (len(places), 1, 1))
-            if ring:
-                neighbours[:, 0, 0], neighbours[:, -1, 1] = width - 1, 0
-            else:
-                neighbours[:, 0, 0] = _hide(master.neighbours[segments[:, 0], 0])
-                neighbours[:, -1, 1] = _hide(master.neighbours[segments[:, -1], 1])
+            for place, way, other_end in ((0, 0, width - 1), (-1, 1, 0)):
+                behind = master.neighbours[segments[:, place], way]
+                neighbours[:, place, way] = other_end if ring else np.where(behind < 0, -1, OUTSIDE)
             arrays = {
                 "slave": np.array([[0, 1]]),
                 "master": 2 + np.column_stack([number, (number + 1) % width if ring else number + 1]),
-                "slave_neighbours": _hide(slave.neighbours[labels])[:, None],
+                "slave_neighbours": np.where(slave.neighbours[labels] < 0, -1, OUTSIDE)[:, None],
                 "master_neighbours": neighbours,
             }
             views.append(Views(places, labels, np.hstack(nodes), 2, arrays))
     return views
-
-
-def _hide(neighbours: IntArray) -> IntArray:
-    hidden: IntArray = np.where(neighbours < 0, -1, OUTSIDE)
-    return hidden
 
 
 VERSION = 1  # `CV_VERSION` of `contactverif.h`.
@@ -195,7 +168,20 @@ class _Functions:
         """Return the memory of a call of `cv_pair` or of `cv_element`."""
         key = shape, n_props, n_decisions, pairs
         if key not in self.slots:
-            slot = GuardedSlot(_arguments_of(shape, n_props, n_decisions, pairs=pairs), 2 * (shape[0] + shape[1]))
+            n_slave, n_master, n_slave_segments, n_master_segments = shape
+            n_nodes, size = n_slave + n_master, 2 * (n_slave + n_master)
+            arguments = [
+                Argument("view", (ctypes.sizeof(_View) // 4,), "integer"),
+                *(Argument(name, (n_nodes, 2)) for name in ("reference", "x")),
+                *(Argument(name, (n_slave_segments, 2), "integer") for name in ("slave", "slave_neighbours")),
+                *(Argument(name, (n_master_segments, 2), "integer") for name in ("master", "master_neighbours")),
+                Argument("props", (n_props,)),
+                Argument("decisions", (n_decisions,), "integer", not pairs),
+            ]
+            if not pairs:
+                arguments.append(Argument("residual", (size,), is_input=False))
+                arguments.append(Argument("tangent", (size, size), is_input=False))
+            slot = GuardedSlot(arguments, size)
             view = _View(*shape, n_props, 0, 0.0, *(slot.addresses[name] for name in _ARRAYS))
             slot.preset({"view": np.frombuffer(bytes(view), np.int32)})  # `_rows` writes number and penalty.
             self.slots[key] = slot
@@ -276,9 +262,9 @@ class LibraryForces:
             slot = self.functions.slot(views.shape, len(self.props), room, pairs=True)
             rows = self._rows(slot, interface, views, x)
             values = [slot.addresses["view"], room, slot.addresses["decisions"]]
-            counts = rows.call(self.functions.pair, values, lambda row: f"cv_pair: {_describe(views, row)}")
+            counts = rows.call(self.functions.pair, values, lambda row: f"cv_pair: {views.describe(row)}")
             if (least := min(counts)) < 0:
-                raise ContractError(f"cv_pair: {_describe(views, counts.index(least))}: returned {least}; needed ≥ 0")
+                raise ContractError(f"cv_pair: {views.describe(counts.index(least))}: returned {least}; needed ≥ 0")
             if max(counts) <= room:
                 integers = rows["decisions"].astype(np.int64)
                 return {int(place): integers[row, : counts[row]] for row, place in enumerate(views.places)}
@@ -295,10 +281,10 @@ class LibraryForces:
         address = slot.addresses
         values = [address["view"], decisions.shape[1], address["decisions"], address["residual"]]
         values.append(address["tangent"] if with_tangent else None)
-        statuses = rows.call(self.functions.element, values, lambda row: f"cv_element: {_describe(views, row)}")
+        statuses = rows.call(self.functions.element, values, lambda row: f"cv_element: {views.describe(row)}")
         for row, status in enumerate(statuses):
             if status:
-                raise ContractError(f"cv_element: {_describe(views, row)}: returned {status}; needed 0")
+                raise ContractError(f"cv_element: {views.describe(row)}: returned {status}; needed 0")
         return rows
 
 
@@ -317,10 +303,6 @@ class LibraryElements(LibraryForces):
             answer = self._call(interface, views, decisions, z.reshape(-1, 2), with_tangent=True)
             parts.append((unknowns_of(views.nodes), answer["residual"], answer["tangent"]))
         return assemble(z.size, parts, by_columns=self.order == "column")
-
-
-def _describe(views: Views, row: int) -> str:
-    return "the interface" if views.labels[row] < 0 else f"slave segment {views.labels[row]}"
 
 
 def c(

@@ -115,10 +115,11 @@ def parse_traits_text(text: str, place: str) -> Traits:
 def _to_traits(table: Any, place: str) -> Traits:
     if not isinstance(table, dict):
         raise MisuseError(place, f"a {type(table).__name__}", "a table of traits")
+    known = set(Traits().by_name()) - {*_FORBIDDEN}
     values = dict(_flatten(table))
     for name in values:
-        if name not in Traits().by_name() or name in _FORBIDDEN:
-            raise unknown_name_error(place, name, set(Traits().by_name()) - {*_FORBIDDEN})
+        if name not in known:
+            raise unknown_name_error(place, name, known)
     values |= {name: tuple(values[name]) for name in ("dimensions", "faces") if name in values}
     try:
         return Traits().revise(**values)
@@ -129,10 +130,7 @@ def _to_traits(table: Any, place: str) -> Traits:
 def _flatten(table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the names and values of a table, groups taken apart."""
     for name, value in table.items():
-        if name in _GROUPS and isinstance(value, dict):
-            yield from _flatten(value)
-        else:
-            yield name, value
+        yield from _flatten(value) if name in _GROUPS and isinstance(value, dict) else [(name, value)]
 
 
 def _read(path: Path) -> str:

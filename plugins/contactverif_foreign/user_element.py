@@ -3,17 +3,15 @@
 A user element decides by itself whether it is in contact (`IF (G.GE.0) RETURN`). So what the harness pairs is only half
 of the decisions, and it travels in a `Handle`: the harness pairs anew at each state.
 
-- UEL of Abaqus has 36 arguments, for one static increment. `RHS` is minus the residual.
-- FEAP calls `elmtNN(d, ul, xl, ix, tl, s, p, ndf, ndm, nst, isw)`. `p` is minus the residual.
-
-`AMATRX` and `s` are its derivative, column by column.
+- UEL of Abaqus has 36 arguments, for one static increment. `RHS` is minus the residual, `AMATRX` its derivative.
+- FEAP calls `elmtNN(d, ul, xl, ix, tl, s, p, ndf, ndm, nst, isw)`. `p` is minus the residual, `s` its derivative.
 """
 
 from __future__ import annotations
 
 import ctypes
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -41,27 +39,36 @@ from contactverif_foreign.shared_library import (
 )
 
 
-@dataclass(frozen=True, slots=True)
 class Convention:
-    """The arguments of the user elements of a solver.
+    """The arguments of the user elements of a solver. What no method says is zero.
 
-    `shapes` and `constants` get the numbers of nodes, properties and state variables. `fill` gets elements, reference
-    positions and displacements (n, n_nodes, 2), and properties (n, n_properties). `constants` and `fill` return the
-    values of arguments by name: those that are the same for all elements, and the others. What is in neither is zero.
+    Each method gets or returns arguments by name.
     """
 
     name: str
     order: tuple[str, ...]  # The names of the arguments in the order of the call.
     integers: tuple[str, ...]  # The arguments that are integers, and those that the element may write.
     outputs: tuple[str, ...]
-    shapes: Callable[[int, int, int], dict[str, tuple[int, ...]]]  # Those of the arguments that are arrays.
-    constants: Callable[[int, int, int], dict[str, Any]]
-    fill: Callable[[Elements, FloatArray, FloatArray, FloatArray], dict[str, Any]]
     forces: str  # The argument with minus the residual.
     matrix: str  # The argument with its derivative, column by column.
-    flaw: Callable[[SlotRows], tuple[int, str] | None] = lambda rows: None  # An element that gave up, and its words.
-    # Gets the library and the number of nodes before elements are called.
-    announce: Callable[[ctypes.CDLL, int], None] = lambda library, n_nodes: None
+
+    def shapes(self, n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
+        """Return the shapes of the arguments that are arrays."""
+        raise NotImplementedError
+
+    def constants(self, n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
+        """Return the values that are the same for all elements."""
+        raise NotImplementedError
+
+    def fill(self, elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
+        """Return the others from reference positions and displacements (n, n_nodes, 2), and properties (n, …)."""
+        raise NotImplementedError
+
+    def flaw(self, rows: SlotRows) -> tuple[int, str] | None:
+        """Return the first element that gave up, and its words."""
+
+    def announce(self, library: ctypes.CDLL, n_nodes: int) -> None:
+        """Tell a library the number of nodes before its elements are called."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,19 +82,15 @@ class Routine:
     slots: dict[tuple[int, int], GuardedSlot] = field(default_factory=dict)
 
     def slot(self, n_nodes: int, n_properties: int) -> GuardedSlot:
-        """Return the memory of a call for elements of so many nodes."""
-        key, numbers, convention = (
-            (n_nodes, n_properties),
-            (n_nodes, n_properties, self.state_variables),
-            self.convention,
-        )
-        if key not in self.slots:
-            shapes, arguments = convention.shapes(*numbers), []
+        """Return the memory of a call for elements of so many nodes and properties."""
+        if (key := (n_nodes, n_properties)) not in self.slots:
+            convention, sizes, arguments = self.convention, (n_nodes, n_properties, self.state_variables), []
+            shapes = convention.shapes(*sizes)
             for name in convention.order:
                 kind: Literal["integer", "real"] = "integer" if name in convention.integers else "real"
                 arguments.append(Argument(name, shapes.get(name, ()), kind, name not in convention.outputs))
             self.slots[key] = GuardedSlot(arguments, 2 * n_nodes)
-            self.slots[key].preset(convention.constants(*numbers))
+            self.slots[key].preset(convention.constants(*sizes))
         return self.slots[key]
 
 
@@ -202,69 +205,54 @@ def _load_routine(convention: Convention, path: Path, names: tuple[str, ...], st
     return Routine(convention, library, function, state_variables)
 
 
-_UEL_ORDER = (
-    *("RHS", "AMATRX", "SVARS", "ENERGY", "NDOFEL", "NRHS", "NSVARS", "PROPS", "NPROPS", "COORDS", "MCRD", "NNODE"),
-    *("U", "DU", "V", "A", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "JELEM", "PARAMS", "NDLOAD", "JDLTYP", "ADLMAG"),
-    *("PREDEF", "NPREDF", "LFLAGS", "MLVARX", "DDLMAG", "MDLOAD", "PNEWDT", "JPROPS", "NJPROP", "PERIOD"),
-)
-_UEL_INTEGERS = (
-    *("NDOFEL", "NRHS", "NSVARS", "NPROPS", "MCRD", "NNODE", "JTYPE", "KSTEP", "KINC", "JELEM", "NDLOAD", "NPREDF"),
-    *("MLVARX", "MDLOAD", "NJPROP", "JDLTYP", "LFLAGS", "JPROPS"),
-)
-_UEL_OUTPUTS = ("RHS", "AMATRX", "SVARS", "ENERGY", "PNEWDT")
-_UEL_FLAGS = (1, 1, 1, 0, 0)  # Static analysis, large displacements, forces and matrix, a general step.
+class _Uel(Convention):
+    """Elements of Abaqus. `COORDS` is the reference configuration and `U` the displacement from it.
+
+    Forces and matrix are zero before the call, and so are the state variables: a formulation has no history.
+    """
+
+    name, forces, matrix = "uel", "RHS", "AMATRX"
+    order = (
+        *("RHS", "AMATRX", "SVARS", "ENERGY", "NDOFEL", "NRHS", "NSVARS", "PROPS", "NPROPS", "COORDS", "MCRD", "NNODE"),
+        *("U", "DU", "V", "A", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "JELEM", "PARAMS", "NDLOAD", "JDLTYP"),
+        *("ADLMAG", "PREDEF", "NPREDF", "LFLAGS", "MLVARX", "DDLMAG", "MDLOAD", "PNEWDT", "JPROPS", "NJPROP", "PERIOD"),
+    )
+    integers = (
+        *("NDOFEL", "NRHS", "NSVARS", "NPROPS", "MCRD", "NNODE", "JTYPE", "KSTEP", "KINC", "JELEM", "NDLOAD", "NPREDF"),
+        *("MLVARX", "MDLOAD", "NJPROP", "JDLTYP", "LFLAGS", "JPROPS"),
+    )
+    outputs = ("RHS", "AMATRX", "SVARS", "ENERGY", "PNEWDT")
+    flags = (1, 1, 1, 0, 0)  # Static analysis, large displacements, forces and matrix, a general step.
+
+    def shapes(self, n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
+        size = 2 * n_nodes
+        vectors = dict.fromkeys(("U", "V", "A"), (size,)) | dict.fromkeys(("RHS", "DU"), (size, 1))
+        matrices = {"AMATRX": (size, size), "COORDS": (2, n_nodes), "PREDEF": (2, 1, n_nodes)}
+        loads = dict.fromkeys(("JDLTYP", "ADLMAG", "DDLMAG"), (1, 1))
+        sizes = {"SVARS": n_state, "ENERGY": 8, "PROPS": n_properties, "TIME": 2, "PARAMS": 3, "JPROPS": 4, "LFLAGS": 5}
+        return vectors | matrices | loads | {name: (n,) for name, n in sizes.items()}
+
+    def constants(self, n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
+        sizes = dict.fromkeys(("NDOFEL", "MLVARX"), 2 * n_nodes) | {"NNODE": n_nodes}
+        ones = ("NRHS", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "NPREDF", "MDLOAD", "PNEWDT", "PERIOD")
+        others = {"NPROPS": n_properties, "NSVARS": n_state, "MCRD": 2, "LFLAGS": self.flags, "NJPROP": 4}
+        return sizes | dict.fromkeys(ones, 1) | others
+
+    def fill(self, elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
+        n_elements = len(elements.nodes)
+        moves, numbers = u.reshape(n_elements, -1), np.arange(1, n_elements + 1)[:, None]
+        given = {"PROPS": properties, "COORDS": reference.reshape(n_elements, -1), "U": moves, "DU": moves}
+        return given | {"JELEM": numbers, "JPROPS": elements.sides}
+
+    def flaw(self, rows: SlotRows) -> tuple[int, str] | None:
+        """Return the first element that asks for a shorter increment; there is none to shorten."""
+        smaller = np.flatnonzero(rows["PNEWDT"][:, 0] < 1.0)
+        if not len(smaller):
+            return None
+        return int(smaller[0]), f"set PNEWDT to {rows['PNEWDT'][smaller[0], 0]:g}; needed 1, there are no increments"
 
 
-def _uel_shapes(n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
-    size = 2 * n_nodes
-    vectors = dict.fromkeys(("U", "V", "A"), (size,)) | dict.fromkeys(("RHS", "DU"), (size, 1))
-    matrices = {"AMATRX": (size, size), "COORDS": (2, n_nodes), "PREDEF": (2, 1, n_nodes)}
-    loads = dict.fromkeys(("JDLTYP", "ADLMAG", "DDLMAG"), (1, 1))
-    sizes = {"SVARS": n_state, "ENERGY": 8, "PROPS": n_properties, "TIME": 2, "PARAMS": 3, "JPROPS": 4}
-    return vectors | matrices | loads | {"LFLAGS": (len(_UEL_FLAGS),)} | {name: (n,) for name, n in sizes.items()}
-
-
-def _uel_constants(n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
-    sizes = {"NDOFEL": 2 * n_nodes, "NNODE": n_nodes, "MLVARX": 2 * n_nodes, "NPROPS": n_properties, "NSVARS": n_state}
-    ones = ("NRHS", "JTYPE", "TIME", "DTIME", "KSTEP", "KINC", "NPREDF", "MDLOAD", "PNEWDT", "PERIOD")
-    return sizes | dict.fromkeys(ones, 1) | {"MCRD": 2, "LFLAGS": _UEL_FLAGS, "NJPROP": 4}
-
-
-def _uel_fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
-    n_elements = len(elements.nodes)
-    displacements = u.reshape(n_elements, -1)
-    return {
-        "PROPS": properties,
-        "COORDS": reference.reshape(n_elements, -1),
-        "U": displacements,
-        "DU": displacements,
-        "JELEM": np.arange(1, n_elements + 1)[:, None],
-        "JPROPS": elements.sides,
-    }
-
-
-def _uel_flaw(rows: SlotRows) -> tuple[int, str] | None:
-    """Return the first element that asks for a shorter increment; there is none to shorten."""
-    smaller = np.flatnonzero(rows["PNEWDT"][:, 0] < 1.0)
-    if not len(smaller):
-        return None
-    return int(smaller[0]), f"set PNEWDT to {rows['PNEWDT'][smaller[0], 0]:g}; needed 1, there are no increments"
-
-
-# `COORDS` is the reference configuration and `U` the displacement from it. Forces and matrix are zero before the call.
-# The state variables are zero, too: a formulation has no history.
-_UEL = Convention(
-    "uel",
-    order=_UEL_ORDER,
-    integers=_UEL_INTEGERS,
-    outputs=_UEL_OUTPUTS,
-    shapes=_uel_shapes,
-    constants=_uel_constants,
-    fill=_uel_fill,
-    forces="RHS",
-    matrix="AMATRX",
-    flaw=_uel_flaw,
-)
+_UEL = _Uel()
 
 
 def uel(
@@ -301,64 +289,50 @@ def uel(
     return _load_element(_UEL, "uel", penalty, file, nodes, svars, props, traits, tau)
 
 
-_FEAP_ORDER = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
-_TANGENT_AND_RESIDUAL = 3  # The value of isw.
-_SETS = 6  # Columns of displacements in `ul`: the total, the increment, and velocities and the like, which are zero.
-_MOST_ELEMENTS = 99
+class _Feap(Convention):
+    """Elements of FEAP. `xl` is the reference configuration and `ul(:,:,1)` the displacement from it.
+
+    Forces and matrix are zero before the call. Common blocks are those of the library itself: what `eldata`, `cdata`
+    and `eltran` say of an element is set before it is called, and all others are zero.
+    """
+
+    name, forces, matrix = "feap", "p", "s"
+    order = ("d", "ul", "xl", "ix", "tl", "s", "p", "ndf", "ndm", "nst", "isw")
+    integers = ("ix", "ndf", "ndm", "nst", "isw")
+    outputs = ("s", "p")
+    sets = 6  # Columns of displacements in `ul`: the total, the increment, and velocities and the like, which are zero.
+
+    def shapes(self, n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
+        size = 2 * n_nodes
+        nodal = {"ul": (2, n_nodes, self.sets), "xl": (2, n_nodes), "ix": (n_nodes,), "tl": (n_nodes,)}
+        return {"d": (n_properties,), **nodal, "s": (size, size), "p": (size,)}
+
+    def constants(self, n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
+        return {"ndf": 2, "ndm": 2, "nst": 2 * n_nodes, "isw": 3}  # 3 asks for the tangent and the residual.
+
+    def fill(self, elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
+        n_elements, n_nodes = elements.nodes.shape
+        moves = np.zeros((n_elements, self.sets, 2 * n_nodes))
+        moves[:, :2] = u.reshape(n_elements, 1, -1)  # The total and the increment.
+        places = {"ul": moves.reshape(n_elements, -1), "xl": reference.reshape(n_elements, -1)}
+        return {"d": properties, **places, "ix": elements.nodes + 1}
+
+    def announce(self, library: ctypes.CDLL, n_nodes: int) -> None:
+        """Say that one element of so many nodes is asked, in a static step, to the common blocks that a library has."""
+        # Their first variables are the same in FEAP and FEAPpv; `ctan` has the factors of stiffness, damping and mass.
+        blocks = {
+            "eldata": ("=d5i", 1.0, 1, 1, 0, 0, n_nodes),  # dm, n, ma, mct, iel, nel
+            "cdata": ("=6i", n_nodes, 1, 1, n_nodes, 2 * n_nodes, 1),  # numnp, numel, nummat, nen, neq, ipr
+            "eltran": ("=6d", 0.0, 0.0, 0.0, 1.0, 0.0, 0.0),  # bpr(3), ctan(3)
+        }
+        for block, (kinds, *values) in blocks.items():
+            for name in fortran_names(block):
+                if hasattr(library, name):
+                    memory = (ctypes.c_char * struct.calcsize(kinds)).in_dll(library, name)
+                    struct.pack_into(kinds, memory, 0, *values)
 
 
-def _feap_shapes(n_nodes: int, n_properties: int, n_state: int) -> dict[str, tuple[int, ...]]:
-    size = 2 * n_nodes
-    nodal = {"ul": (2, n_nodes, _SETS), "xl": (2, n_nodes), "ix": (n_nodes,), "tl": (n_nodes,)}
-    return {"d": (n_properties,), **nodal, "s": (size, size), "p": (size,)}
-
-
-def _feap_constants(n_nodes: int, n_properties: int, n_state: int) -> dict[str, Any]:
-    return {"ndf": 2, "ndm": 2, "nst": 2 * n_nodes, "isw": _TANGENT_AND_RESIDUAL}
-
-
-def _feap_fill(elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
-    n_elements, n_nodes = elements.nodes.shape
-    displacements = np.zeros((n_elements, _SETS, 2 * n_nodes))
-    displacements[:, :2] = u.reshape(n_elements, 1, -1)  # The total and the increment.
-    return {
-        "d": properties,
-        "ul": displacements.reshape(n_elements, -1),
-        "xl": reference.reshape(n_elements, -1),
-        "ix": elements.nodes + 1,
-    }
-
-
-def _set_common_blocks(library: ctypes.CDLL, n_nodes: int) -> None:
-    """Say that one element of so many nodes is asked, in a static step, to the common blocks that a library has."""
-    # Their first variables are the same in FEAP and FEAPpv; `ctan` has the factors of stiffness, damping and mass.
-    blocks = {
-        "eldata": ("=d5i", 1.0, 1, 1, 0, 0, n_nodes),  # dm, n, ma, mct, iel, nel
-        "cdata": ("=6i", n_nodes, 1, 1, n_nodes, 2 * n_nodes, 1),  # numnp, numel, nummat, nen, neq, ipr
-        "eltran": ("=6d", 0.0, 0.0, 0.0, 1.0, 0.0, 0.0),  # bpr(3), ctan(3)
-    }
-    for block, (kinds, *values) in blocks.items():
-        for name in fortran_names(block):
-            if hasattr(library, name):
-                memory = (ctypes.c_char * struct.calcsize(kinds)).in_dll(library, name)
-                struct.pack_into(kinds, memory, 0, *values)
-
-
-# `xl` is the reference configuration and `ul(:,:,1)` the displacement from it; forces and matrix are zero before the
-# call. Common blocks of FEAP are those of the library itself: what `eldata`, `cdata` and `eltran` say of an element is
-# set before it is called, and all others are zero.
-_FEAP = Convention(
-    "feap",
-    order=_FEAP_ORDER,
-    integers=("ix", "ndf", "ndm", "nst", "isw"),
-    outputs=("s", "p"),
-    shapes=_feap_shapes,
-    constants=_feap_constants,
-    fill=_feap_fill,
-    forces="p",
-    matrix="s",
-    announce=_set_common_blocks,
-)
+_FEAP, _MOST_ELEMENTS = _Feap(), 99
 
 
 def feap(

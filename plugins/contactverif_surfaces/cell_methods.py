@@ -258,7 +258,12 @@ class FaceQuarters:
         numbers = np.arange(corners.shape[0] * corners.shape[1]).reshape(corners.shape[:2])
         edges = np.repeat(longest_edges(interface.slave, x), N_PARTS), longest_edges(master, x)
         faces, codes = find_cells(np.vstack([corners.reshape(-1, 3), x]), numbers, master.faces + numbers.size, *edges)
-        home = _find_homes(corners, x[master.faces], faces)
+        view = SlaveView.of_corners(corners[faces[:, 0]], x[master.faces[faces[:, 1]]])
+        depth = evaluate_shapes(view.master, view.slave.mean(axis=1, keepdims=True))[:, 0].min(axis=1)
+        home, deepest = np.full(len(corners), -1), np.full(len(corners), -PAST_BORDER)
+        for (part, face), value in zip(faces.tolist(), depth.tolist(), strict=True):
+            if value > deepest[part]:
+                home[part], deepest[part] = face, value
         parts, active = np.flatnonzero(home >= 0), np.zeros(len(home), bool)
         shares, nodes = _parts_on_faces(interface, parts, home[parts])
         active[parts] = _centre_points(positions_of(z, nodes), shares).gap[:, 0] < 0
@@ -360,20 +365,6 @@ def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
     view = SlaveView.of_corners(part, corners[..., n_slave:, :])
     points = gauss_points(view, codes, 3 if n_slave == TRIANGLE else 6)
     return flatten_pushes(points.push(points.weight)[1])
-
-
-def _find_homes(parts: FloatArray, master: FloatArray, faces: IntArray) -> IntArray:
-    """Return the master face under the centre of each part, −1 for none, of cells with these faces (n_cells, 2).
-
-    Parts are (n_parts, n_corners, 3), and master faces (n_faces, n_corners, 3).
-    """
-    view = SlaveView.of_corners(parts[faces[:, 0]], master[faces[:, 1]])
-    depth = evaluate_shapes(view.master, view.slave.mean(axis=1, keepdims=True))[:, 0].min(axis=1)
-    home, deepest = np.full(len(parts), -1), np.full(len(parts), -PAST_BORDER)
-    for (part, face), value in zip(faces.tolist(), depth.tolist(), strict=True):
-        if value > deepest[part]:
-            home[part], deepest[part] = face, value
-    return home
 
 
 def vts_ppt_3d(*, penalty: float) -> FaceQuarters:

@@ -137,24 +137,17 @@ def evaluate_shapes(corners: Array, points: Array) -> Array:
         area = cross_plane(first, second)
         s, t = cross_plane(arm, second) / area, cross_plane(first, arm) / area
         return np.stack([1 - s - t, s, t], axis=-1)
-    s, t = _find_place(corners, arm)
-    return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
-
-
-def _find_place(corners: Array, arm: Array) -> tuple[Array, Array]:
-    """Return the place (s, t) of points at an arm (..., n_points, 2) from corner 0 of quadrilaterals (..., 4, 2).
-
-    With edges a and b at corner 0 and the twist w, a point is at p = s a + t b + s t w. Its cross product with b + s w
-    leaves s alone, that with a + t w leaves t. The root of the discriminant of both is the Jacobian at the point. It
-    has the sign of the face's area, and so has what it is added to: nothing cancels where the twist is small, or 0.
-    """
+    # With edges a and b at corner 0 and the twist w, a point is at p = s a + t b + s t w. Its cross product with
+    # b + s w leaves s alone, that with a + t w leaves t. The root of the discriminant of both is the Jacobian at the
+    # point. It has the sign of the face's area, and so has what it is added to: nothing cancels where the twist is 0.
     first, second, third, last = (corners[..., i : i + 1, :] for i in range(4))
     a, b, w = second - first, last - first, (first - second) + (third - last)
     area, turn = cross_plane(a, b), cross_plane(arm, w)
     by_s, by_t = cross_plane(arm, b), cross_plane(a, arm)
     jacobian_s = _root((area - turn) ** 2 + 4 * cross_plane(a, w) * by_s, area)
     jacobian_t = _root((area + turn) ** 2 + 4 * cross_plane(w, b) * by_t, area)
-    return 2 * by_s / (area - turn + jacobian_s), 2 * by_t / (area + turn + jacobian_t)
+    s, t = 2 * by_s / (area - turn + jacobian_s), 2 * by_t / (area + turn + jacobian_t)
+    return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1)
 
 
 def _root(square: Array, sign: Array) -> Array:
@@ -209,11 +202,10 @@ class SlaveView:
 
     def cell_corners(self, codes: IntArray) -> Array:
         """Return the corners (..., n_cells, most_corners, 2) with these codes (n_cells, most_corners, 2)."""
-        n_slave, n_master = self.slave.shape[-2], self.master.shape[-2]
+        n_slave, n_master, cells = self.slave.shape[-2], self.master.shape[-2], np.arange(len(codes))[:, None]
         i, j = codes[..., 0], codes[..., 1]
-        reverse = self.master[..., ::-1, :]
-        start, end = _take(self.slave, i % n_slave), _take(self.slave, (i + 1) % n_slave)
-        before, behind = _take(reverse, j % n_master), _take(reverse, (j + 1) % n_master)
+        start, end = (self.slave[..., cells, (i + step) % n_slave, :] for step in (0, 1))
+        before, behind = (self.master[..., ::-1, :][..., cells, (j + step) % n_master, :] for step in (0, 1))
         here, there = cross_plane(end - start, before - start), cross_plane(end - start, behind - start)
         crossing = (i >= 0) & (j >= 0)
         share = here / np.where(crossing, here - there, 1.0)
@@ -255,7 +247,12 @@ def gauss_points(view: SlaveView, codes: IntArray, n_points: int) -> CellPoints:
     places, weights = GAUSS[n_points]
     corners = view.cell_corners(codes)
     following = np.roll(corners, -1, axis=-2)
-    middle = np.broadcast_to(_middle(corners, following), corners.shape)
+    # The middle is the mean of the edges by their squared lengths. It lies inside however thin the cell is, and corners
+    # that are listed twice do not count. The centroid of a cell without area would be a quotient of two roundoffs.
+    squares = ((following - corners) ** 2).sum(axis=-1)[..., None]
+    total = squares.sum(axis=-2, keepdims=True)
+    middle = (squares * (corners + following)).sum(axis=-2, keepdims=True) / np.where(total == 0, 1.0, 2 * total)
+    middle = np.broadcast_to(np.where(total == 0, corners[..., :1, :], middle), corners.shape)
     triangles = np.stack([middle, corners, following], axis=-2)
     points = places @ triangles
     count = points.shape[-3] * n_points
@@ -264,27 +261,9 @@ def gauss_points(view: SlaveView, codes: IntArray, n_points: int) -> CellPoints:
     return view.points_at(points.reshape(*points.shape[:-3], count, 2), area.reshape(*area.shape[:-2], count))
 
 
-def _middle(corners: Array, following: Array) -> Array:
-    """Return a point in the middle of each cell (..., n_cells, 1, 2), the mean of its edges by their squared lengths.
-
-    It lies inside however thin the cell is, and corners that are listed twice do not count. The centroid of a cell
-    without area would be a quotient of two roundoffs.
-    """
-    weights = ((following - corners) ** 2).sum(axis=-1)[..., None]
-    total = weights.sum(axis=-2, keepdims=True)
-    middle: Array = (weights * (corners + following)).sum(axis=-2, keepdims=True) / np.where(total == 0, 1.0, 2 * total)
-    return np.where(total == 0, corners[..., :1, :], middle)
-
-
 def _dot(arms: Array, axis: Array) -> Array:
     product: Array = (arms @ axis[..., None])[..., 0]
     return product
-
-
-def _take(corners: Array, numbers: IntArray) -> Array:
-    cells = np.arange(len(numbers))[:, None]
-    selection: Array = corners[..., cells, numbers, :]
-    return selection
 
 
 def report_points(

@@ -8,7 +8,7 @@ from contactverif.contract.errors import ContractError
 from foreign.comparison import CASES, Build, agree, compare, ring_case, subject_of
 
 Exchanges = tuple[tuple[str, str], ...]
-REFERENCE = "nts-ar:area=reference"
+REFERENCE, OFFSET = "nts-ar:area=reference", named_case("offset-c")
 # Texts of the library that are exchanged: it decides in `cv_element`, or does something wrong.
 ITSELF = (
     ("int cv_pair(", "static int never_called("),
@@ -28,9 +28,7 @@ TRAITS = (("int cv_version", "const char *cv_traits(void) { return \"area = 'cur
 @pytest.mark.parametrize("exchanges", [(), ITSELF], ids=["cv_pair", "itself"])
 @pytest.mark.parametrize("elements", ["segment", "interface"])
 @pytest.mark.parametrize("name", CASES)
-def test_springs_in_c_are_those_of_ours(
-    name: str, elements: str, exchanges: tuple[tuple[str, str], ...], build: Build
-) -> None:
+def test_springs_in_c_are_those_of_ours(name: str, elements: str, exchanges: Exchanges, build: Build) -> None:
     library = build("springs.c", *exchanges)
     compare(f"c:file={library},elements={elements}", REFERENCE, named_case(name))
 
@@ -40,31 +38,32 @@ def test_a_closed_master_has_no_free_end_in_c(build: Build) -> None:
 
 
 def test_decisions_are_a_pairing_of_integers(build: Build) -> None:
-    case = named_case("offset-c")
-    pairing = subject_of(f"c:file={build('springs.c')}").for_case(case).pair(case.interface, case.z)
+    pairing = subject_of(f"c:file={build('springs.c')}").for_case(OFFSET).pair(OFFSET.interface, OFFSET.z)
     assert isinstance(pairing, Pairing)
-    assert len(pairing["decision"]) == 2 * len(case.interface.slave)
-    itself = subject_of(f"c:file={build('springs.c', *ITSELF)}").for_case(case)
-    assert itself.pair(case.interface, case.z) is None
+    assert len(pairing["decision"]) == 2 * len(OFFSET.interface.slave)
+    itself = subject_of(f"c:file={build('springs.c', *ITSELF)}").for_case(OFFSET)
+    assert itself.pair(OFFSET.interface, OFFSET.z) is None
 
 
 def test_the_residual_is_smooth_on_frozen_decisions(build: Build) -> None:
     """The tangent on a pairing is the derivative of the residual on it, also where a node leaves the master."""
-    case = named_case("offset-c")
-    checked = subject_of(f"c:file={build('springs.c')}").for_case(case)
-    pairing = checked.pair(case.interface, case.z)
-    direction = np.random.default_rng(1).normal(size=case.z.size)
-    step = np.finfo(float).eps ** (1 / 3) * np.abs(case.z).max()
-    ends = [checked.residual(case.interface, pairing, case.z + sign * step * direction) for sign in (1, -1)]
+    checked = subject_of(f"c:file={build('springs.c')}").for_case(OFFSET)
+    pairing = checked.pair(OFFSET.interface, OFFSET.z)
+    direction = np.random.default_rng(1).normal(size=OFFSET.z.size)
+    step = np.finfo(float).eps ** (1 / 3) * np.abs(OFFSET.z).max()
+    ends = [checked.residual(OFFSET.interface, pairing, OFFSET.z + sign * step * direction) for sign in (1, -1)]
     slope = (ends[0] - ends[1]) / (2 * step)
-    exact = checked.tangent(case.interface, pairing, case.z) @ direction
+    exact = checked.tangent(OFFSET.interface, pairing, OFFSET.z) @ direction
     assert np.abs(slope - exact).max() <= np.finfo(float).eps ** 0.5 * np.abs(exact).max()
 
 
 def test_the_order_of_the_tangent_is_that_of_the_option(build: Build) -> None:
-    case, library = named_case("offset-c"), build("springs.c", *A_TERM_LESS)
+    library = build("springs.c", *A_TERM_LESS)
     by_row, by_column = (
-        subject_of(f"c:file={library},order={order}").for_case(case).tangent(case.interface, None, case.z).toarray()
+        subject_of(f"c:file={library},order={order}")
+        .for_case(OFFSET)
+        .tangent(OFFSET.interface, None, OFFSET.z)
+        .toarray()
         for order in ("row", "column")
     )
     assert (by_row == by_column.T).all()
@@ -72,11 +71,11 @@ def test_the_order_of_the_tangent_is_that_of_the_option(build: Build) -> None:
 
 
 def test_a_library_without_a_tangent_gets_none(build: Build) -> None:
-    case = named_case("offset-c")
     subject = subject_of(f"c:file={build('springs.c')},tangent=false")
     assert "tangent" not in subject.provides
-    forces = [each.for_case(case).residual(case.interface, None, case.z) for each in (subject, subject_of(REFERENCE))]
-    agree(*forces)
+    agree(
+        *(each.for_case(OFFSET).residual(OFFSET.interface, None, OFFSET.z) for each in (subject, subject_of(REFERENCE)))
+    )
 
 
 def test_many_decisions_get_room(build: Build) -> None:
@@ -109,10 +108,9 @@ def test_what_a_library_says_of_itself_counts_more_than_the_file_beside_it(build
     ],
 )
 def test_what_a_library_does_wrong_is_named(exchanges: Exchanges, message: str, build: Build) -> None:
-    case = named_case("offset-c")
-    checked = subject_of(f"c:file={build('springs.c', *exchanges)}").for_case(case)
+    checked = subject_of(f"c:file={build('springs.c', *exchanges)}").for_case(OFFSET)
     with pytest.raises(ContractError) as error:
-        checked.residual(case.interface, None, case.z)
+        checked.residual(OFFSET.interface, None, OFFSET.z)
     assert message in str(error.value)
 
 

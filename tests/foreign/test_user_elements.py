@@ -1,6 +1,7 @@
 """User elements of Abaqus and FEAP: right ones are what ours are, wrong writes are named, crashes are contained."""
 
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from contactverif.contract.errors import ContractError, NonFiniteError, PluginEr
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
 from foreign.comparison import CASES, Build, agree, compare, ring_case, subject_of
+
+OFFSET = named_case("offset-c")
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -37,12 +40,21 @@ def test_segments_that_overlap_give_the_forces_of_sts(name: str, build: Build) -
     agree(mine, ours)
 
 
-def test_an_element_of_chains_knows_their_sizes(build: Build) -> None:
-    case = named_case("offset-c")
-    checked = subject_of(f"uel:file={build('wrong_writes.f90')},nodes=n,props=12").for_case(case)
-    forces = checked.residual(case.interface, None, case.z)
-    n_slave, n_nodes = case.interface.n_slave_nodes, case.interface.n_nodes
-    assert forces[:6].tolist() == [n_slave, n_nodes - n_slave, 0, 0, n_nodes, 1]
+@pytest.fixture
+def ask(build: Build) -> Iterator[Callable[..., Any]]:
+    """Return a function that asks an element with a fault, the first of `props`, for its forces; then end all."""
+
+    def residual(options: str, limits: Limits | None = None) -> Any:
+        checked = subject_of(f"uel:file={build('wrong_writes.f90')},{options}", limits).for_case(OFFSET)
+        return checked.residual(OFFSET.interface, None, OFFSET.z)
+
+    yield residual
+    end_all()
+
+
+def test_an_element_of_chains_knows_their_sizes(ask: Callable[..., Any]) -> None:
+    n_slave, n_nodes = OFFSET.interface.n_slave_nodes, OFFSET.interface.n_nodes
+    assert ask("nodes=n,props=12")[:6].tolist() == [n_slave, n_nodes - n_slave, 0, 0, n_nodes, 1]
 
 
 def test_the_traits_beside_a_library_are_its_own(build: Build) -> None:
@@ -64,52 +76,38 @@ def test_the_traits_beside_a_library_are_its_own(build: Build) -> None:
         (5, "set PNEWDT to 0.25"),
     ],
 )
-def test_a_wrong_write_is_named_with_array_and_element(wrong: int, message: str, build: Build) -> None:
-    case = named_case("offset-c")
-    checked = subject_of(f"uel:file={build('wrong_writes.f90')},svars=4,props={wrong}").for_case(case)
+def test_a_wrong_write_is_named_with_array_and_element(wrong: int, message: str, ask: Callable[..., Any]) -> None:
     with pytest.raises(ContractError) as error:
-        checked.residual(case.interface, None, case.z)
+        ask(f"svars=4,props={wrong}")
     assert message in str(error.value)
     assert "uel: element 2 (nodes 1, " in str(error.value)
 
 
-def test_what_reads_behind_an_array_shows(build: Build) -> None:
-    case = named_case("offset-c")
-    checked = subject_of(f"uel:file={build('wrong_writes.f90')},props=9").for_case(case)
+def test_what_reads_behind_an_array_shows(ask: Callable[..., Any]) -> None:
     with pytest.raises(NonFiniteError):
-        checked.residual(case.interface, None, case.z)
+        ask("props=9")
 
 
-def test_state_variables_are_zero_before_each_call(build: Build) -> None:
-    case = named_case("offset-c")
-    checked = subject_of(f"uel:file={build('wrong_writes.f90')},svars=4,props=10").for_case(case)
-    forces = [checked.residual(case.interface, None, case.z) for _ in range(2)]
+def test_state_variables_are_zero_before_each_call(ask: Callable[..., Any]) -> None:
+    forces = [ask("svars=4,props=10") for _ in range(2)]
     assert np.count_nonzero(forces[0]) == 1
     assert (forces[0] == forces[1]).all()
 
 
-@pytest.mark.parametrize(("wrong", "cause"), [(4, "signal"), (6, "exit")])
-def test_a_crash_ends_the_process_of_the_plugin_alone(wrong: int, cause: str, build: Build) -> None:
-    case = named_case("offset-c")
-    text = f"uel:file={build('wrong_writes.f90')},svars=4,props={wrong}"
-    try:
-        checked = subject_of(text, Limits()).for_case(case)
-        with pytest.raises(PluginError) as error:
-            checked.residual(case.interface, None, case.z)
-    finally:
-        end_all()
+@pytest.mark.parametrize(
+    ("options", "limits", "cause"),
+    [
+        ("svars=4,props=4", Limits(), "signal"),
+        ("svars=4,props=6", Limits(), "exit"),
+        ("props=13", Limits(seconds=2.0), "hang"),
+    ],
+)
+def test_a_crash_or_a_hang_ends_the_process_of_the_plugin_alone(
+    options: str, limits: Limits, cause: str, ask: Callable[..., Any]
+) -> None:
+    with pytest.raises(PluginError) as error:
+        ask(options, limits)
     assert error.value.cause == cause
-
-
-def test_an_element_that_never_returns_is_ended(build: Build) -> None:
-    case = named_case("offset-c")
-    try:
-        checked = subject_of(f"uel:file={build('wrong_writes.f90')},props=13", Limits(seconds=2.0)).for_case(case)
-        with pytest.raises(PluginError) as error:
-            checked.residual(case.interface, None, case.z)
-    finally:
-        end_all()
-    assert error.value.cause == "hang"
 
 
 def test_a_relative_path_is_that_of_the_working_folder(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,7 +152,5 @@ def test_the_number_of_an_element_of_feap_is_checked(build: Build) -> None:
 
 
 def test_a_library_that_needs_the_solver_is_refused_with_its_reason(build: Build) -> None:
-    library = build("needs_solver.f90")
     with pytest.raises(MisuseError, match=r"undefined symbol: xit_; needed .* refers to no function of the solver"):
-        load_formulation(f"uel:file={library}")
-    assert Path(library).is_file()
+        load_formulation(f"uel:file={build('needs_solver.f90')}")

@@ -1,10 +1,10 @@
 """A scene in other units, or in another place, is the same problem to the last bit; what would round it is refused."""
 
 from dataclasses import replace
-from math import cos, radians, sin
 
 import numpy as np
 import pytest
+from pressed_blocks import LEANING
 from subjects import load_subject
 
 from contactverif import MisuseError, Placing, Rectangle, Scene, solve, two_blocks
@@ -21,7 +21,7 @@ def lean_blocks() -> Scene:
         penalty=20.0,
         approach=0.1,
         tilt=0.02,
-        placing=Placing((cos(radians(17.3)), sin(radians(17.3))), (3.0, -7.0)),
+        placing=Placing(LEANING, (3.0, -7.0)),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pressed_blocks import on
 from scipy import sparse
 from subjects import change_verbs, load_subject
 
@@ -49,7 +50,7 @@ def on_frozen_pairing(
     name: str, n_segments: int = 16
 ) -> tuple[CheckedFormulation, Interface, Pairing | None, Differences]:
     scene, z = long_interface(n_segments)
-    formulation = load_subject(name).for_case(scene.case())
+    formulation = on(name, scene)
     pairing = formulation.pair(scene.interface, z)
     forces = partial(formulation.residual, scene.interface, pairing)
     return formulation, scene.interface, pairing, differences_at(forces, z)

@@ -4,23 +4,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pressed_blocks import on
 from scipy import linalg
 from subjects import Changed, load_subject
 
-from contactverif import CheckedFormulation, Scene, Subject
+from contactverif import Scene, Subject
 from contactverif.contract.arrays import dense
 from contactverif.mechanics.inf_sup import InfSup, force_rows, gap_rows, inf_sup_constant
 from contactverif.problems.refined_blocks import refined_blocks
 
 
-def formulation_on(name: str, scene: Scene) -> CheckedFormulation:
-    return load_subject(name).for_case(scene.case())
-
-
 def constant_of(name: str, scene: Scene) -> InfSup:
-    return inf_sup_constant(
-        scene, formulation_on(name, scene), nodal=load_subject(name).traits.rules.penalty == "nodal"
-    )
+    return inf_sup_constant(scene, on(name, scene), nodal=load_subject(name).traits.rules.penalty == "nodal")
 
 
 def node_on_node_constants(scene: Scene) -> Any:
@@ -46,7 +41,7 @@ def test_the_constant_is_the_smallest_eigenvalue_of_the_problem_written_by_hand(
 @pytest.mark.parametrize("name", ["nts-lm", "mortar-lm", "mortar-dual-lm", "vts-me-lm"])
 def test_rows_of_gaps_are_those_of_forces_where_the_saddle_point_is_symmetric(name: str) -> None:
     scene = refined_blocks(6, 4)
-    formulation = formulation_on(name, scene)
+    formulation = on(name, scene)
     forces, gaps = force_rows(scene, formulation), gap_rows(scene, formulation)
     assert np.abs(forces + gaps).max() < 1e-9 * np.abs(forces).max() or np.abs(forces - gaps).max() < 1e-9
 
@@ -54,7 +49,7 @@ def test_rows_of_gaps_are_those_of_forces_where_the_saddle_point_is_symmetric(na
 def test_rows_of_vts_ppt_differ_and_the_smaller_constant_counts() -> None:
     scene = refined_blocks(8, 12)
     printed, standard = (constant_of(name, scene).constant for name in ("vts-ppt-lm", "vts-me-lm"))
-    forces, gaps = (rows(scene, formulation_on("vts-ppt-lm", scene)) for rows in (force_rows, gap_rows))
+    forces, gaps = (rows(scene, on("vts-ppt-lm", scene)) for rows in (force_rows, gap_rows))
     assert min(np.abs(forces - gaps).max(), np.abs(forces + gaps).max()) > 0.01 * np.abs(forces).max()
     assert printed == pytest.approx(standard, rel=1e-6)  # They have the same gaps, and those are the worse rows.
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from pressed_blocks import ALL, LEANING, in_triangles
-from subjects import Changed, load_subject
+from subjects import change_verbs, load_subject
 
 from contactverif import Body, Case, Interface, MisuseError, Subject, Surface, oracle
 from contactverif.compiler import python_function
@@ -33,13 +34,10 @@ def press_blocks(**more: Any) -> Scene:
 def three_bodies() -> Scene:
     """Return a scene of a quadrilateral and a triangular slave on one master, of different heights."""
     master = block(Rectangle(np.linspace(0, 8, 6), [-2, -1, 0], young=5.0), contact="top", approach=0.0, name="base")
-    left = block(
-        Rectangle([0.5, 1, 3], [0, 1, 2], poisson=0.25), contact="bottom", approach=0.125, tilt=0.01, lowered=0.125
-    )
-    right = in_triangles(
-        block(Rectangle([4, 6, 7.5], [0, 3], young=2.0), contact="bottom", pressure=0.25, lowered=0.0625)
-    )
-    return Scene((left, master, right), slave=(0, 2), master=(1,), penalty=7.0)
+    left, right = Rectangle([0.5, 1, 3], [0, 1, 2], poisson=0.25), Rectangle([4, 6, 7.5], [0, 3], young=2.0)
+    first = block(left, contact="bottom", approach=0.125, tilt=0.01, lowered=0.125)
+    second = in_triangles(block(right, contact="bottom", pressure=0.25, lowered=0.0625))
+    return Scene((first, master, second), slave=(0, 2), master=(1,), penalty=7.0)
 
 
 def change_bodies(change: Callable[[Body], Body], count: int = 2) -> Scene:
@@ -65,11 +63,8 @@ every_scene = pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 
 def bits(arrays: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
     """Return arrays in a form that can be compared bit by bit."""
-    return {name: (array.dtype, array.shape, array.tobytes()) for name, array in map_arrays(arrays)}
-
-
-def map_arrays(arrays: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    return [(name, np.asarray(values)) for name, values in arrays.items()]
+    every = {name: np.asarray(values) for name, values in arrays.items()}
+    return {name: (array.dtype, array.shape, array.tobytes()) for name, array in every.items()}
 
 
 ATTRIBUTES = ("nodes", "cells", "contact", "young", "poisson", "fixed", "imposed", "load", "axis", "start")
@@ -120,11 +115,8 @@ def test_the_interface_has_slave_nodes_first() -> None:
     scene = three_bodies()
     assert scene.bodies_in_reach == (0, 2, 1)
     interface = scene.interface
-    assert interface.nodes.tolist() == [
-        *([0.5, 0], [1, 0], [3, 0]),
-        *([4, 0], [6, 0], [7.5, 0]),
-        *([x, 0] for x in np.linspace(0, 8, 6).tolist()),
-    ]
+    assert interface.nodes[:, 0].tolist() == [0.5, 1, 3, 4, 6, 7.5, *np.linspace(0, 8, 6)]
+    assert not interface.nodes[:, 1].any()
     assert interface.slave.segments.tolist() == [[0, 1], [1, 2], [3, 4], [4, 5]]
     assert sorted(interface.master.segments.tolist()) == [[n + 1, n] for n in range(6, 11)]
     assert scene.slices == (slice(0, 4), slice(4, 8), slice(8, 18))  # at the sides, on rollers, y alone is free
@@ -271,25 +263,19 @@ def count_calls(name: str) -> tuple[Subject, list[tuple[Any, ...]]]:
     """Return a formulation that notes its calls and how large its answers are, and these notes."""
     calls: list[tuple[Any, ...]] = []
 
-    def make(*, penalty: float) -> Changed:
-        plugin = load_subject(name)._make(penalty=penalty)
+    def note(size: Callable[[Any], Any], right: Any, *state: Any) -> Any:
+        answer = right(*state)
+        calls.append((right.__name__, size(answer)))
+        return answer
 
-        def note(verb: str, size: Callable[[Any], Any]) -> Callable[..., Any]:
-            def call(*arguments: Any) -> Any:
-                answer = getattr(plugin, verb)(*arguments)
-                calls.append((verb, size(answer)))
-                return answer
-
-            return call
-
-        return Changed(
-            plugin,
-            pair=note("pair", lambda pairing: {key: values.size for key, values in pairing.items()}),
-            residual=note("residual", np.shape),
-            tangent=note("tangent", lambda matrix: (matrix.shape, matrix.nnz)),
-        )
-
-    return Subject(name, make), calls
+    sizes: dict[str, Callable[[Any], Any]] = {
+        "pair": lambda pairing: {key: values.size for key, values in pairing.items()},
+        "residual": np.shape,
+        "tangent": lambda matrix: (matrix.shape, matrix.nnz),
+    }
+    changes = {verb: partial(note, size) for verb, size in sizes.items()}
+    inner = load_subject(name)
+    return Subject(name, lambda *, penalty: change_verbs(inner._make(penalty=penalty), **changes)), calls
 
 
 def with_a_far_body(scene: Scene, role: str) -> Scene:

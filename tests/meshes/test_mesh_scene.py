@@ -10,18 +10,7 @@ from curved_bodies import write_curved_bodies
 from hypothesis.strategies import SearchStrategy
 from subjects import load_subject
 
-from contactverif import (
-    Case,
-    End,
-    Interface,
-    MisuseError,
-    Scene,
-    Verdict,
-    load_formulation,
-    load_properties,
-    read_scene,
-    solve,
-)
+from contactverif import Case, End, Interface, MisuseError, Scene, Verdict, load_properties, read_scene, solve
 from contactverif.contract.interface import ways_to_master
 from contactverif.contract.result import NOT_HERE
 from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support
@@ -78,7 +67,7 @@ def test_a_scene_is_that_of_the_file(curved: Path) -> None:
     assert np.array_equal(np.flatnonzero(slave.fixed.all(axis=1)), np.flatnonzero(slave.nodes[:, 1] == 1))
     assert np.array_equal(np.flatnonzero(master.fixed.all(axis=1)), np.flatnonzero(master.nodes[:, 1] == -1))
     assert not master.imposed.any()
-    trace = solve(scene, load_formulation("mortar").with_penalty(scene.penalty))
+    trace = solve(scene, load_subject("mortar").with_penalty(scene.penalty))
     assert trace.end is End.CONVERGED
     assert trace.forces.any()
     assert describe_bodies(scene) == [
@@ -110,9 +99,7 @@ def test_lines_without_cells_are_a_rigid_body(tmp_path: Path) -> None:
 
 
 def test_supports_that_do_not_hold_a_body_are_refused() -> None:
-    with pytest.raises(
-        MisuseError, match=r"^supports of slave body: found supports: it can .*; needed fixed components"
-    ):
+    with pytest.raises(MisuseError, match=r"^supports of slave body: found supports: it can .*; needed fixed comp"):
         read_scene(PUNCH, slave="punch", master="base", supports={"punch": (None, 0.0)})
 
 
@@ -138,10 +125,7 @@ def test_a_body_that_surrounds_its_contact_is_held_on_its_other_boundary(tmp_pat
 
 
 WRONG = [
-    (
-        {"materials": {"bass": (1.0, 0.3)}},
-        r"--material: found 'bass', which is no group of the file; needed 'base'\?.*",
-    ),
+    ({"materials": {"bass": (1.0, 0.3)}}, r"--material: found 'bass', which is no group of the file; needed 'base'.*"),
     ({"materials": {"base": (0.0, 0.3)}}, r"--material: found E = 0, ν = 0.3 of 'base'; needed .*E > 0 and .*"),
     ({"materials": {"base": (1.0, 0.5)}}, r"--material: found E = 1, ν = 0.5 of 'base'; needed .*ν < 0.5"),
     (

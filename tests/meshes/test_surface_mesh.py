@@ -33,16 +33,10 @@ def read(tmp_path: Path) -> Read:
     """Return a function that writes two groups, `punch` and `base`, and reads the interface between them."""
 
     def written_and_read(
-        upper: object,
-        lower: object,
-        *,
-        points: object = POINTS,
-        solids: object = (),
-        suffix: str = ".msh",
-        **flip: bool,
+        *sides: object, points: object = POINTS, solids: object = (), suffix: str = ".msh", **flip: bool
     ) -> Interface:
         kinds = {3: "triangle", 4: "quad", 6: "triangle6"}
-        parts = [(kinds[np.shape(faces)[1]], np.array(faces)) for faces in (upper, lower)]
+        parts = [(kinds[np.shape(faces)[1]], np.array(faces)) for faces in sides]
         parts += [("tetra", np.array(solids))] if len(np.array(solids)) else []
         tags = [np.full(len(data), number) for number, (_, data) in enumerate(parts, 1)]
         data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
@@ -70,18 +64,15 @@ def test_two_named_surfaces_are_an_interface(read: Read, faces: tuple[object, ob
 def test_volume_cells_show_the_side_of_a_body(read: Read) -> None:
     upper, lower = TRIANGLES
     turned = [upper[0], upper[1][::-1]], [face[::-1] for face in lower]
-    for kwargs in ({}, {"flip": False}):
-        interface = read(*turned, solids=TETRAHEDRA, **kwargs)
-        normals = turns_of(interface.nodes[np.concatenate([interface.slave.faces, interface.master.faces])])[:, 0, 2]
-        assert (np.sign(normals) == [-1, -1, 1, 1]).all()
+    interface = read(*turned, solids=TETRAHEDRA)
+    normals = turns_of(interface.nodes[np.concatenate([interface.slave.faces, interface.master.faces])])[:, 0, 2]
+    assert (np.sign(normals) == [-1, -1, 1, 1]).all()
 
 
 def test_faces_without_cells_run_as_the_first_of_them(read: Read) -> None:
     upper, lower = TRIANGLES
     assert read([upper[0], upper[1][::-1]], lower).slave.faces.tolist() == upper
-    with pytest.raises(
-        MisuseError, match=r"--mesh: found mean normals \(.*\) of the slave and .*, which do not oppose"
-    ):
+    with pytest.raises(MisuseError, match=r"--mesh: found mean normals \(.*\) of the slave and .*, which do not"):
         read([face[::-1] for face in upper], lower)
     solids = TETRAHEDRA[2:]  # Only the master has cells.
     assert read([face[::-1] for face in upper], lower, solids=solids, flip=True).slave.faces.tolist() == upper
@@ -90,11 +81,7 @@ def test_faces_without_cells_run_as_the_first_of_them(read: Read) -> None:
 @pytest.mark.parametrize(
     ("upper", "lower", "message"),
     [
-        (
-            [[0, 2, 1, 10, 11, 12]],
-            TRIANGLES[1],
-            r"--slave: found 'punch' with elements triangle6; needed triangles alone",
-        ),
+        ([[0, 2, 1, 10, 11, 12]], TRIANGLES[1], "--slave: found 'punch' with elements triangle6; needed triangles al"),
         ([*TRIANGLES[0], [2, 0, 1]], TRIANGLES[1], "--slave: found the same face twice; needed each face once"),
         (TRIANGLES[0], [[4, 5, 6], [4, 6, 0]], r"--master: found a node of the slave surface too, at \(0, 0, 0.5\)"),
         (TRIANGLES[0], [[4, 5, 6], [4, 6, 7], [4, 6, 9]], r"--master: found 3 faces on one edge, at \(-1, -1, 0\)"),
@@ -114,9 +101,8 @@ def test_a_face_inside_a_body_is_refused(read: Read) -> None:
 
 
 def test_a_group_that_is_missing_is_named(tmp_path: Path) -> None:
-    mesh = meshio.Mesh(
-        POINTS, [("triangle", np.concatenate(TRIANGLES))], cell_data={"cell_tags": [np.array([1, 1, 2, 2])]}
-    )
+    tags = {"cell_tags": [np.array([1, 1, 2, 2])]}
+    mesh = meshio.Mesh(POINTS, [("triangle", np.concatenate(TRIANGLES))], cell_data=tags)
     mesh.write(tmp_path / "mesh.vtu")
     assert len(read_interface(tmp_path / "mesh.vtu", slave="1", master="2").master) == 2
     with pytest.raises(MisuseError, match=r"--master: found '3', which is no group of the file; needed one of '1'"):
@@ -151,9 +137,7 @@ def test_states_of_a_given_interface_penetrate_it(read: Read, make: Callable[...
         ("nts", TRIANGLES, "triangles in space; needed one of segments in the plane, on which nts is asked"),
     ],
 )
-def test_a_formulation_is_refused_on_faces_that_it_does_not_take(
-    read: Read, name: str, faces: Any, needed: str
-) -> None:
+def test_a_formulation_is_refused_on_other_faces(read: Read, name: str, faces: Any, needed: str) -> None:
     with pytest.raises(MisuseError, match=f"place: found an interface of {needed}"):
         run([load_subject(name)], [load_property("balance.force")], place=read(*faces), examples=1, seed=1)
 
