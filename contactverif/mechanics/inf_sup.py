@@ -23,7 +23,6 @@ import numpy as np
 from scipy import linalg
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
-from contactverif.contract.interface import Interface
 from contactverif.contract.subject import CheckedFormulation
 from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.scene import Scene
@@ -77,13 +76,11 @@ def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bo
 
 def force_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
     """Return the nodal forces (n_multipliers, n_unknowns) of unit multipliers, in the reference positions."""
-    interface = scene.interface
-    state = _pressed_state(interface, formulation)
-    n, count = interface.n_unknowns, state.size - interface.n_unknowns
-    states = np.tile(state, (count + 1, 1))
-    states[1:, n:] += np.eye(count)
-    forces = _residuals(interface, formulation, state, states)[:, :n]
-    rows: FloatArray = forces[1:] - forces[0]
+    n, count = scene.interface.n_unknowns, formulation.n_multipliers(scene.interface)
+    shifts = np.zeros((count + 1, n + count))
+    shifts[1:, n:] = np.eye(count)
+    forces = _residuals(scene, formulation, shifts)
+    rows: FloatArray = forces[1:, :n] - forces[0, :n]
     return rows
 
 
@@ -92,31 +89,26 @@ def gap_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
 
     They are central differences. Of nodes that touch, only what moves across the interface opens or closes a gap.
     """
-    interface = scene.interface
-    state = _pressed_state(interface, formulation)
-    n, sides = interface.n_unknowns, (interface.slave, interface.master)
-    shortest = min(float(side.lengths(interface.nodes).min()) for side in sides)
+    interface, across = scene.interface, scene.bodies[0].frame[:, 1]
+    n, n_nodes, count = interface.n_unknowns, interface.n_nodes, formulation.n_multipliers(interface)
+    shortest = min(float(side.lengths(interface.nodes).min()) for side in (interface.slave, interface.master))
     step = shortest * UNIT_ROUNDOFF ** (1 / 3)
-    shifts = np.zeros((interface.n_nodes, state.size))
-    across = scene.bodies[0].frame[:, 1]
+    shifts = np.zeros((n_nodes, n + count))
     for direction in (0, 1):
-        shifts[np.arange(interface.n_nodes), 2 * np.arange(interface.n_nodes) + direction] = step * across[direction]
-    states = np.concatenate([state + shifts, state - shifts])
-    values = _residuals(interface, formulation, state, states)[:, n:]
-    derivatives = (values[: interface.n_nodes] - values[interface.n_nodes :]).T / (2 * step)
+        shifts[np.arange(n_nodes), 2 * np.arange(n_nodes) + direction] = step * across[direction]
+    values = _residuals(scene, formulation, np.concatenate([shifts, -shifts]))[:, n:]
+    derivatives = (values[:n_nodes] - values[n_nodes:]).T / (2 * step)
     rows: FloatArray = (derivatives[:, :, None] * across).reshape(len(derivatives), n)
     return rows
 
 
-def _pressed_state(interface: Interface, formulation: CheckedFormulation) -> FloatArray:
-    """Return the reference positions with multipliers of 1, so that every point that faces something is active."""
-    return np.concatenate([interface.nodes.reshape(-1), np.ones(formulation.n_multipliers(interface))])
+def _residuals(scene: Scene, formulation: CheckedFormulation, shifts: FloatArray) -> FloatArray:
+    """Return the residuals of states that are shifted (n_states, n) from one, in batches, on the pairing of that one.
 
-
-def _residuals(
-    interface: Interface, formulation: CheckedFormulation, state: FloatArray, states: FloatArray
-) -> FloatArray:
-    """Return the residuals of states (n_states, n), in batches, on the pairing of one state."""
+    It has the reference positions and multipliers of 1, so that every point that faces something is active.
+    """
+    interface = scene.interface
+    state = np.concatenate([interface.nodes.reshape(-1), np.ones(formulation.n_multipliers(interface))])
     pairing = formulation.pair(interface, state)
-    batches = (states[start : start + _BATCH] for start in range(0, len(states), _BATCH))
+    batches = (state + shifts[start : start + _BATCH] for start in range(0, len(shifts), _BATCH))
     return np.concatenate([formulation.residual(interface, pairing, batch) for batch in batches])

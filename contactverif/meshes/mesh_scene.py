@@ -23,13 +23,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
 from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
-from contactverif.meshes.mesh_file import (
-    MeshSides,
-    check_facing,
-    corners_of_cells,
-    describe_place,
-    read_sides,
-)
+from contactverif.meshes.mesh_file import MeshSides, check_facing, corners_of_cells, describe_place, read_sides
 from contactverif.meshes.plain_mesh import unknown_group_error
 
 YOUNG, POISSON = 1.0, 0.3  # The material of a body that the user says nothing about.
@@ -137,13 +131,6 @@ class _Part:
         normal = mean_normal(Surface(self.contact), self.nodes)
         length = np.hypot(*normal)
         return normal / length if length > ONE_SIDED else np.zeros(2)
-
-    def body(self) -> Body:
-        """Return the body, checked."""
-        young, poisson = self.material
-        return Body(
-            self.nodes, self.cells, self.contact, young, poisson, self.fixed, self.imposed, name=f"{self.side} body"
-        )
 
 
 def _parts(sides: MeshSides) -> list[_Part]:
@@ -259,7 +246,8 @@ def _push_slaves(parts: list[_Part], scene: Scene) -> None:
 
 def _scene(parts: list[_Part]) -> Scene:
     """Return the scene of some bodies, slaves first."""
-    bodies = tuple(part.body() for part in parts)
+    arrays = [(part.nodes, part.cells, part.contact, *part.material, part.fixed, part.imposed) for part in parts]
+    bodies = tuple(Body(*each, name=f"{part.side} body") for each, part in zip(arrays, parts, strict=True))
     n_slaves = sum(part.side == "slave" for part in parts)
     elastic = [part for part in parts if len(part.cells)]
     if not elastic:

@@ -16,7 +16,6 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
 from contactverif.isolation.wire import PackedArray
@@ -110,21 +109,18 @@ def _unpack(stored: _PackedScene) -> Scene:
     facts = {key: np.asarray(values.unpack(), dtype=np.float64) for key, values in stored.facts.items()}
     bodies, slave, master = unpack_bodies(packed)
     scene = Scene(bodies, slave, master, stored.penalty, facts)
-    _check_facts(scene, facts)
+    if "compliance" in facts:  # Those of a uniform pressure, which no property could use otherwise
+        shapes: dict[str, tuple[int, ...]] = {
+            "compliance": (2,),
+            "along": (scene.interface.n_nodes,),
+            "direction": (2,),
+        }
+        shapes["pressure" if "pressure" in facts else "approach"] = ()
+        for name, shape in shapes.items():
+            values = facts.get(name)
+            if values is None or values.shape != shape or not np.isfinite(values).all():
+                actual = "nothing" if values is None else f"shape {values.shape} or numbers that are not finite"
+                needed = f"finite numbers of shape {shape}, as `two_blocks` gives them"
+                raise MisuseError(f"facts[{name!r}]", actual, needed)
     scene.case()  # It checks the interface and the penalty.
     return scene
-
-
-def _check_facts(scene: Scene, facts: dict[str, FloatArray]) -> None:
-    """Refuse facts of a uniform pressure that no property could use."""
-    if "compliance" not in facts:
-        return
-    shapes: dict[str, tuple[int, ...]] = {"compliance": (2,), "along": (scene.interface.n_nodes,), "direction": (2,)}
-    shapes["pressure" if "pressure" in facts else "approach"] = ()
-    for name, shape in shapes.items():
-        values = facts.get(name)
-        if values is None or values.shape != shape or not np.isfinite(values).all():
-            actual = "nothing" if values is None else f"shape {values.shape} or numbers that are not finite"
-            raise MisuseError(
-                f"facts[{name!r}]", actual, f"finite numbers of shape {shape}, as `two_blocks` gives them"
-            )
