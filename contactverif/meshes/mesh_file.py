@@ -121,12 +121,12 @@ def check_facing(interface: Interface) -> None:
         return
     words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in (slave, master)]
     if interface.dim == 2:
-        seen, cells, elements = "with its body on the left of its lines", "2-D", "lines"
+        side, cells, elements = "with its body on the left of its lines", "2-D", "lines"
         turn = "; or turn the lines of one group in the mesher (Gmsh: a minus sign before its curves)"
     else:
-        seen, cells, elements, turn = "seen from outside its body", "volume", "faces", ""
+        side, cells, elements, turn = "seen from outside its body", "volume", "faces", ""
     needed = (
-        f"surfaces that face each other, each {seen}. Keep the {cells} cells in the file, they tell the side{turn}; or "
+        f"surfaces that face each other, each {side}. Keep the {cells} cells in the file, they tell the side{turn}; or "
         f"give --flip where only one surface has cells beside it (it turns the {elements} without cells, and both "
         "surfaces where neither or each has cells)"
     )

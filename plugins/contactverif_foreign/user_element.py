@@ -241,8 +241,8 @@ class _Uel(Convention):
     def fill(self, elements: Elements, reference: FloatArray, u: FloatArray, properties: FloatArray) -> dict[str, Any]:
         n_elements = len(elements.nodes)
         moves, numbers = u.reshape(n_elements, -1), np.arange(1, n_elements + 1)[:, None]
-        given = {"PROPS": properties, "COORDS": reference.reshape(n_elements, -1), "U": moves, "DU": moves}
-        return given | {"JELEM": numbers, "JPROPS": elements.sides}
+        values = {"PROPS": properties, "COORDS": reference.reshape(n_elements, -1), "U": moves, "DU": moves}
+        return values | {"JELEM": numbers, "JPROPS": elements.sides}
 
     def flaw(self, rows: SlotRows) -> tuple[int, str] | None:
         """Return the first element that asks for a shorter increment; there is none to shorten."""
