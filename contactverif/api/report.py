@@ -1,4 +1,4 @@
-"""A run as scripts and notebooks see it: short when it is printed, a table and a picture in a notebook, files.
+"""A run as scripts and notebooks see it: short when it is printed, a table and pictures in a notebook, files.
 
 Rule: what takes long to import is imported where it is used.
 """
@@ -7,28 +7,88 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactverif.api.run_files import RUN_FILES, either, write_run
+from contactverif.api.run_files import PARAVIEW, RUN_FILES, either, write_run
 from contactverif.contract.counterexample import Counterexample, failing_examples
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Property, Verdict
+from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.remote import RemoteSubject
+from contactverif.run.judge import forces_to_draw
 from contactverif.run.ranking import by_rank
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from contactverif.api.drawing import Drawing
+    from matplotlib.figure import Figure
 
 _MOST_FORMULATIONS = 6  # With more of them, only all rows together are counted.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """The picture of a case. A notebook shows it.
+
+    Attributes
+    ----------
+    figure : Figure
+        The figure of matplotlib.
+    """
+
+    figure: Figure
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture to a file.
+
+        Parameters
+        ----------
+        path : str | os.PathLike[str]
+            The file, ``.png`` or ``.svg``; an older one is replaced.
+
+        Raises
+        ------
+        MisuseError
+            If the name has another suffix, or the file cannot be written.
+        """
+        from contactverif_reports.files import checked_name
+        from contactverif_reports.plot.case_figures import SUFFIXES, save
+
+        save(self.figure, checked_name(path, SUFFIXES))
+
+    def _repr_html_(self) -> str:
+        """Return the picture as SVG."""
+        from contactverif_reports.html.pages import svg_inline
+
+        return str(svg_inline(self.figure))
+
+
+def make_drawing(subject: Subject, question: Property, outcome: Outcome) -> Drawing:
+    """Return the picture of an outcome's case, with the forces of the formulation and, where known, the exact ones."""
+    from contactverif_reports.plot.case_figures import make_case_figure  # It brings matplotlib, which is slow.
+
+    title = f"{subject.name}, {question.id}: {outcome.reason or outcome.verdict}"
+    forces = forces_to_draw(question, outcome.case, subject)
+    of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
+    return Drawing(make_case_figure(outcome.case, title=title, forces=of_formulation, exact=exact))
+
+
+def draw_outcome(subject: Subject, question: Property, outcome: Outcome, path: Path, argument: str) -> None:
+    """Draw the case of an outcome to a picture, or write a case in space for ParaView."""
+    try:
+        if path.suffix.lower() == PARAVIEW:
+            from contactverif_reports.plot.vtu import write_surfaces
+
+            write_surfaces(outcome.case, forces_to_draw(question, outcome.case, subject), path)
+            return
+        make_drawing(subject, question, outcome).write(path)
+    except MisuseError as error:
+        raise MisuseError(argument, error.found, error.needed) from None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -56,8 +116,6 @@ class Failure(Counterexample):
         Drawing
             The picture: a notebook shows it, ``write("failure.svg")`` stores it, and ``figure`` is that of matplotlib.
         """
-        from contactverif.api.drawing import make_drawing
-
         try:
             return make_drawing(self.subject, self.question, self.outcome)
         finally:
@@ -94,27 +152,6 @@ class Report(Run):
 
     subjects: Mapping[str, Subject] = field(default_factory=dict)
     questions: Mapping[str, Property] = field(default_factory=dict)
-
-    @classmethod
-    def from_run(cls, run: Run, subjects: Iterable[object], questions: Iterable[object]) -> Report:
-        """Return the report of a run with its formulations and properties; what did not load plays no part.
-
-        Parameters
-        ----------
-        run : Run
-            The run.
-        subjects, questions : Iterable[object]
-            Its formulations and properties.
-
-        Returns
-        -------
-        Report
-            The report.
-        """
-        results = {entry.name: getattr(run, entry.name) for entry in fields(run)}
-        by_name = {item.name: item for item in subjects if isinstance(item, Subject)}
-        by_id = {item.id: item for item in questions if isinstance(item, Property)}
-        return cls(**results, subjects=by_name, questions=by_id)
 
     @property
     def failures(self) -> list[Failure]:

@@ -1,4 +1,4 @@
-"""The files that hold a run: a report, a page, and what other programs read."""
+"""The files that hold a run (a report, a page, what other programs read) or the picture of a case."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ PAGE = ".html"
 JSON = ".json"
 JUNIT = ".xml"
 RUN_FILES = (REPORT, PAGE, JSON, JUNIT)
+PICTURES = (".png", ".svg")
+PARAVIEW = ".vtu"  # A case in space, or a solved scene.
 
 
 def write_run(run: Run, path: Path, report: Path | None = None) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
+from dataclasses import fields
 from typing import Any
 
 from contactverif.api.report import Report
@@ -109,8 +110,11 @@ def verify(
         )
     questions = _load_questions(properties)
     items = _items(formulations, "formulations", _FORMULATIONS)
-    names = [item for item in items if isinstance(item, str)]
-    limits = _limits(isolation) if names else None
+    limits = None  # Of the processes of registered names; None if there are none, or they run in this process.
+    if any(isinstance(item, str) for item in items):
+        if isolation not in (None, *Isolation):
+            raise MisuseError("isolation", repr(isolation), "box, landlock, process, inline or None")
+        limits = RunOptions(isolation=None if isolation is None else Isolation(isolation)).limits(argument="isolation")
     try:
         subjects = [_load_subject(item, limits) for item in items]
         result = run(
@@ -129,7 +133,11 @@ def verify(
     finally:
         if limits is not None:
             end_all()
-    return Report.from_run(result, subjects, questions)
+    return Report(
+        **{entry.name: getattr(result, entry.name) for entry in fields(result)},
+        subjects={item.name: item for item in subjects if isinstance(item, Subject)},
+        questions={item.id: item for item in questions if isinstance(item, Property)},
+    )
 
 
 def _items(argument: Any, name: str, needed: str) -> list[Any]:
@@ -157,14 +165,6 @@ def _load_questions(properties: Any) -> list[Property | NotLoaded]:
     names = [item for item in items if isinstance(item, str)]
     loaded = load_properties(names) if names else ()
     return [*loaded, *(item for item in items if not isinstance(item, str))]
-
-
-def _limits(isolation: str | None) -> Limits | None:
-    """Return the limits of the processes of registered names; None if they run in this process."""
-    if isolation is not None and isolation not in [*Isolation]:
-        raise MisuseError("isolation", repr(isolation), "box, landlock, process, inline or None")
-    wanted = None if isolation is None else Isolation(isolation)
-    return RunOptions(isolation=wanted).limits(argument="isolation")
 
 
 def _load_subject(item: Any, limits: Limits | None) -> Subject | NotLoaded:

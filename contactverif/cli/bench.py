@@ -20,13 +20,7 @@ from contactverif.run.journal import journal_folder, remove_journal
 from contactverif.run.run_options import RunOptions
 from contactverif.studies.bench_plan import BenchPlan, make_plan
 from contactverif.studies.bench_study import run_bench
-from contactverif_reports.bench_costs import (
-    BenchChange,
-    bench_markdown,
-    compare_benches,
-    cost_sentences,
-    overview_table,
-)
+from contactverif_reports import bench_costs
 from contactverif_reports.bench_results import BenchResults, Outcome
 from contactverif_reports.files import whole
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
@@ -54,14 +48,31 @@ def bench(
     else:
         plan = make_plan(scene, quick=quick, instances=instances, processes=processes)
         results = _run(options, plan, files)
-    since = () if old is None else compare_benches(results, old)
-    _write(results, since, files, pictures, file)
+    since = () if old is None else bench_costs.compare_benches(results, old)
+    # The files are written before anything is shown.
+    if REPORT in files.paths:
+        write_bench(results, files.paths[REPORT])
+        remove_journal(journal_folder(files.paths[REPORT]))
+    if pictures is not None:
+        from contactverif_reports.plot.bench_figures import plot_bench  # It imports matplotlib, which is slow.
+
+        plot_bench(results, pictures)
+    if PAGE in files.paths:
+        from contactverif_reports.html.bench_page import bench_page
+        from contactverif_reports.html.pages import write_page
+
+        write_page(files.paths[PAGE], bench_page(results, since))
+    if MARKDOWN in files.paths:
+        name_of_report = (files.names.get(REPORT) or Path(file)).name
+        with whole(files.paths[MARKDOWN]) as part:
+            text = bench_costs.bench_markdown(results, name_of_report, pictures is not None)
+            part.write_text(text, encoding="utf-8")
     for name in results.scenes:
-        show(overview_table(results, name).terminal(dense=True))
+        show(bench_costs.overview_table(results, name).terminal(dense=True))
     if any(results.uses_differences(name, each) for name in results.formulations for each in results.scenes):
         show("* with differences of forces where there is no tangent, or it did not help")
     for name in results.scenes:
-        show("\n".join(cost_sentences(results, name, results.targets[name][0])))
+        show("\n".join(bench_costs.cost_sentences(results, name, results.targets[name][0])))
     for name, reason in results.not_loaded.items():
         show(f"{name} is not measured: {reason}")
     if old is not None:
@@ -84,25 +95,3 @@ def _run(options: RunOptions, plan: BenchPlan, files: OutputFiles) -> BenchResul
     one_thread = all(os.environ.get(name) == "1" for name in ONE_THREAD)
     facts = {"command": shlex.join(["contactverif", *sys.argv[1:]]), "threads": "1" if one_thread else "not set"}
     return replace(results, provenance={**results.provenance, **facts})
-
-
-def _write(
-    results: BenchResults, since: Sequence[BenchChange], files: OutputFiles, pictures: Path | None, file: str
-) -> None:
-    """Write the files that the user wants, before anything is shown; `file` is the one that was read, if one was."""
-    if REPORT in files.paths:
-        write_bench(results, files.paths[REPORT])
-        remove_journal(journal_folder(files.paths[REPORT]))
-    if pictures is not None:
-        from contactverif_reports.plot.bench_figures import plot_bench  # It imports matplotlib, which is slow.
-
-        plot_bench(results, pictures)
-    if PAGE in files.paths:
-        from contactverif_reports.html.bench_page import bench_page
-        from contactverif_reports.html.pages import write_page
-
-        write_page(files.paths[PAGE], bench_page(results, since))
-    if MARKDOWN in files.paths:
-        report = (files.names.get(REPORT) or Path(file)).name
-        with whole(files.paths[MARKDOWN]) as part:
-            part.write_text(bench_markdown(results, report, pictures is not None), encoding="utf-8")

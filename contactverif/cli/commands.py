@@ -353,7 +353,7 @@ def audit(
     """
 
 
-@done_in("scenes")
+@done_in("replay")
 def draw(
     *,
     report: Annotated[
@@ -492,7 +492,7 @@ def paper(
     """
 
 
-@done_in("scenes")
+@done_in("listing")
 def list_scenes() -> None:
     """List the named scenes, with drawings, and their options.
 

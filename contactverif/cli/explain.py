@@ -15,17 +15,9 @@ from contactverif.cli.console import echo, show, show_verbatim
 from contactverif.contract.counterexample import Counterexample, counterexamples, find_counterexample
 from contactverif.contract.errors import MisuseError, unknown_name_error
 from contactverif.contract.result import Run
+from contactverif.explanations import terms
 from contactverif.explanations.case_numbers import case_text
 from contactverif.explanations.property_text import property_text, stated_failures
-from contactverif.explanations.terms import (
-    list_of_terms,
-    symbol_meanings,
-    term_text,
-    term_texts,
-    trait_names,
-    trait_text,
-    without_links,
-)
 from contactverif.plugins.registry import load_formulations, property_ids, the_property
 from contactverif.run.run_options import RunOptions
 from contactverif_reports.netcdf.read import read_run
@@ -37,18 +29,29 @@ _MOST_COLUMNS = 80  # Longer lines are hard to read.
 def explain(name: str | None, report: Path | None, case: str | None, options: RunOptions) -> None:
     """Explain a name, with the numbers of a report; or list the terms."""
     run, examples = _read(name, report, case)
-    if run is not None:
-        name = name or examples[0].property_id
-    if name in property_ids(engines=True):
-        _explain_property(name, run, examples, report, options)
-    elif name is None:
-        _show(list_of_terms())
-    elif text := term_text(name) or trait_text(name):
-        _show(text)
-    else:
-        names = {*property_ids(engines=True), *term_texts(), *symbol_meanings(), *trait_names()}
-        needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
-        raise unknown_name_error("NAME", name, names, needed)
+    name = examples[0].property_id if name is None and examples else name
+    ids = property_ids(engines=True)
+    if name not in ids:
+        text = terms.list_of_terms() if name is None else terms.term_text(name) or terms.trait_text(name)
+        if name is not None and not text:
+            names = {*ids, *terms.term_texts(), *terms.symbol_meanings(), *terms.trait_names()}
+            needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
+            raise unknown_name_error("NAME", name, names, needed)
+        show(TerminalMarkdown(text))
+        return
+    question = the_property(name)
+    show(TerminalMarkdown(property_text(question)))
+    for row in run.rows if run is not None and not examples else ():
+        if row.property_id == name:
+            echo(f"\n{row.formulation}: {row.result}{': ' if row.reason else ''}{row.reason}")
+    for example in examples:
+        echo("")
+        diagnosis = run.diagnoses.get(example.formulation, "") if run is not None else ""
+        show(TerminalMarkdown(case_text(example, diagnosis, solved=question.bodies)))
+        show_verbatim(Text(f"\n{as_text(example.case)}\n{example.replay_command(str(report))}"))
+    echo("")
+    # The formulations come last, because a reader need not wait until they are loaded.
+    show(TerminalMarkdown(stated_failures(question, load_formulations(options.limits()))))
 
 
 def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run | None, list[Counterexample]]:
@@ -71,29 +74,6 @@ def _read(name: str | None, report: Path | None, case: str | None) -> tuple[Run 
     return run, examples
 
 
-def _explain_property(
-    name: str, run: Run | None, examples: list[Counterexample], report: Path | None, options: RunOptions
-) -> None:
-    question = the_property(name)
-    _show(property_text(question))
-    if run is not None and not examples:
-        for row in run.rows:
-            if row.property_id == name:
-                echo(f"\n{row.formulation}: {row.result}{': ' if row.reason else ''}{row.reason}")
-    for example in examples:
-        echo("")
-        diagnosis = run.diagnoses.get(example.formulation, "") if run is not None else ""
-        _show(case_text(example, diagnosis, solved=question.bodies))
-        show_verbatim(Text(f"\n{as_text(example.case)}\n{example.replay_command(str(report))}"))
-    echo("")
-    # The formulations come last, because a reader need not wait until they are loaded.
-    _show(stated_failures(question, load_formulations(options.limits())))
-
-
-def _show(markdown: str) -> None:
-    show(TerminalMarkdown(markdown))
-
-
 class _LeftHeading(Heading):
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         yield Text(self.text.plain, style="bold")
@@ -111,7 +91,7 @@ class TerminalMarkdown:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
         narrow = options.update(width=min(options.max_width, _MOST_COLUMNS))
-        for line in console.render_lines(_Markdown(without_links(self.markdown)), narrow):
+        for line in console.render_lines(_Markdown(terms.without_links(self.markdown)), narrow):
             text = Text.assemble(*((part.text, part.style or "") for part in line), no_wrap=True)
             text.rstrip()
             yield text

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin,
 
 import typer
 
-from contactverif.api.run_files import JSON, JUNIT, PAGE, REPORT, either
+from contactverif.api.run_files import JSON, JUNIT, PAGE, PARAVIEW, PICTURES, REPORT, either
 from contactverif.contract.errors import MisuseError
 from contactverif.run.run_options import Option, RunOptions, declared_options, group_names
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from contactverif.contract.case import Case
     from contactverif.contract.interface import Interface
 
-PICTURES = (".png", ".svg")
-SOLVED_SCENE = ".vtu"
 MARKDOWN = ".md"
 _LABELS = {
     REPORT: "report",
@@ -32,9 +30,8 @@ _LABELS = {
     MARKDOWN: "page",
     JSON: "JSON",
     JUNIT: "JUnit",
-    ".png": "picture",
-    ".svg": "picture",
-    SOLVED_SCENE: "for ParaView",
+    **dict.fromkeys(PICTURES, "picture"),
+    PARAVIEW: "for ParaView",
 }
 
 
@@ -278,10 +275,6 @@ class OutputFiles:
             {key: path for key, path in files.items() if key in suffixes} for files in (self.names, self.paths)
         )
         return OutputFiles(names, paths)
-
-    def drawings(self) -> Iterator[Path]:
-        """Yield the absolute path of each picture, and of a file for ParaView."""
-        yield from (path for suffix, path in self.paths.items() if suffix in (*PICTURES, SOLVED_SCENE))
 
     def announce(self) -> None:
         """Print the name of each file that was written, a line each."""

@@ -1,33 +1,52 @@
-"""The work of `replay` and `audit`: one case of a stored report, or all of it, is judged again."""
+"""The work of `replay`, `draw` and `audit`: a stored case, a scene, or a whole report is judged or solved again."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
+from math import isnan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from contactverif.api.drawing import draw_outcome
+from contactverif.api.report import draw_outcome
+from contactverif.api.run_files import PARAVIEW, PICTURES
 from contactverif.cli.console import echo, print_plugin_output, show
-from contactverif.cli.options import PICTURES, SOLVED_SCENE, OutputFiles, read_place, with_engines
+from contactverif.cli.options import OutputFiles, read_place, with_engines
 from contactverif.cli.run_screen import ending_lines
 from contactverif.contract.case import Case
+from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.errors import MisuseError, parse_name
 from contactverif.contract.interface import PLANE
-from contactverif.contract.property import Verdict
+from contactverif.contract.property import Outcome, Verdict
 from contactverif.contract.result import Run
-from contactverif.plugins.registry import formulation_names, the_property, the_subject
+from contactverif.contract.subject import Subject
+from contactverif.isolation.file_reader import check_ordinary
+from contactverif.isolation.limits import Limits
+from contactverif.mechanics.scene import has_bodies
+from contactverif.plugins.registry import (
+    formulation_names,
+    load_formulation,
+    the_formulation,
+    the_property,
+    the_subject,
+)
+from contactverif.problems.catalogue import load_scene
 from contactverif.run.audit import Audit
 from contactverif.run.audit import audit as audit_run
 from contactverif.run.judge import judge_if_applicable
 from contactverif.run.run_options import RunOptions
 from contactverif.sampling.draw import Sampling
+from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
 from contactverif_reports.netcdf.write import write
 from contactverif_reports.plot.text import as_text
-from contactverif_reports.tables import Column, Table
+from contactverif_reports.plot.vtu import write_vtu
+from contactverif_reports.tables import Column, Table, numbers
 
+_DRAWINGS = (*PICTURES, PARAVIEW)
 _MOST_LINES = 20  # The most differences that are listed.
+_MOST_COLUMNS = 80  # The largest number of columns of a remark.
 
 
 def replay(
@@ -39,19 +58,15 @@ def replay(
     options: RunOptions,
 ) -> int:
     """Judge a stored counterexample again, or list the ids; return 1 if it fails again, else 0."""
-    files = OutputFiles.check(out, (*PICTURES, SOLVED_SCENE))
+    files = OutputFiles.check(out, _DRAWINGS)
     if case is None:
-        ids = case_ids(report)
-        echo("\n".join(ids) if ids else "no counterexamples: nothing failed")
+        echo("\n".join(case_ids(report)) or "no counterexamples: nothing failed")
         return 0
     example = read_case(report, case)
-    check_surfaces(example.case, files)
+    _check_surfaces(example.case, files)
     instead = formulation if engine is None else with_engines((), [engine])[0]
     subject = the_subject(instead or announce_stored(example.formulation), options.limits())
-    question = the_property(example.property_id)
-    outcome = judge_if_applicable(question, example.case, subject)
-    for picture in files.drawings():  # before anything is printed, in case a file cannot be written
-        draw_outcome(subject, question, outcome, picture, argument="--out")
+    outcome = _judge_and_draw(example, subject, files)  # Before anything is printed: a file may not be writable.
     echo(as_text(example.case))
     table = Table([Column(head, wrap=True) for head in ("", "formulation", "verdict", "reason")])
     table.add("stored", example.formulation, str(example.verdict), example.reason)
@@ -61,6 +76,118 @@ def replay(
         echo(line)
     files.announce()
     return 1 if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED) else 0
+
+
+def draw(
+    report: Path | None,
+    case: str | None,
+    scene: str | None,
+    formulation: Sequence[str],
+    out: Sequence[Path],
+    options: RunOptions,
+) -> int:
+    """Draw a scene or a counterexample; return 0 if every formulation loaded and kept its contract, else 1."""
+    files, limits, names = OutputFiles.check(out, _DRAWINGS), options.limits(), formulation
+    for name in names:
+        if names.count(name) > 1:
+            raise MisuseError("--formulation", f"{name} twice", "each formulation once")
+    complete = True
+    if scene is not None:
+        for option, value in (("--case", case), ("REPORT", report)):
+            if value is not None:
+                raise MisuseError("--scene", f"{scene} and {option} {value}", "one of the two")
+        case_of_scene = load_scene(scene).case()
+        if not names:
+            raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
+        complete = _draw_solved(case_of_scene, names, scene, files, limits)
+    else:
+        example = _read_stored(report, case)
+        if has_bodies(example.case):
+            names = names or [announce_stored(example.formulation)]
+            complete = _draw_solved(example.case, names, f"{case}: {example.reason}", files, limits)
+        else:
+            _check_surfaces(example.case, files)
+            if len(names) > 1:
+                raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
+            subject = the_formulation(names[0] if names else announce_stored(example.formulation), limits)
+            _judge_and_draw(example, subject, files)
+            if not files.paths:
+                echo(as_text(example.case))
+            files.announce()
+    print_plugin_output()
+    return 0 if complete else 1
+
+
+def _judge_and_draw(example: Counterexample, subject: Subject, files: OutputFiles) -> Outcome:
+    question = the_property(example.property_id)
+    outcome = judge_if_applicable(question, example.case, subject)
+    for path in files.paths.values():
+        draw_outcome(subject, question, outcome, path, argument="--out")
+    return outcome
+
+
+def _check_surfaces(case: Case, files: OutputFiles) -> None:
+    """Refuse a file for ParaView of an interface in the plane."""
+    if case.interface.dim == PLANE and PARAVIEW in files.names:
+        raise MisuseError("--out", f"{files.names[PARAVIEW]} for a case without bodies", "a .png or .svg file")
+
+
+def announce_stored(name: str) -> str:
+    """Say on standard error which formulation a report names, before it is loaded; return the name.
+
+    Running it runs installed code with options that a stranger may have chosen.
+    """
+    base, options = parse_name("REPORT", name)
+    installed = formulation_names()
+    for part in base.split("/"):
+        if part not in installed:
+            needed = "an installed one: install its plugin, or give --formulation NAME"
+            raise MisuseError("REPORT", f"the formulation {part!r}, which is not installed", needed)
+    listed = ", ".join(f"{option} = {value!r}" for option, value in options.items())
+    echo(f"the report names the formulation {base}, {listed or 'without options'}", to_stderr=True)
+    return name
+
+
+def _read_stored(report: Path | None, case: str | None) -> Counterexample:
+    if report is None and case is None:
+        raise MisuseError("--scene", "nothing to draw", "--scene NAME, or REPORT --case ID")
+    if report is None:
+        raise MisuseError("REPORT", f"none, but --case {case}", "the report that holds the case")
+    if case is None:
+        check_ordinary(report, "REPORT", "a report that `contactverif verify --out FILE.nc` wrote, or --scene NAME")
+        raise MisuseError("--case", "nothing", f"--case ID; `contactverif replay {report}` lists the ids")
+    return read_case(report, case)
+
+
+def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFiles, limits: Limits | None) -> bool:
+    """Solve a scene with each formulation and write the files; return whether all could be used."""
+    if PARAVIEW in files.names and len(names) > 1:
+        file_for_many = f"{files.names[PARAVIEW]} for {len(names)} formulations"
+        raise MisuseError("--out", file_for_many, "one --formulation: a .vtu file holds one solution")
+    scene = solve_scene(case, [load_formulation(name, limits) for name in names])
+    for suffix, path in files.paths.items() if scene.solutions else ():
+        if suffix == PARAVIEW:
+            write_vtu(scene, scene.solutions[0], path)
+        else:
+            from contactverif_reports.plot.scene_figures import plot_scene  # importing matplotlib is slow
+
+            plot_scene(scene, path, title=title)
+    if not (scene.solutions and files.paths):
+        echo(as_text(case))
+    if scene.solutions:
+        # How Newton's method ended for each formulation, a line each.
+        table = Table([Column("formulation"), Column("end"), *numbers("iterations", "residual", "stress error")])
+        for each in scene.solutions:
+            residual = f"{each.residuals[-1]:.2g}"
+            table.add(each.formulation, str(each.end), each.n_iterations, residual, each.stress_error)
+        without_stress = all(isnan(each.stress_error) for each in scene.solutions)
+        show((table.without("stress error") if without_stress else table).terminal())
+    remarks = [(each.formulation, text) for each in scene.solutions for text in (each.advice, each.remark) if text]
+    for name, text in (*remarks, *scene.failures.items()):
+        echo("\n".join(textwrap.wrap(f"{name}: {text}", _MOST_COLUMNS, subsequent_indent="  ")))
+    if scene.solutions:
+        files.announce()
+    return not scene.failures
 
 
 def check_share(share: float) -> None:
@@ -73,21 +200,6 @@ def audit(report: Path, share: float, options: RunOptions) -> int:
     """Audit a report, and show what differs; return 1 if something does, else 0."""
     check_share(share)
     run = read_run(report, consistent=False)
-    sampling = _sampling(run, options)
-    limits = options.limits()
-    subjects = [the_subject(name, limits) for name in run.formulations]
-    questions = [the_property(id_) for id_ in run.properties]
-    result = audit_run(run, subjects, questions, sampling, share)
-    with TemporaryDirectory() as folder:
-        derived = Path(folder) / "derived.nc"
-        write(result.derived, derived)
-        derivable = same_data(report, derived, names=("the report", "what follows from its numbers"))
-    _show_audit(run, result, derivable)
-    print_plugin_output()
-    return 1 if derivable or result.differences else 0
-
-
-def _sampling(run: Run, options: RunOptions) -> Sampling:
     stored, typed = run.provenance.get("place", ""), options.place_words
     if stored != typed:
         difference = f"a run with {stored or 'no place'}, and here {typed or 'none'}"
@@ -96,7 +208,16 @@ def _sampling(run: Run, options: RunOptions) -> Sampling:
         examples, seed = (int(run.provenance[name]) for name in ("examples", "seed"))
     except (KeyError, ValueError):
         raise MisuseError("REPORT", "a report without its number of cases or its seed", "an undamaged report") from None
-    return Sampling.at(read_place(options), examples, seed)
+    sampling, limits = Sampling.at(read_place(options), examples, seed), options.limits()
+    subjects = [the_subject(name, limits) for name in run.formulations]
+    result = audit_run(run, subjects, [the_property(id_) for id_ in run.properties], sampling, share)
+    with TemporaryDirectory() as folder:
+        derived = Path(folder) / "derived.nc"
+        write(result.derived, derived)
+        derivable = same_data(report, derived, names=("the report", "what follows from its numbers"))
+    _show_audit(run, result, derivable)
+    print_plugin_output()
+    return 1 if derivable or result.differences else 0
 
 
 def _show_audit(run: Run, audit: Audit, derivable: list[str]) -> None:
@@ -117,25 +238,3 @@ def _show_audit(run: Run, audit: Audit, derivable: list[str]) -> None:
     if chances:
         show(f"chance to see one forged outcome among so many: {', '.join(chances)}")
     show("Something differs." if lines else "Nothing differs.")
-
-
-def check_surfaces(case: Case, files: OutputFiles) -> None:
-    """Refuse a file for ParaView of an interface in the plane."""
-    if case.interface.dim == PLANE and SOLVED_SCENE in files.names:
-        raise MisuseError("--out", f"{files.names[SOLVED_SCENE]} for a case without bodies", "a .png or .svg file")
-
-
-def announce_stored(name: str) -> str:
-    """Say on standard error which formulation a report names, before it is loaded; return the name.
-
-    Running it runs installed code with options that a stranger may have chosen.
-    """
-    base, options = parse_name("REPORT", name)
-    installed = formulation_names()
-    for part in base.split("/"):
-        if part not in installed:
-            needed = "an installed one: install its plugin, or give --formulation NAME"
-            raise MisuseError("REPORT", f"the formulation {part!r}, which is not installed", needed)
-    listed = ", ".join(f"{option} = {value!r}" for option, value in options.items())
-    echo(f"the report names the formulation {base}, {listed or 'without options'}", to_stderr=True)
-    return name

@@ -10,13 +10,14 @@ from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import typer
 from rich.text import Text
 
-from contactverif.api.drawing import draw_outcome
+from contactverif.api.report import draw_outcome
 from contactverif.api.run_files import REPORT, RUN_FILES, write_run
 from contactverif.cli.annotations import annotate
 from contactverif.cli.console import columns, echo, print_plugin_output, show
@@ -51,7 +52,6 @@ _STOPPED = 130  # The exit status after Ctrl-C.
 _NOT_WRITTEN = 2  # The exit status if a file could not be written.
 _CAMPAIGN_SEED = 0  # The seed if there is none: all shards must have the same.
 _BESIDE_RESUME = ("every", "keep_going", "last_failed", "memory", "jobs")
-_Loaded = TypeVar("_Loaded")
 
 
 def verify(options: RunOptions, screen: Screen, resume: Path | None) -> int:
@@ -61,9 +61,7 @@ def verify(options: RunOptions, screen: Screen, resume: Path | None) -> int:
         job = resumed_job(resume, replace(options, names=with_engines(options.names, options.engines), engines=()))
     else:
         job = new_job(replace(options, names=select_names(options)).with_settings())
-    if options.last_failed:
-        return _judge_last_failed(job)
-    return _run_job(job, screen, memory=memory)
+    return _judge_last_failed(job) if options.last_failed else _run_job(job, screen, memory=memory)
 
 
 def campaign(options: RunOptions, shard: str, folder: Path) -> int:
@@ -79,7 +77,7 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
             echo(f"shard {piece.text} is done already")
             return 0
         plugins = replace(job, hidden=(folder.absolute(),)).load()
-        for item in (*plugins.subjects, *plugins.questions):
+        for item in chain(*plugins):
             if isinstance(item, NotLoaded):
                 words = f"{name_line(item.formulation)} does not load: {one_line(item.reason)}"
                 echo(f"contactverif: {words}", to_stderr=True)
@@ -107,8 +105,8 @@ def merge(folder: Path, out: Sequence[Path], options: RunOptions, audit: bool, s
     plan, journals = read_shards(folder, "FOLDER")
     planned, shrink = options_of(plan, CAMPAIGN, "FOLDER"), options.shrink
     job = new_job(replace(planned, shrink=shrink or planned.shrink, out=tuple(out)))
-    files = " ".join(f"--out {shlex.quote(str(path))}" for path in out)
-    again = f"contactverif merge {shlex.quote(str(folder))} {files}{f' --shrink {shrink}' if shrink else ''}"
+    files = [word for path in out for word in ("--out", str(path))]
+    again = shlex.join(["contactverif", "merge", str(folder), *files, *(["--shrink", shrink] if shrink else [])])
     if audit and REPORT not in job.files.names:
         raise MisuseError("--audit", "no report", f"--out FILE{REPORT} beside it")
     status = _run_job(replace(job, sources=journals, again=again), screen)
@@ -118,8 +116,7 @@ def merge(folder: Path, out: Sequence[Path], options: RunOptions, audit: bool, s
     return status
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plugins:
+class Plugins(NamedTuple):
     """The formulations and the properties of a run, as they were loaded."""
 
     subjects: Sequence[Subject | NotLoaded]
@@ -160,14 +157,10 @@ class Job:
         return self.options.limits([*files, *map(journal_folder, files), *self.hidden])
 
     def run_options(self, **others: Any) -> dict[str, Any]:
-        """Return the options of a run, those of `contactverif.run.run.run`, and others beside them."""
-        return others | {
-            "profile": self.options.size,
-            "place": self.place,
-            "known": self.options.known,
-            "keep_going": self.options.keep_going,
-            "shrink": self.options.shrink or "one",
-        }
+        """Return the options of `contactverif.run.run.run`, and others beside them."""
+        of_run = {name: getattr(self.options, name) for name in ("known", "keep_going")}
+        shrink = self.options.shrink or "one"
+        return others | of_run | {"profile": self.options.size, "place": self.place, "shrink": shrink}
 
     @property
     def jobs(self) -> int:
@@ -196,33 +189,26 @@ class Job:
         )
 
     @contextmanager
-    def begin(self, load: Callable[[], _Loaded]) -> Iterator[tuple[_Loaded, Store]]:
-        """Open a block with what a function loads, and with the store of the run.
+    def begin(self, load: Callable[[], Plugins]) -> Iterator[tuple[Plugins, Store]]:
+        """Open a block with what a function loads, and with the store of the run, whose journal no other process uses.
 
         The store is there before a box is, which hides it. A plugin that lives in this process is loaded before: it
         may end us, and then leaves no file.
         """
         first = load() if self.options.isolation is Isolation.INLINE else None
-        with self._store() as store:
-            yield first or load(), store
-
-    @contextmanager
-    def _store(self) -> Iterator[Store]:
-        """Open a block with the store of the run. In it no other process uses the same journal."""
         if self.output is None:
-            yield Store()
+            yield first or load(), Store()
             return
         plan, outputs = self.plan(), tuple(self.files.paths.values())
         folder = journal_folder(self.files.paths[self.output.suffix.lower()])
-        journal = hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs)
-        with journal as aside:
+        with hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs) as aside:
             if aside:
                 folder_aside = self.output.parent / aside
                 echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", to_stderr=True)
             keep_earlier(folder, outputs)
             store = Store(plan, folder, self.sources)
             try:
-                yield store
+                yield first or load(), store
             finally:
                 _print_remarks(store)
 
@@ -291,17 +277,17 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
                 store.failures = failures.recall(job.options.names, job.options.properties)
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
             options = job.run_options(progress=bar.show_progress, executor=executor, store=store)
-            result = run(plugins.subjects, plugins.questions, **options)
+            result = run(*plugins, **options)
         if failures is not None:
             failures.update(result.rows)
-        gap = partial(find_missing, result, plugins.subjects, plugins.questions, job.sampling)
+        missing = partial(find_missing, result, *plugins, job.sampling)
         write = partial(write_run, result, report=job.files.names.get(REPORT))
-        end = end_run(job, store, gap, write, promises_kept=result.promises_kept)
+        end = end_run(job, store, missing, write, promises_kept=result.promises_kept)
     if job.pictures is not None:
         for example in failing_examples(result):
             subject, question = plugins.subject(example.formulation), plugins.question(example.property_id)
-            name = f"{case_id(subject.name, question.id)}.png"
-            draw_outcome(subject, question, example.outcome, job.pictures / name, argument="--pictures")
+            path = job.pictures / f"{case_id(subject.name, question.id)}.png"
+            draw_outcome(subject, question, example.outcome, path, argument="--pictures")
     advice = ""
     if REPORT not in end.files.names and not result.promises_kept and failing_examples(result):
         seed = result.provenance.get("seed")
@@ -330,7 +316,7 @@ def show_end(
         end.files.announce()
         if advice:
             show(advice)
-    show(f"Not complete: {end.gap}." if end.gap else last_line)
+    show(f"Not complete: {end.missing}." if end.missing else last_line)
     if not screen.quiet:
         print_isolation(result.provenance)
     if not end.complete:
@@ -339,10 +325,10 @@ def show_end(
 
 
 class End(NamedTuple):
-    """The files, the exit status and the gaps of a run."""
+    """The files, the exit status and what is missing of a run."""
 
     files: OutputFiles  # Those that were written.
-    gap: str  # What was not judged; empty if nothing is missing.
+    missing: str  # What was not judged; empty if nothing is missing.
     complete: bool
     status: int  # The exit status; 0 only if nothing is missing in the run or in its files, and promises are kept.
 
@@ -351,33 +337,27 @@ def end_run(
     job: Job, store: Store, find_missing: Callable[[], str], write: Callable[[Path], None], *, promises_kept: bool
 ) -> End:
     """Write the files before anything is shown, so that nothing that was judged is lost, and remove the journal."""
-    gap = find_missing() if promises_kept else ""
-    files = job.files
-    written = files.only(
-        [suffix for suffix, path in files.paths.items() if _is_written(write, path, files.names[suffix])]
-    )
-    complete = written.paths == files.paths and not gap
+    missing = find_missing() if promises_kept else ""
+    written = []
+    for suffix, path in job.files.paths.items():
+        try:
+            write(path)
+        except MisuseError as error:
+            reason = error.found.removeprefix(f"{path}: ")
+        except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
+            reason = f"{reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}"
+        else:
+            written.append(suffix)
+            continue
+        _warn(f"{job.files.names[suffix]} is not written: {reason}")
+    complete = len(written) == len(job.files.paths) and not missing
     if store.write_error:
         _warn(f"the journal could not be written to its end: {store.write_error}")
     if complete and store.folder is not None:
         remove_journal(store.folder)
-    if gap:
-        return End(written, gap, complete, 1)
+    status = 0 if promises_kept and not missing else 1
     whole = complete and not store.write_error
-    return End(written, gap, complete, (0 if promises_kept else 1) if whole else _NOT_WRITTEN)
-
-
-def _is_written(write: Callable[[Path], None], path: Path, name: Path) -> bool:
-    """Write a file; return whether it is there. A line says why one is not."""
-    try:
-        write(path)
-    except MisuseError as error:
-        _warn(f"{name} is not written: {error.found.removeprefix(f'{path}: ')}")
-    except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
-        _warn(f"{name} is not written: {reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}")
-    else:
-        return True
-    return False
+    return End(job.files.only(written), missing, complete, status if whole or missing else _NOT_WRITTEN)
 
 
 @contextmanager
@@ -428,11 +408,8 @@ def _warn(words: str) -> None:
 
 def _judge_last_failed(job: Job) -> int:
     """Judge what failed in earlier runs, show what became of it, and return 1 if a promise is not kept, else 0."""
-    others = [
-        *(["--out"] if job.files.names and not job.resumes else []),
-        *(["--resume"] if job.resumes else []),
-        *(["a mesh or a scene"] if job.place is not None else []),
-    ]
+    others = ["--resume"] if job.resumes else ["--out"] if job.files.names else []
+    others += [] if job.place is None else ["a mesh or a scene"]
     if others:
         raise MisuseError("--last-failed", f"{' and '.join(others)} beside it", "--last-failed alone")
     names, memory = (job.options.names, job.options.properties), FailureMemory()
@@ -440,9 +417,7 @@ def _judge_last_failed(job: Job) -> int:
     if not failures:
         words = f"no failure of {', '.join(map(repr, job.options.names))} in .contactverif"
         raise MisuseError("--last-failed", words, "a run of `verify` here in which something fails")
-    plugins = job.load()
-    provenance = {"asked": "what failed in earlier runs"}
-    result = run_failures((*plugins.subjects, *plugins.questions), failures, provenance)
+    result = run_failures(tuple(chain(*job.load())), failures, {"asked": "what failed in earlier runs"})
     memory.update(result.rows)
     print_plugin_output()
     show(*run_screen(result, columns()))

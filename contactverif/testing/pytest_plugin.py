@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from contactverif.testing.parametrize import MARK
+from contactverif.testing import MARK
 
 _FRESH_SEED = pytest.StashKey[int]()
 _TO_WORKERS = "contactverif_fresh_seed"

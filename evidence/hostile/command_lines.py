@@ -281,7 +281,7 @@ def run_lines(number: int, seed: int, folder: Path, *, limit: float = TIME_LIMIT
 
 def _import_all() -> None:
     """Import once what forked processes share."""
-    for name in ("cli.app", "cli.compare", "cli.run_screen", "cli.scenes", "run.run"):
+    for name in ("cli.app", "cli.compare", "cli.run_screen", "cli.replay", "run.run"):
         importlib.import_module(f"contactverif.{name}")
     importlib.import_module("contactverif_reports.html.report_page")
     from contactverif.plugins import registry

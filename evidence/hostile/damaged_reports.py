@@ -326,7 +326,7 @@ class Damage(Campaign):
 
 def import_everything() -> None:
     """Import what the commands import, once and not in each fork."""
-    for name in ("cli.compare", "cli.scenes"):
+    for name in ("cli.compare", "cli.replay"):
         importlib.import_module(f"contactverif.{name}")
     for name in ("html.report_page", "netcdf.bench_file"):
         importlib.import_module(f"contactverif_reports.{name}")

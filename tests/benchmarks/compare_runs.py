@@ -9,26 +9,16 @@ busier changes both, and the quotient of two ratios says what became slower. The
 
 import argparse
 import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 SLOWER = 1.25  # The quotient of two medians above which a change is reported, as in `contactverif bench --against`.
 
-Key = tuple[str, str]
+Benchmarks = dict[tuple[str, str], dict[str, Any]]  # {(group, name): what a run knows of it}
 
 
-@dataclass(frozen=True)
-class Change:
-    """The ratio of a benchmark in two runs.
-
-    Attributes
-    ----------
-    group, name : str
-        The benchmark.
-    old, new : dict[str, float]
-        The least, median and greatest ratio.
-    """
+class Change(NamedTuple):
+    """The least, median and greatest ratio of a benchmark in two runs."""
 
     group: str
     name: str
@@ -37,7 +27,6 @@ class Change:
 
     @property
     def quotient(self) -> float:
-        """The new median over the old one."""
         return self.new["median"] / self.old["median"]
 
     @property
@@ -50,23 +39,14 @@ class Change:
         return ""
 
 
-def read(path: Path) -> dict[Key, dict[str, Any]]:
-    """Return the benchmarks of a file by group and name."""
-    return {(entry["group"], entry["name"]): entry for entry in json.loads(path.read_text())["benchmarks"]}
-
-
-def compare(old: dict[Key, dict[str, Any]], new: dict[Key, dict[str, Any]]) -> list[Change]:
-    """Return the changes of all benchmarks that both runs have, the largest first.
-
-    A ratio belongs to its reference, so a benchmark with another reference is left out.
-    """
+def compare(old: Benchmarks, new: Benchmarks) -> list[Change]:
+    """Return the changes of all benchmarks that both runs have with the same reference, the largest first."""
     common = [key for key in new if key in old and old[key]["reference"] == new[key]["reference"]]
     changes = [Change(*key, old[key]["ratio"], new[key]["ratio"]) for key in common]
     return sorted(changes, key=lambda change: -change.quotient)
 
 
-def lines_of_run(run: dict[Key, dict[str, Any]]) -> list[str]:
-    """Return the table of one run."""
+def lines_of_run(run: Benchmarks) -> list[str]:
     lines, group = [], ""
     for entry in run.values():
         if entry["group"] != group:
@@ -78,15 +58,13 @@ def lines_of_run(run: dict[Key, dict[str, Any]]) -> list[str]:
 
 
 def lines_of_changes(changes: list[Change], n_left_out: int) -> list[str]:
-    """Return the table of two runs."""
     lines = [f"{'old':>9}{'new':>9}{'new/old':>9}          benchmark"]
     for change in changes:
         numbers = f"{change.old['median']:>9.3g}{change.new['median']:>9.3g}{change.quotient:>9.2f}"
         lines.append(f"{numbers}  {change.word:7} {change.group}: {change.name}")
-    n_slower = sum(change.word == "slower" for change in changes)
-    n_faster = sum(change.word == "faster" for change in changes)
-    lines.append(f"{len(changes)} compared: {n_slower} slower, {n_faster} faster; {n_left_out} in one file alone")
-    return lines
+    words = [change.word for change in changes]
+    counts = f"{words.count('slower')} slower, {words.count('faster')} faster"
+    return [*lines, f"{len(changes)} compared: {counts}; {n_left_out} in one file alone"]
 
 
 def main() -> int:
@@ -96,9 +74,10 @@ def main() -> int:
     files = parser.parse_args().files
     if len(files) > 2:
         parser.error(f"{len(files)} files; one or two are needed")
-    runs = [read(path) for path in files]
+    entries = [json.loads(path.read_text())["benchmarks"] for path in files]
+    runs: list[Benchmarks] = [{(entry["group"], entry["name"]): entry for entry in each} for each in entries]
     if len(runs) == 1:
-        print("\n".join(lines_of_run(runs[0])))
+        print("\n".join(lines_of_run(*runs)))
         return 0
     changes = compare(*runs)
     print("\n".join(lines_of_changes(changes, len({*runs[0], *runs[1]}) - len(changes))))

@@ -2,20 +2,18 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
-from compare_runs import compare, lines_of_changes, lines_of_run
+from compare_runs import Benchmarks, compare, lines_of_changes, lines_of_run
 
 STORED = Path(__file__).parents[2] / "reports" / "bench" / "benchmarks.json"
 
 
-def a_run(factor: float = 1.0, reference: str = "a copy") -> dict[tuple[str, str], dict[str, Any]]:
+def a_run(factor: float = 1.0, reference: str = "a copy") -> Benchmarks:
     """Return a run of one benchmark, so many times slower beside its reference."""
     ratio = {"least": 1.9 * factor, "median": 2.0 * factor, "greatest": 2.2 * factor}
-    return {
-        ("search", "mine"): {"name": "mine", "group": "search", "reference": reference, "seconds": 1.0, "ratio": ratio}
-    }
+    entry = {"name": "mine", "group": "search", "reference": reference, "seconds": 1.0, "ratio": ratio}
+    return {("search", "mine"): entry}
 
 
 @pytest.mark.parametrize(("factor", "word"), [(1.5, "slower"), (1.2, ""), (1.0, ""), (0.5, "faster")])

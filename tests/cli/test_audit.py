@@ -14,7 +14,7 @@ from contactverif.run.audit import Audit
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write
 
-WORDS = ("nts", "vts-ppt", "-p", "patch.flat.transmission", "-p", "hard.deep", "--examples", "12", "--seed", "1")
+WORDS = "verify nts vts-ppt -p patch.flat.transmission -p hard.deep --examples 12 --seed 1 --jobs 1 --out"
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def report(ask: Ask, whole: Path, tmp_path: Path) -> Path:
     """Return a report that a test may change."""
     if not whole.exists():
-        assert ask("verify", *WORDS, "--jobs", "1", "--out", whole).status == 0
+        assert ask(WORDS, whole).status == 0
     (tmp_path / "r.nc").write_bytes(whole.read_bytes())
     return tmp_path / "r.nc"
 
@@ -109,26 +109,19 @@ def test_a_share_is_a_part_of_all(ask: Ask, report: Path, share: str) -> None:
     check_mistake(ask("audit", report, f"--share={share}"), "--share: found .*; needed a number above 0, and at most 1")
 
 
-def test_what_is_no_report_is_one_line(ask: Ask, tmp_path: Path) -> None:
-    (tmp_path / "r.nc").write_bytes(b"nothing")
-    check_mistake(ask("audit", tmp_path / "r.nc"), "REPORT: found .*; needed a report that .*")
-
-
 def test_a_report_on_a_scene_needs_that_scene(ask: Ask, tmp_path: Path) -> None:
     report = tmp_path / "r.nc"
-    assert ask("verify", "nts", "-p", "balance.force", "--scene", "c", "--examples", "5", "--out", report).status == 0
+    assert ask("verify nts -p balance.force --scene c --examples 5 --out", report).status == 0
     check_mistake(ask("audit", report), "REPORT: found a run with --scene c, and here none; needed the same options")
     assert ask("audit", report, "--scene", "c").status == 0
 
 
 def test_merge_can_audit_what_it_makes(ask: Ask, tmp_path: Path) -> None:
-    words = ("nts", "-p", "patch.flat.transmission", "--examples", "8")
-    assert ask("campaign", *words, "--shard", "1/1", "--out", tmp_path / "shards").status == 0
-    check_mistake(
-        ask("merge", tmp_path / "shards", "--audit", "--out", tmp_path / "r.html"),
-        "--audit: found no report; needed --out FILE.nc beside it",
-    )
-    answer = ask("merge", tmp_path / "shards", "--audit", "--share", "0.5", "--out", tmp_path / "r.nc")
+    shards = tmp_path / "shards"
+    assert ask("campaign nts -p patch.flat.transmission --examples 8 --shard 1/1 --out", shards).status == 0
+    without = ask("merge --audit --out", tmp_path / "r.html", shards)
+    check_mistake(without, "--audit: found no report; needed --out FILE.nc beside it")
+    answer = ask("merge --audit --share 0.5 --out", tmp_path / "r.nc", shards)
     assert answer.status == 0
     assert "judged again: 4 of 8 outcomes and all " in answer.out
     assert "outcomes that were judged before: 9, of which 1 were judged again" in answer.out

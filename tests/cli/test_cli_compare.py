@@ -4,9 +4,7 @@ import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import netCDF4
 import pytest
@@ -20,12 +18,8 @@ from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.write import write
 
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
-QUICK = ("--examples", "12", "--seed", "1", "-p", "patch.flat.transmission", "-p", "balance.force")
-
-
-@pytest.fixture
-def ask(ask: Ask) -> Ask:
-    return partial(ask, "compare")
+VTS_ME = "compare vts-me --against vts-ppt"
+QUICK = f"{VTS_ME} --examples 12 --seed 1 -p patch.flat.transmission -p balance.force"
 
 
 def run_properties(names: Sequence[str], *globs: str, examples: int = 12, seed: int = 1) -> Run:
@@ -53,12 +47,19 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def read_page(path: Path) -> Page:
+    """Read a page, which has no link to another file."""
+    page = Page(path.read_text(encoding="utf-8"))
+    assert not [link for link in page.links if not link.startswith("#")]
+    return page
+
+
 # ---------------------------------------------------------------------------------------------------------------------
 # Formulations
 
 
 def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
-    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "-v")
+    answer = ask(f"{QUICK} -v")
     assert answer.status == 0  # vts-me says itself that it fails the patch test
     assert not [line for line in answer.err.splitlines() if "take" not in line]  # A busy machine makes calls slow.
     assert re.search(r"vts-me against vts-ppt: profile dev: 12 random cases for each property, seed 1", answer.out)
@@ -73,8 +74,8 @@ def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
 
 def test_what_differs_takes_few_lines(ask: Ask) -> None:
     """Verdicts that differ, errors of accuracy, iterations and time take 25 lines of 80 columns at most."""
-    options = ("--examples", "3", "--seed", "1", "--isolation", "inline")
-    answer = ask("vts-me", "--against", "vts-ppt", *options, columns=80)
+    words = f"{VTS_ME} --examples 3 --seed 1 --isolation inline"
+    answer = ask(words, columns=80)
     lines = answer.out.splitlines()
     assert answer.status == 0
     assert len(lines) <= 25
@@ -85,18 +86,17 @@ def test_what_differs_takes_few_lines(ask: Ask) -> None:
     assert re.search(r"\n  \d+ more differ: ", answer.out)
     assert re.search(r"\nNewton iterations: fewer in \d+ cases, the same in \d+, more in \d+\.\n", answer.out)
     assert re.search(r"\nAn evaluation takes \d+ µs on 16 segments \(\S+ of vts-ppt\),", answer.out)
-    quiet = ask("vts-me", "--against", "vts-ppt", "-q", "-p", "balance.force", *options)
-    assert quiet.out == "Every promise of vts-me is kept.\n"
+    assert ask(f"{words} -q -p balance.force").out == "Every promise of vts-me is kept.\n"
 
 
 def test_a_comparison_draws_all_meshes_on_which_formulations_differ(ask: Ask) -> None:
-    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--show", "all")
+    answer = ask(f"{QUICK} --show all")
     assert len(re.findall(r"^(\S+), case \d+$", answer.out, flags=re.MULTILINE)) == 2
 
 
 def test_every_file_that_is_named_is_written(ask: Ask, tmp_path: Path) -> None:
     report, html, pictures = tmp_path / "r.nc", tmp_path / "r.html", tmp_path / "new" / "pictures"
-    answer = ask("vts-me", "--against", "vts-ppt", *QUICK, "--out", report, "--out", html, "--pictures", pictures)
+    answer = ask(QUICK, "--out", report, "--out", html, "--pictures", pictures)
     assert answer.status == 0
     write(run_properties(["vts-ppt", "vts-me"], "patch.flat.transmission", "balance.force"), tmp_path / "v.nc")
     # As `verify` writes it, which knows the digests of code from its journal, too.
@@ -104,12 +104,10 @@ def test_every_file_that_is_named_is_written(ask: Ask, tmp_path: Path) -> None:
     assert sorted(path.name for path in pictures.iterdir()) == [
         f"{name}.{id_}.png" for name in ("vts-me", "vts-ppt") for id_ in ("balance.force", "patch.flat.transmission")
     ]
-    page = Page(html.read_text(encoding="utf-8"))
-    assert not [link for link in page.links if not link.startswith("#")]
+    page = read_page(html)
     assert len(page.ids) == len(set(page.ids))
-    assert (
-        sum(tag == "svg" for tag, _ in page.tags) == 1 + 4 + 4
-    )  # axis and distributions; two meshes, each with the forces of both
+    # Axis and distributions; two meshes, each with the forces of both.
+    assert sum(tag == "svg" for tag, _ in page.tags) == 1 + 4 + 4
     assert "vts-me against vts-ppt" in page.text
     assert "every promise of vts-me is kept" in page.text.lower()
 
@@ -120,21 +118,40 @@ def test_a_broken_promise_of_a_candidate_is_status_1_and_of_the_reference_is_not
     """VTS-PPT under trial says that it fails `balance.force`; a harness where nothing fails breaks that."""
     judge = judging.judge_case
     monkeypatch.setattr(judging, "judge_case", lambda *result: replace(judge(*result), verdict=Verdict.PASS, reason=""))
-    options = ("--examples", "3", "--seed", "1", "-p", "balance.force")
-    answer = ask("vts-ppt", "--against", "vts-me", *options)
+    answer = ask("compare vts-ppt --against vts-me --examples 3 --seed 1 -p balance.force")
     assert answer.status == 1
     assert answer.out.rstrip().endswith("1 broken promise: vts-ppt balance.force (stated to fail, but passes).")
-    answer = ask("vts-me", "--against", "vts-ppt", *options, "-v")
-    assert answer.status == 0
-    assert "BROKEN PROMISE" in answer.out
+    answer = ask(f"{VTS_ME} --examples 3 --seed 1 -p balance.force -v")
+    assert (answer.status, "BROKEN PROMISE" in answer.out) == (0, True)
 
 
 def test_scenes_and_meshes_can_be_compared_on(ask: Ask) -> None:
-    answer = ask("vts-me", "--against", "vts-ppt", "--scene", "c", "-p", "patch.flat.*", "--examples", "1")
+    answer = ask(f"{VTS_ME} --scene c -p patch.flat.* --examples 1")
     assert answer.status == 0
     assert re.search(r"patch.flat.solve +fail.* pass ", answer.out)
-    on_punch = ("--mesh", PUNCH, "--slave", "punch", "--master", "base", "-p", "balance.force", "--examples", "2")
-    assert ask("nts", "--against", "vts-ppt-balanced", *on_punch, "--seed", "1").status == 0
+    on_punch = f"--mesh {PUNCH} --slave punch --master base -p balance.force --examples 2 --seed 1"
+    assert ask(f"compare nts --against vts-ppt-balanced {on_punch}").status == 0
+
+
+IN_SPACE = "-p patch.flat.transmission --examples 2 --seed 1"
+
+
+def test_a_comparison_across_dimensions_says_what_it_cannot_compare(ask: Ask) -> None:
+    words = " ".join(ask(f"compare nts-3d --against vts-ppt {IN_SPACE}").out.split())
+    assert "nts-3d and vts-ppt are asked on different interfaces, of other dimension or faces: verdicts and" in words
+    assert "--show all" not in words  # There is no case on which both were judged.
+
+
+def test_a_comparison_in_space_draws_the_mesh_in_space(ask: Ask) -> None:
+    answer = ask(f"compare nts-3d --against vts-cell-3d --show all {IN_SPACE}")
+    assert "different interfaces" not in answer.out
+    assert " master triangle" in answer.out
+
+
+def test_a_formulation_of_other_faces_is_compared_on_equal_cases_alone(ask: Ask) -> None:
+    words = " ".join(ask(f"compare vts-cell-3d --against sts-3d {IN_SPACE} -p patch.tilted.nodal").out.split())
+    assert "vts-cell-3d and sts-3d are asked on different interfaces" in words
+    assert "patch.tilted.nodal" in words  # Both are asked about the same triangles there.
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -142,7 +159,7 @@ def test_scenes_and_meshes_can_be_compared_on(ask: Ask) -> None:
 
 
 def test_equal_reports_have_no_regression(ask: Ask, reports: Path) -> None:
-    answer = ask(reports / "old.nc", reports / "same.nc")
+    answer = ask("compare", reports / "old.nc", reports / "same.nc")
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"patch.flat.transmission +pass .* 0 +12 +0 +\d", answer.out)
     assert answer.out.rstrip().endswith("Nothing got worse.")
@@ -150,7 +167,7 @@ def test_equal_reports_have_no_regression(ask: Ask, reports: Path) -> None:
 
 def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: Path) -> None:
     html = tmp_path / "r.html"
-    answer = ask(reports / "old.nc", reports / "worse.nc", "--out", html)
+    answer = ask("compare", reports / "old.nc", reports / "worse.nc", "--out", html)
     assert answer.status == 1
     assert "pass → fail" in answer.out
     words = " ".join(answer.out.split())  # it is long, and wrapped
@@ -160,19 +177,18 @@ def test_a_regression_is_status_1_and_named(ask: Ask, reports: Path, tmp_path: P
     replay = re.search(r"contactverif replay (\S+) --case vts-ppt.patch.flat.transmission", answer.out)
     assert replay
     assert replay[1] == str(reports / "worse.nc")
-    page = Page(html.read_text(encoding="utf-8"))
-    assert not [link for link in page.links if not link.startswith("#")]
+    page = read_page(html)
     assert "1 regression." in page.text
     assert sum(tag == "svg" for tag, _ in page.tags) == 1 + 2 + 1  # axis, old and new; the mesh
-    assert ask(reports / "worse.nc", reports / "old.nc").status == 0
+    assert ask("compare", reports / "worse.nc", reports / "old.nc").status == 0
 
 
 def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
-    tables = ask(reports / "old.nc", reports / "worse.nc", columns=80).out.partition("\nvts-ppt, patch")[0]
+    tables = ask("compare", reports / "old.nc", reports / "worse.nc", columns=80).out.partition("\nvts-ppt, patch")[0]
     assert "…" not in tables
     assert re.search(r"better +equal +worse +time", tables)
-    options = ("-v", "-p", "patch.flat.*", "--seed", "1", "--examples", "3")
-    tables = ask("vts-me", "mortar", "--against", "vts-ppt", *options, columns=80).out.partition("\npatch.flat.")[0]
+    words = "compare vts-me mortar --against vts-ppt -v -p patch.flat.* --seed 1 --examples 3"
+    tables = ask(words, columns=80).out.partition("\npatch.flat.")[0]
     assert "…" not in tables
     assert re.search(r"median +worst +ratio +better +equal +worse *\n", tables)
     assert re.search(r"converged +median +most +fewer +same +more +order *\n", tables)
@@ -180,7 +196,7 @@ def test_no_number_is_cut_in_80_columns(ask: Ask, reports: Path) -> None:
 
 
 def test_other_seeds_are_compared_as_distributions_and_it_is_said(ask: Ask, reports: Path) -> None:
-    answer = ask(reports / "old.nc", reports / "other.nc")
+    answer = ask("compare", reports / "old.nc", reports / "other.nc")
     assert answer.status == 0
     assert "all rows have other cases: their errors are compared as distributions" in answer.out
 
@@ -191,74 +207,23 @@ def test_a_report_needs_no_ending_and_a_formulation_is_none(
     monkeypatch.chdir(tmp_path)
     shutil.copy(reports / "old.nc", tmp_path / "old")
     shutil.copy(reports / "old.nc", tmp_path / "vts-me")
-    assert ask("old", reports / "same.nc").status == 0
-    assert "vts-me against vts-ppt" in ask("vts-me", "--against", "vts-ppt", *QUICK, "-p", "balance.force").out
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-# Bad input
-
-MISTAKES = [
-    # argument, found, needed
-    ([], r"--against: found nothing; needed the formulation to compare with, or two reports OLD.nc NEW.nc"),
-    (["nts"], r"--against: found nothing; needed .*"),
-    (["--against", "vts-ppt"], r"NAME: found nothing; needed some of .*nts, .*, or two reports OLD.nc NEW.nc"),
-    (["nts", "--against", "vts-pt"], r"--against: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
-    (["vts-pt", "--against", "nts"], r"formulation: found 'vts-pt'; needed .* nearest: vts-ppt.*"),
-    (["nts", "--against", "nts"], r"--against: found nts, which is compared too; needed another formulation .*"),
-    (["nts", "nts", "--against", "vts-ppt"], r"formulation: found nts 2 times; needed each of them once"),
-    (["nts", "--against", "vts-ppt", "-p", "pach.*"], r"property: found 'pach.\*'; needed .*"),
-    (["nts", "--against", "vts-ppt", "--examples", "0"], r"--examples: found 0; needed at least 1, at most 1000000000"),
-    (["nts", "--against", "vts-ppt", "--profile", "nigthly"], r"--profile: found 'nigthly'; needed .* nightly"),
-    (["nts", "--against", "vts-ppt", "--out", "no/r.nc"], r"--out: .* is no folder; needed a folder that exists"),
-    (["nts", "--against", "vts-ppt", "--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),
-    (["nts", "--against", "vts-ppt", "--out", "r.pdf"], r"--out: found 'r.pdf'; needed .* .nc, .html, .* .xml"),
-    (["nts", "--against", "vts-ppt", "--pictures", str(PUNCH)], r"--pictures: found .* needed a folder that can be .*"),
-    (["nts", "--against", "vts-ppt", "--flip"], r"--mesh: found none, but --flip; needed --mesh FILE, .*"),
-    (["a.nc"], r"NAME: found 1 report; needed two, OLD.nc NEW.nc"),
-    (["a.nc", "b.nc", "c.nc"], r"NAME: found 3 reports; needed two, OLD.nc NEW.nc"),
-    (["a.nc", "nts"], r"NAME: found nts and the report a.nc; needed formulations alone, or two reports"),
-    ([str(PUNCH), "nts"], r"NAME: found nts and the report .*punch.msh; needed formulations alone, or two reports"),
-    (["a.nc", "b.nc", "--against", "nts"], r"--against: found two reports beside it; needed formulations: a report .*"),
-    (["a.nc", "b.nc", "--seed", "1"], r"--seed: found two reports beside it; needed formulations: a report .*"),
-    (["a.nc", "b.nc", "--out", "r.nc"], r"--out: found 'r.nc'; needed a name that ends in .html"),
-    (["a.nc", "b.nc"], r"OLD.nc: found a.nc, which does not exist; needed a report that .*"),
-    ([str(PUNCH), "b.nc"], r"OLD.nc: found .*punch.msh, which is no netCDF file.*; needed a report that .* wrote"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("arguments", "message"), MISTAKES, ids=[" ".join(result)[-60:] for result, _ in MISTAKES])
-def test_a_mistake_is_one_line_and_nothing_is_judged(
-    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: Sequence[str], message: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    judged: list[Any] = []
-    monkeypatch.setattr(judging, "judge_case", lambda *anything: judged.append(anything))
-    answer = ask(*arguments)
-    check_mistake(answer, message)
-    assert not judged
-    assert list(tmp_path.iterdir()) == []
+    assert ask("compare old", reports / "same.nc").status == 0
+    assert "vts-me against vts-ppt" in ask(f"{VTS_ME} --examples 2 --seed 1 -p balance.force").out
 
 
 @pytest.mark.parametrize(
     ("new", "options", "message"),
     [
-        ("nts.nc", [], r"NEW.nc: found no formulation that OLD.nc has too \(vts-ppt and nts\); needed two reports .*"),
-        ("purity.nc", [], r"NEW.nc: found no property that OLD.nc has too \(patch.flat.transmission and purity\); .*"),
-        ("old.nc", ["-p", "purity"], r"--property: found 'purity'; needed one of patch.flat.transmission"),
-        ("old.nc", ["--out", "no/r.html"], r"--out: .* is no folder; needed a folder that exists"),
-        ("else.nc", [], r"(OLD|NEW).nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
-        ("schema.nc", [], r"(OLD|NEW).nc: found .*schema.nc of schema 0, which an older .*; needed schema [0-9]+; .*"),
-        (
-            "damaged.nc",
-            [],
-            r"(OLD|NEW).nc: found .*damaged.nc, which cannot be read \(.*\); needed an undamaged report",
-        ),
+        ("nts.nc", "", r"NEW.nc: found no formulation that OLD.nc has too \(vts-ppt and nts\); needed two reports .*"),
+        ("purity.nc", "", r"NEW.nc: found no property that OLD.nc has too \(patch.flat.transmission and purity\); .*"),
+        ("old.nc", "-p purity", r"--property: found 'purity'; needed one of patch.flat.transmission"),
+        ("old.nc", "--out no/r.html", r"--out: .* is no folder; needed a folder that exists"),
+        ("else.nc", "", r"NEW.nc: found .*else.nc, a netCDF file of something else; needed a report .*"),
+        ("schema.nc", "", r"NEW.nc: found .*schema.nc of schema 0, which an older .*; needed schema [0-9]+; .*"),
+        ("damaged.nc", "", r"NEW.nc: found .*, which cannot be read \(.*\); needed an undamaged report"),
     ],
 )
-def test_a_mistake_in_a_report_is_one_line(
-    ask: Ask, reports: Path, new: str, options: Sequence[str], message: str
-) -> None:
+def test_a_mistake_in_a_report_is_one_line(ask: Ask, reports: Path, new: str, options: str, message: str) -> None:
     if not (reports / new).exists():
         shutil.copy(reports / "old.nc", reports / new)
         with netCDF4.Dataset(reports / new, "a") as data:
@@ -268,5 +233,4 @@ def test_a_mistake_in_a_report_is_one_line(
                 data.schema = "0"
             else:
                 data["summary"].renameVariable("row_verdict", "gone")
-    answer = ask(reports / "old.nc", reports / new, *options)
-    check_mistake(answer, message)
+    check_mistake(ask(f"compare {options}", reports / "old.nc", reports / new), message)

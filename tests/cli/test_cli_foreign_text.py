@@ -68,7 +68,7 @@ def _check(answer: Answer) -> None:
 
 @pytest.mark.usefixtures("strangers")
 def test_the_list_shows_hostile_names_and_reasons_escaped(ask: Ask) -> None:
-    for answer in (ask("list"), ask("list", "--traits", columns=20)):
+    for answer in (ask("list"), ask("list --traits", columns=20)):
         _check(answer)
         assert answer.status == 0
         assert r"loud-\x1b[31m" in answer.out.replace("\n", "")
@@ -92,25 +92,21 @@ def test_messages_of_exceptions_are_shown_escaped_and_cut(ask: Ask, tmp_path: Pa
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 def test_an_error_is_one_clean_line_whatever_the_user_typed(ask: Ask, text: str) -> None:
-    lines = [
-        ("verify", text),
-        ("verify", f"vts-me:n={text}"),
-        ("verify", f"vts-me:{text}=1"),
-        ("verify", f"two-pass/{text}"),
-        ("verify", "nts", "-p", text),
-        ("verify", "nts", "--out", f"{text}.xyz"),
-        ("verify", "nts", "--out", f"no/{text}.nc"),
-        ("verify", "nts", "--scene", text),
-        ("verify", "nts", "--profile", text),
-        ("verify", "nts", "--known", f"{text}=1"),
-        ("verify", "nts", f"--{text}"),
-        ("replay", text),
-        ("report", f"{text}.nc"),
-        ("draw", "--scene", text),
-        (text,),
-    ]
-    for line in lines:
-        answer = ask(*line)
+    words = {
+        "verify": (text, f"vts-me:n={text}", f"vts-me:{text}=1", f"two-pass/{text}"),
+        "verify nts -p": (text,),
+        "verify nts --out": (f"{text}.xyz", f"no/{text}.nc"),
+        "verify nts --scene": (text,),
+        "verify nts --profile": (text,),
+        "verify nts --known": (f"{text}=1",),
+        "verify nts": (f"--{text}",),
+        "replay": (text,),
+        "report": (f"{text}.nc",),
+        "draw --scene": (text,),
+        "": (text,),
+    }
+    for line, typed in ((line, word) for line, each in words.items() for word in each):
+        answer = ask(line, typed)
         _check(answer)
         assert answer.status == 2, line
         assert answer.err.count("\n") == 1, line

@@ -16,7 +16,6 @@ from contactverif import Subject, Verdict, verify
 from contactverif.cli import new as new_project
 
 Make = Callable[..., Path]
-FREE = "needed a name that is free"
 
 
 @pytest.fixture
@@ -73,14 +72,6 @@ def test_a_project_of_a_library_has_a_makefile(
     assert f'"{subject}"' in files["test_my_nts.py"]
     assert "/my_nts.so" in files[".gitignore"]
     assert not [name for name, text in files.items() if "{{" in text or "{%" in text]
-
-
-@pytest.mark.parametrize("options", [("--c", "--fortran"), ("--3d", "--c")])
-def test_a_project_is_of_one_kind(
-    ask: Ask, options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    check_mistake(ask("new", "mine", *options), f"NAME: found {' and '.join(options)}; needed one of them")
 
 
 def test_a_project_in_space_registers_a_formulation_on_faces(make: Make) -> None:
@@ -144,39 +135,6 @@ def test_contactverif_comes_from_where_it_is_installed(
     project = make("mine")
     assert f"deps = {{env:CONTACTVERIF:{requirements[0]}}}\n" in (project / "tox.ini").read_text()
     assert f"      CONTACTVERIF: {requirements[1]}\n" in (project / ".github" / "workflows" / "tests.yml").read_text()
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("two words", r"NAME: found 'two words'; needed a name of letters, digits.*"),
-        ("a/b", r"NAME: found 'a/b'; needed a name of letters.*"),
-        ("../mine", r"NAME: found '../mine'; needed a name of letters.*"),
-        ("mine-", r"NAME: found 'mine-'; needed a name of letters.*"),
-        ("1mine", r"NAME: found '1mine'; needed .* first a letter.*"),
-        ("mïne", r"NAME: found 'mïne'; needed a name of letters.*"),
-        ("m" * 61, r"NAME: found 'm+'; needed .*at most 60; .*"),
-        ("class", r"NAME: found 'class', a word of Python; needed a name that a module can have"),
-        ("vts-ppt", f"NAME: found 'vts-ppt', but a formulation vts-ppt is registered; {FREE}"),
-        ("Scikit-FEM", f"NAME: found 'Scikit-FEM', a package that is installed; {FREE}"),
-        ("random", f"NAME: found 'random', but Python has a module random; {FREE}"),
-    ],
-)
-def test_a_name_that_cannot_be_is_refused(
-    ask: Ask, name: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    check_mistake(ask("new", name), message)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_folder_that_exists_is_left_as_it_is(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine").symlink_to("nowhere")
-    check_mistake(
-        ask("new", "mine"), "NAME: found 'mine', which exists in this folder; needed the name of a new folder"
-    )
-    assert [path.is_symlink() for path in tmp_path.iterdir()] == [True]
 
 
 def test_nothing_is_left_where_the_disk_is_full(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,6 @@
-"""The progress of a whole run, on standard error where it is no terminal."""
+"""The progress of a whole run, on standard error where it is no terminal; and Ctrl-C."""
+
+import signal
 
 import pytest
 
@@ -57,3 +59,15 @@ def test_work_without_rows_has_such_lines_too(bar: Bar, capsys: pytest.CaptureFi
         "wavy, mesh 8, instance 0; 1,001 of some 1,125 in all",
         "wavy, mesh 8, instance 0; 1,003 of some 1,125 in all",
     ]
+
+
+def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
+    """A callback of the garbage collector drops the exception of the first Ctrl-C."""
+    before = signal.getsignal(signal.SIGINT)
+    with Bar() as bar:
+        bar.update("one", 0, 3)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            bar.update("two", 1, 3)
+    assert signal.getsignal(signal.SIGINT) is before

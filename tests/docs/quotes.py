@@ -105,43 +105,27 @@ def classes(source: str) -> dict[str, str]:
     return {node.name: "".join(lines[start : node.end_lineno]) for start, node in zip(starts, nodes, strict=True)}
 
 
-def mine_classes() -> dict[str, str]:
-    """Return {name: text} of the classes of the tutorial's file."""
-    return classes((MINE / "mine.py").read_text(encoding="utf-8"))
+MINE_SOURCE = (MINE / "mine.py").read_text(encoding="utf-8")
+MINE_CLASSES = classes(MINE_SOURCE)
 
 
-def install_project(folder: Path, settings: Path) -> None:
+def install_project(folder: Path, settings: str) -> None:
     """Write what `pip install` leaves in a folder of the project with this pyproject.toml, besides its modules."""
-    project = tomllib.loads(settings.read_text(encoding="utf-8"))["project"]
-    _install(folder, project["name"], project["version"], project["entry-points"])
-
-
-def install_mine(folder: Path, source: str) -> None:
-    """Write what `pip install` leaves in a folder of a project whose mine.py has this source."""
-    install_project(folder, MINE / "pyproject.toml")
-    (folder / "mine.py").write_text(source, encoding="utf-8")
-
-
-def install_example(folder: Path, page: Path) -> None:
-    """Write what `pip install` leaves in a folder of the example whose formulations a page registers, if it does."""
-    settings = tomllib.loads("".join(blocks("toml", page.read_text(encoding="utf-8"))))
-    project = settings.get("project", {})
-    points = project.get("entry-points", {}).get("contactverif.formulations", {})
-    sources = {target.partition(":")[0] for target in points.values()}
-    for source in (path for path in EXAMPLES if path.stem in sources):
-        _install(folder, project["name"], project["version"], project["entry-points"])
-        shutil.copy(source, folder)
-
-
-def _install(folder: Path, name: str, version: str, entry_points: dict[str, dict[str, str]]) -> None:
-    """Write the `dist-info` of a distribution."""
-    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    project = tomllib.loads(settings)["project"]
+    info = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
     info.mkdir(parents=True, exist_ok=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.4\nName: {name}\nVersion: {version}\n", encoding="utf-8")
+    metadata = f"Metadata-Version: 2.4\nName: {project['name']}\nVersion: {project['version']}\n"
+    (info / "METADATA").write_text(metadata, encoding="utf-8")
     lines = []
-    for group, points in entry_points.items():
+    for group, points in project["entry-points"].items():
         lines += [f"[{group}]", *(f"{point} = {target}" for point, target in points.items())]
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def install_mine(folder: Path, source: str = MINE_SOURCE) -> None:
+    """Write what `pip install` leaves in a folder of a project whose mine.py has this source."""
+    install_project(folder, (MINE / "pyproject.toml").read_text(encoding="utf-8"))
+    (folder / "mine.py").write_text(source, encoding="utf-8")
 
 
 def call(program: str, *arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -175,35 +159,29 @@ def prepare(page: Path, folder: Path) -> None:
     if not (folder / "tests").exists():
         (folder / "tests").symlink_to(ROOT / "tests")
     if page.parent.name == "tutorial":
-        names = STEPS.get(page.name, tuple(mine_classes()))
-        install_mine(folder / "site", "\n\n\n".join(mine_classes()[name] for name in names))
-    else:
-        install_example(folder / "site", page)
-
-
-def _needed_commands(page: Path) -> list[str]:
-    """Return the commands of a page whose output or picture is shown, and those that write the files they read."""
-    known = [line for line in commands(page.read_text(encoding="utf-8")) if line.startswith("contactverif ")]
-    quoted = {quote.command for quote in quotes(page) if not quote.foreign}
-    needed: list[str] = []
-    for line in reversed(known):
-        files = re.findall(r"--out (\S+)", line)
-        if line in quoted or picture_of(line) or any(file in later.split() for file in files for later in needed):
-            needed.insert(0, line)
-    return needed
-
-
-def picture_of(command: str) -> str:
-    """Return the name of the picture that a command writes for the site; empty if there is none."""
-    match = re.search(r"--out (\S+\.svg)", command)
-    return match[1] if match else ""
+        install_mine(folder / "site", "\n\n\n".join(MINE_CLASSES[name] for name in STEPS.get(page.name, MINE_CLASSES)))
+        return
+    settings = "".join(blocks("toml", page.read_text(encoding="utf-8")))  # The page may register an example.
+    points = tomllib.loads(settings).get("project", {}).get("entry-points", {}).get("contactverif.formulations", {})
+    sources = {target.partition(":")[0] for target in points.values()}
+    for source in (path for path in EXAMPLES if path.stem in sources):
+        install_project(folder / "site", settings)
+        shutil.copy(source, folder / "site")
 
 
 def outputs(page: Path, folder: Path, extra: Sequence[str] = ()) -> dict[str, subprocess.CompletedProcess[str]]:
-    """Run the commands of a page whose output or picture is shown, and those before them."""
+    """Run the commands of a page whose output or picture is shown, and those that write the files they read."""
     prepare(page, folder)
+    quoted = {quote.command for quote in quotes(page) if not quote.foreign}
+    needed: list[str] = []
+    for line in reversed(commands(page.read_text(encoding="utf-8"))):
+        files = re.findall(r"--out (\S+)", line)
+        is_read = any(file in later.split() for file in files for later in needed)
+        is_shown = line in quoted or re.search(r"--out \S+\.svg", line)
+        if line.startswith("contactverif ") and (is_shown or is_read):
+            needed.insert(0, line)
     results = {}
-    for line in _needed_commands(page):
+    for line in needed:
         program, *arguments = shlex.split(line)
         more = extra if arguments[0] in ("verify", "compare") else ()
         results[line] = call(program, *arguments, *more, folder=folder)
@@ -258,40 +236,38 @@ def source_block(argument: str) -> str:
     if not wanted:
         return text
     if name.endswith("mine.py"):
-        return classes(text)[wanted]
+        return MINE_CLASSES[wanted]
     node = next(item for item in ast.parse(text).body if isinstance(item, ast.ClassDef) and item.name == wanted)
     return "".join(text.splitlines(keepends=True)[node.lineno - 1 : node.end_lineno])
 
 
 def renew_text(page: Path, results: dict[str, str]) -> str:
     """Return the text of a page with its quotations anew, from {command: its output}."""
-    fresh = iter(
-        [
-            source_block(quote.argument) if quote.kind == "source" else excerpt(results[quote.command], quote.argument)
-            for quote in quotes(page)
-        ]
+    fresh = (
+        source_block(quote.argument) if quote.kind == "source" else excerpt(results[quote.command], quote.argument)
+        for quote in quotes(page)
     )
 
     def replace(match: re.Match[str]) -> str:
-        comment = match[0].partition("\n")[0]
-        return f"{comment}\n```{match[4]}\n{next(fresh)}```"
+        return f"{match[0].splitlines()[0]}\n```{match[4]}\n{next(fresh)}```"
 
     return _QUOTE.sub(replace, page.read_text(encoding="utf-8"))
 
 
 def keep_pictures(folder: Path) -> None:
     """Copy the pictures in a folder, and in folders of it, that some page shows to those of the site."""
-    texts = [page.read_text(encoding="utf-8") for page in pages()]
+    texts = "".join(page.read_text(encoding="utf-8") for page in pages())
     for path in sorted([*folder.glob("*.svg"), *folder.glob("*/*.svg")]):
         name = "_".join(path.relative_to(folder).parts)
-        if any(f"pictures/{name}" in text for text in texts):
+        if f"pictures/{name}" in texts:
             shutil.copyfile(path, PICTURES / name)
             print(f"    {name}")
 
 
 def main(names: Sequence[str]) -> None:
     """Run every quoted command and every example, and write pages and pictures anew."""
-    selection = [Path(name).resolve() for name in names if name.endswith(".md")] or ([] if names else pages())
+    paths = [Path(name).resolve() for name in names] or [*pages(), *EXAMPLES]
+    selection, scripts = ([path for path in paths if path.suffix == suffix] for suffix in (".md", ".py"))
     results: dict[str, str] = {}
     for page in selection:
         with tempfile.TemporaryDirectory() as folder:
@@ -301,11 +277,6 @@ def main(names: Sequence[str]) -> None:
             keep_pictures(Path(folder))
     for page in selection:
         page.write_text(renew_text(page, results), encoding="utf-8")
-    run_examples([Path(name).resolve() for name in names if name.endswith(".py")] or ([] if names else EXAMPLES))
-
-
-def run_examples(scripts: Sequence[Path]) -> None:
-    """Run examples in one folder and keep their pictures."""
     with tempfile.TemporaryDirectory() as folder:
         if scripts:
             call("contactverif", "verify", *REPORT, folder=Path(folder))

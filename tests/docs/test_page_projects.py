@@ -33,7 +33,7 @@ def test_a_new_project_passes_its_tests_and_keeps_its_promises(
     assert answer.returncode == 0, answer.stderr
     project = tmp_path / "mine"
     assert enter == ["cd", "mine", "&&", "pip", "install", "-e", "."]
-    install_project(project / "site", project / "pyproject.toml")
+    install_project(project / "site", (project / "pyproject.toml").read_text(encoding="utf-8"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(project), os.environ.get("PYTHONPATH")])))
     tested = call(*tests, "-k", " or ".join(CHOICE), folder=project)
     assert tested.returncode == 0, tested.stdout + tested.stderr

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from quotes import DOCS, MINE, STEPS, blocks, call, commands, install_mine, mine_classes, outputs, quotes
+from quotes import DOCS, MINE_CLASSES, MINE_SOURCE, STEPS, blocks, call, commands, install_mine, outputs, quotes
 from test_docs import last_lines, rows
 
 QUICK = ("--examples", "6")  # The tutorial's commands ask for a hundred; its loops are plain Python.
@@ -31,7 +31,7 @@ def run_program(tmp_path: Path) -> Run:
 def whole_project(tmp_path: Path) -> Path:
     """Install the whole project."""
     folder = tmp_path / "site"
-    install_mine(folder, (MINE / "mine.py").read_text(encoding="utf-8"))
+    install_mine(folder)
     return folder
 
 
@@ -62,7 +62,7 @@ FORCE = ("-p", "balance.force", "--examples", "2")
 
 
 def test_a_file_that_is_not_finished_is_a_row_that_did_not_load(run_program: Run, tmp_path: Path) -> None:
-    install_mine(tmp_path / "site", mine_classes()["NodeToSegment"])
+    install_mine(tmp_path / "site", MINE_CLASSES["NodeToSegment"])
     answer = run_program("contactverif", "verify", "mine-nodes", "mine-exact", "-v", *FORCE)
     assert answer.returncode == 1
     assert rows(answer.stdout) == [("balance.force", "–", "pass")], "the others run"
@@ -91,10 +91,10 @@ def what_does_not_apply(printed: str) -> list[str]:
 
 
 def test_the_steps_pasted_one_below_the_other_are_the_file() -> None:
-    whole = "\n\n\n".join(block.rstrip("\n") for block in mine_classes().values()) + "\n"
-    assert whole == (MINE / "mine.py").read_text(encoding="utf-8")
+    whole = "\n\n\n".join(block.rstrip("\n") for block in MINE_CLASSES.values()) + "\n"
+    assert whole == MINE_SOURCE
     sources = [quote.argument for name in STEPS for quote in quotes(TUTORIAL / name) if quote.kind == "source"]
-    assert [argument.partition(" ")[2] for argument in sources] == list(mine_classes())
+    assert [argument.partition(" ")[2] for argument in sources] == list(MINE_CLASSES)
 
 
 def test_an_exact_tangent_is_judged(whole_project: Path, run_program: Run, tmp_path: Path) -> None:
@@ -113,11 +113,10 @@ def test_an_exact_tangent_is_judged(whole_project: Path, run_program: Run, tmp_p
 
 
 def test_a_wrong_tangent_is_found_out(run_program: Run, tmp_path: Path) -> None:
-    source = (MINE / "mine.py").read_text(encoding="utf-8")
-    wrong = source.replace("return np.column_stack(columns)", "return -np.column_stack(columns)")
-    fixed_step = source.replace("h = 2.0**-100 * np.ptp(z)", "h = 1e-20")
+    wrong = MINE_SOURCE.replace("return np.column_stack(columns)", "return -np.column_stack(columns)")
+    fixed_step = MINE_SOURCE.replace("h = 2.0**-100 * np.ptp(z)", "h = 1e-20")
     for text, property_id in ((wrong, "tangent.directional"), (fixed_step, "units")):
-        assert text != source
+        assert text != MINE_SOURCE
         install_mine(tmp_path / "site", text)
         answer = run_program(
             "contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "15", "-v"

@@ -14,7 +14,7 @@ from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, run_
 from rich.console import Console, Group, RenderableType
 
 from contactverif import Finding, Measurement, MisuseError, Outcome, Verdict, load_formulation, load_properties
-from contactverif.cli.comparison_screen import changes_screen, last_line, regressions_text
+from contactverif.cli.compare import changes_screen, last_line, regressions_text
 from contactverif.cli.run_screen import counterexample_text, run_screen, run_table, summary
 from contactverif.contract.counterexample import counterexamples, failing_examples
 from contactverif.contract.result import NotLoaded, Result, Row, Run

@@ -9,7 +9,7 @@ import xarray as xr
 from subjects import load_property, load_subject, same_case
 
 from contactverif import Case, Interface, Run, judge_case, named_case
-from contactverif.api.drawing import make_drawing
+from contactverif.api.report import make_drawing
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.result import NodalForces
 from contactverif.run.judge import forces_to_draw

@@ -10,7 +10,7 @@ import pytest
 from subjects import load_subject
 
 from contactverif import Case, End, Interface, Subject, load_formulation, load_properties, load_scene, solve
-from contactverif.cli.comparison_screen import regressions_text
+from contactverif.cli.compare import regressions_text
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Measurement, Outcome, Property, Quantity, Verdict, judge
 from contactverif.contract.result import NotLoaded, Row, Run
