@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fine_waves import FILE, FORMULATIONS, GROWTH, HEADS, INSTANCES, solve
 
-from contactverif.contract.traits import Traits
+from contactverif import Traits
 from contactverif.problems.problem import Variation
 from contactverif.problems.wavy import pose_wavy
 

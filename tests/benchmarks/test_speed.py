@@ -18,23 +18,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 from subjects import load_property, load_subject, plane_names
 
-from contactverif import (
-    Case,
-    Interface,
-    Property,
-    Rectangle,
-    Run,
-    Scene,
-    Subject,
-    Verdict,
-    block,
-    evaluate_both,
-    judge_case,
-    named_case,
-    solve,
-    two_blocks,
-    verify,
-)
+import contactverif
+from contactverif import Case, Interface, Property, Rectangle, Run, Scene, Subject, Verdict, evaluate_both, judge_case
 from contactverif.mechanics.bulk import assemble_stiffness, condense, forget_condensed
 from contactverif.mechanics.scene import forget_bodies
 from contactverif.plugins.registry import property_ids
@@ -89,7 +74,7 @@ def forces_and_tangent(name: str) -> Racers:
 
 def condensation(n_cells: str) -> Racers:
     line = np.arange(int(n_cells) + 1.0)
-    body = block(Rectangle(line, line), contact="bottom", approach=0.0)
+    body = contactverif.block(Rectangle(line, line), contact="bottom", approach=0.0)
     free = np.flatnonzero(~body.fixed.ravel())
     matrix = assemble_stiffness(body)[0][free][:, free]
 
@@ -118,7 +103,7 @@ def random_blocks() -> list[TwoBlocks]:
 
 
 def make_scene(blocks: TwoBlocks) -> Scene:
-    return two_blocks(
+    return contactverif.two_blocks(
         Rectangle(blocks.slave_x, blocks.slave_y, young=blocks.young[0], poisson=blocks.poisson[0]),
         Rectangle(blocks.master_x, blocks.master_y, young=blocks.young[1], poisson=blocks.poisson[1]),
         penalty=blocks.penalty,
@@ -129,7 +114,7 @@ def make_scene(blocks: TwoBlocks) -> Scene:
 def solve_as_scene(blocks: TwoBlocks, subject: Subject) -> float:
     """Do what the plain script does: mesh, bodies, solution, and the comparison of the stresses with the exact ones."""
     scene = make_scene(blocks)
-    trace = solve(scene, subject.with_penalty(blocks.penalty))
+    trace = contactverif.solve(scene, subject.with_penalty(blocks.penalty))
     return stress_error(scene, scene.stresses(trace.solution), exact_pressure(blocks))
 
 
@@ -193,7 +178,7 @@ def pictures(name: str) -> Racers:
         figure.add_subplot()
         draw(figure)
 
-    case = named_case("c")
+    case = contactverif.named_case("c")
     calls: dict[str, Call] = {
         "test_picture_of_a_case": lambda: draw(make_case_figure(case, title="", forces=None, exact=None)),
         "test_text_of_a_case": lambda: as_text(case),
@@ -214,7 +199,7 @@ def numbers_of(result: Run) -> np.ndarray:
 
 def reports(name: str, folder: Path) -> Racers:
     questions = [load_property(each) for each in ("balance.force", "patch.flat.transmission", "units")]
-    result = verify([load_subject("vts-ppt")], questions, examples=N_REPORTED, seed=1)
+    result = contactverif.verify([load_subject("vts-ppt")], questions, examples=N_REPORTED, seed=1)
     report, archive, numbers = folder / "a.nc", folder / "a.npz", numbers_of(result)
     write(result, report)
     np.savez_compressed(archive, numbers)

@@ -10,7 +10,7 @@ from asking import Ask
 from studies.bench_results import make_cells, make_results
 from subjects import change_verbs, load_subject
 
-from contactverif.contract.subject import Subject
+from contactverif import Subject
 from contactverif.studies import bench_cells
 from contactverif_reports.bench_costs import compare_benches
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from asking import Ask
 
+from contactverif import MisuseError
 from contactverif.cli.verify import print_isolation
-from contactverif.contract.errors import MisuseError
 from contactverif.isolation import box as boxes
 from contactverif.isolation import confine, process
 from contactverif.run.journal import read_record, write_record

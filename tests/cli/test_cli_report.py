@@ -7,9 +7,8 @@ import pytest
 from asking import Ask
 from handmade_run import run_with
 
-from contactverif import named_case
+from contactverif import MisuseError, named_case
 from contactverif.cli.replay import announce_stored
-from contactverif.contract.errors import MisuseError
 from contactverif.plugins.registry import the_property
 from contactverif_reports.netcdf.write import write
 

@@ -18,13 +18,10 @@ from fresh_process import MAIN
 from rich.cells import cell_len
 from subjects import Changed, ResidualAlone, load_property
 
+from contactverif import Measurement, Outcome, Row, Run, Traits, Verdict, named_case
 from contactverif.cli import progress
 from contactverif.cli.run_screen import run_screen
-from contactverif.contract.property import Measurement, Outcome, Verdict
-from contactverif.contract.result import Row, Run
-from contactverif.contract.traits import Traits
 from contactverif.plugins import registry
-from contactverif.problems.named_states import named_case
 from contactverif.run.ranking import by_rank
 from contactverif.run.scheduler import Progress
 from contactverif_nts import nts_ar, vts_ppt

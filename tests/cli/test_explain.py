@@ -8,11 +8,11 @@ from asking import Ask, check_mistake
 from rich.cells import cell_len
 from subjects import load_property
 
+from contactverif import Traits
 from contactverif.cli.console import QuietConsole
 from contactverif.cli.explain import TerminalMarkdown
 from contactverif.cli.run_screen import COLUMNS as HEADS
 from contactverif.contract.result import Result
-from contactverif.contract.traits import Traits
 from contactverif.explanations.property_text import planted_mistakes, smallest_mesh, stated_failures
 from contactverif.explanations.terms import symbol_meanings, term_text, term_texts
 from contactverif.plugins.registry import load_formulations, property_ids

@@ -7,8 +7,7 @@ from itertools import repeat
 import pytest
 from quotes import DOCS
 
-from contactverif import Property, Traits, load_properties
-from contactverif.contract.traits import PatchPromises, Promises
+from contactverif import PatchPromises, Promises, Property, Traits, load_properties
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import NAMED, named_case
 

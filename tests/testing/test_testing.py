@@ -18,11 +18,8 @@ import numpy as np
 import pytest
 from dataclasses import replace
 from hypothesis import strategies as st
+from contactverif import Case, Interface, Measurement, PatchPromises, Promises, Property, Quantity, Traits
 from contactverif.plugins import registry
-from contactverif.contract.case import Case
-from contactverif.contract.traits import PatchPromises, Promises, Traits
-from contactverif.contract.interface import Interface
-from contactverif.contract.property import Measurement, Property, Quantity
 
 ERROR = Quantity("error", "1e-6", "a number for a test")
 
