@@ -86,29 +86,27 @@ def verify(
       contactverif verify --resume vts-ppt.nc
       contactverif verify mine --last-failed
     """
-    if options.jobs != 1 and not options.properties:  # It is likely to have workers, which import meanwhile.
-        from contactverif.run.worker_pool import start_server
-
-        start_server()
-    elif options.names and not (options.out or options.mesh or options.scene_file):
-        _start_first(options)
+    _start_processes(options)
     from contactverif.cli.verify import verify
 
     return verify(options, screen, resume)
 
 
-def _start_first(options: RunOptions) -> None:
-    """Start the process of the first formulation of a run without workers, before this one imports what judges it."""
+def _start_processes(options: RunOptions) -> None:
+    """Start what runs beside the imports of this process: a formulation that stands alone, or the server of workers."""
     from contactverif.contract.errors import ContactverifError
     from contactverif.plugins.registry import start_loading
-    from contactverif.run.worker_pool import default_jobs
+    from contactverif.run.worker_pool import default_jobs, start_server
 
     with suppress(ContactverifError):  # What is wrong is told in its turn.
         settled = options.with_settings().settle()
         jobs = settled.jobs or default_jobs(len(settled.names) * len(settled.properties) * settled.size.examples)
-        limits = settled.limits() if jobs == 1 else None
-        if limits is not None:
+        writes = options.out or options.mesh or options.scene_file  # A box hides files that are not there yet.
+        limits = settled.limits() if settled.names and not writes else None
+        if limits is not None and (jobs == 1 or len(settled.names) == 1):
             start_loading(settled.names[0], limits)
+        elif jobs > 1:
+            start_server()
 
 
 @done_in("explain")

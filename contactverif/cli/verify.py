@@ -271,7 +271,8 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
     """
     failures = FailureMemory() if memory and job.place is None else None
     with watch_for_stops(job), ExitStack() as stack:
-        with worker_pool(job.jobs) as executor, Bar() as bar:
+        alone = len(job.options.names) == 1 and job.options.isolation is not Isolation.INLINE
+        with worker_pool(job.jobs, parent_judges=alone) as executor, Bar() as bar:
             plugins, store = stack.enter_context(job.begin(partial(job.load, executor)))
             if failures is not None:
                 store.failures = failures.recall(job.options.names, job.options.properties)

@@ -135,6 +135,19 @@ def count_ends(subject: Subject) -> int:
     return 0 if remote is None else remote.host.n_ended
 
 
+def has_process(subject: Subject) -> bool:
+    """Return whether a process of a subject's own answers this process of the judge now."""
+    remote = _remote_of(subject)
+    return remote is not None and remote.host.has_process
+
+
+def start_process(subject: Subject) -> None:
+    """Start the process of a subject's own in this process of the judge, unless there is one."""
+    remote = _remote_of(subject)
+    if remote is not None and not remote.host.has_process:
+        remote.host.load()
+
+
 def code_files(subject: Subject) -> list[Path]:
     """Return the files whose compiled code the process of a subject has loaded; none if it has none of its own."""
     remote = _remote_of(subject)

@@ -27,7 +27,7 @@ from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
 from contactverif.diagnosis.diagnose import diagnose
-from contactverif.isolation.remote import places
+from contactverif.isolation.remote import has_process, places
 from contactverif.plugins.provenance import collect_provenance
 from contactverif.plugins.registry import unknown_property_error
 from contactverif.run import judge
@@ -102,11 +102,13 @@ def run(
         raise MisuseError("shrink", repr(shrink), "one, new, all or none")
     resolved = (profile_named(profile) if isinstance(profile, str) else profile).resolve(examples=examples, seed=seed)
     assert resolved.seed is not None
+    loaded = _of_kind(Subject, subjects)
+    alone = loaded[0] if len(loaded) == 1 and has_process(loaded[0]) else None
     driver = Driver(
-        _of_kind(Subject, subjects),
+        loaded,
         _of_kind(Property, properties),
         Sampling.at(place, resolved.examples, resolved.seed),
-        Scheduler(executor, progress),
+        Scheduler(executor, progress, subject=alone),
         store or Store(),
         known=known,
         shrink=shrink,

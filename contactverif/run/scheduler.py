@@ -14,7 +14,7 @@ from __future__ import annotations
 import io
 import pickle
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -31,7 +31,7 @@ from contactverif.contract.result import NotLoaded, Row
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import hangs, last_words, note_hangs, note_last_words
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote import code_files, note_code_files
+from contactverif.isolation.remote import code_files, note_code_files, start_process
 from contactverif.plugins.registry import installed_properties, load_property, load_subject, start_loading
 
 Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
@@ -87,36 +87,53 @@ class Job:
 
 
 class Scheduler:
-    """A scheduler of jobs, in the executor or in this process, that reports each step of the progress once."""
+    """A scheduler of jobs, in the executor or in this process, that reports each step of the progress once.
 
-    def __init__(self, executor: Executor | None = None, report: Callable[[Progress], None] | None = None) -> None:
+    All jobs are about `subject`, if there is one, whose process answers here: then this process takes part, and does
+    all jobs as long as the workers are starting.
+    """
+
+    def __init__(
+        self,
+        executor: Executor | None = None,
+        report: Callable[[Progress], None] | None = None,
+        *,
+        subject: Subject | None = None,
+    ) -> None:
         if isinstance(executor, ThreadPoolExecutor):  # Hypothesis does not allow threads.
             raise MisuseError("executor", "a ThreadPoolExecutor", "one with processes, such as ProcessPoolExecutor")
         self._executor, self._report = executor, report
-        self._limit = 1 if executor is None else 2 * int(getattr(executor, "_max_workers", _FURTHER_WORKERS))
+        n_workers = int(getattr(executor, "_max_workers", _FURTHER_WORKERS))
+        self._takes_part = subject is not None
+        self._limit = 1 if executor is None else (4 if self._takes_part else 2) * n_workers
         self._last: Progress | None = None
+        self._start: Future[None] | None = None
+        if executor is not None and subject is not None:  # In a thread, since the first job waits for the server.
+            self._start = ThreadPoolExecutor(1).submit(_start_workers, executor, n_workers, subject)
 
     def work(self, jobs: Iterable[Job]) -> None:
         """Do all jobs, those that follow from one before all others: so few drawn cases wait at a time."""
         waiting, running = deque([iter(jobs)]), dict[Future[bytes], Job]()
         while waiting or running:
-            while waiting and len(running) < self._limit:
-                job = next(waiting[0], None)
-                if job is None:
-                    waiting.popleft()
-                elif (future := _submit(self._executor, job.function, *job.arguments)) is not None:
+            is_full = len(running) >= self._limit
+            job = None if is_full and not self._takes_part else _next_job(waiting)
+            if job is not None:
+                may_submit = not is_full and (self._start is None or self._start.done())
+                future = _submit(self._executor, job.function, *job.arguments) if may_submit else None
+                if future is not None:
                     running[future] = job
-                else:
-                    result = job.function(*job.arguments, **self._counting(job.progress))
-                    waiting.appendleft(iter(job.then(result) or ()))
-            for future in self._wait(running):
+                    continue
+                result = job.function(*job.arguments, **self._counting(job.progress))
+                waiting.appendleft(iter(job.then(result) or ()))
+            for future in self._wait(running, is_patient=job is None):
                 job = running.pop(future)
                 here = partial(job.function, *job.arguments, **self._counting(job.progress))
                 waiting.appendleft(iter(job.then(_fetch(future, here)) or ()))
 
-    def _wait(self, running: Iterable[Future[bytes]]) -> Iterable[Future[bytes]]:
+    def _wait(self, running: Iterable[Future[bytes]], *, is_patient: bool) -> Iterable[Future[bytes]]:
         while running:
-            if ended := wait(running, _SILENCE, FIRST_COMPLETED).done:
+            ended = wait(running, _SILENCE if is_patient else 0, FIRST_COMPLETED).done
+            if ended or not is_patient:
                 return ended
             if self._report is not None and self._last is not None:
                 self._report(replace(self._last, row=None))
@@ -133,6 +150,20 @@ class Scheduler:
         if start is None:
             return {}
         return {"count": lambda finished: self.report(replace(start, count=start.count + finished))}
+
+
+def _next_job(waiting: deque[Iterator[Job]]) -> Job | None:
+    while waiting:
+        if (job := next(waiting[0], None)) is not None:
+            return job
+        waiting.popleft()
+    return None
+
+
+def _start_workers(executor: Executor, count: int, subject: Subject) -> None:
+    """Let each worker of an executor start the process of a subject, and wait for the first one."""
+    futures = [_submit(executor, start_process, subject) for _ in range(count)]
+    wait(filter(None, futures), return_when=FIRST_COMPLETED)
 
 
 def _submit(executor: Executor | None, function: Callable[..., Any], *arguments: Any) -> Future[bytes] | None:
@@ -171,11 +202,12 @@ def begin_loading(names: Sequence[str], limits: Limits | None, executor: Executo
 
     Return a function for each name that waits for what is loaded and returns it, or raises a MisuseError as
     `load_subject` does. Without an executor this process loads all: within limits, the first begins to load at once.
+    It loads one that stands alone, too, since it takes part in judging it.
     """
     here: list[Loader] = [partial(load_subject, name, limits) for name in names]
     if limits is None:
         return here
-    if executor is None:
+    if executor is None or len(names) == 1:
         start_loading(names[0], limits)
         return here
     futures = [_submit(executor, _load, name, limits) for name in names]

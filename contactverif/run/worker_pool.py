@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -50,10 +50,10 @@ def check_jobs(jobs: int) -> int:
 
 
 @contextmanager
-def worker_pool(jobs: int) -> Iterator[Executor | None]:
-    """Yield an executor with so many worker processes; None for one job, which the parent does itself.
+def worker_pool(jobs: int, *, parent_judges: bool = False) -> Iterator[Executor | None]:
+    """Yield an executor with so many worker processes, or one fewer if the parent does jobs, too; None for one job.
 
-    Enter it before plugins and properties are loaded: the workers import while the parent does.
+    The workers start with the first job for them.
     """
     if jobs < 1:
         raise MisuseError("jobs", str(jobs), "at least 1")
@@ -62,7 +62,7 @@ def worker_pool(jobs: int) -> Iterator[Executor | None]:
         return
     before = set(multiprocessing.active_children())
     try:
-        pool = ProcessPoolExecutor(jobs, mp_context=_context(), initializer=_begin_worker)
+        pool = _Pool(jobs - parent_judges, mp_context=_context(), initializer=_begin_worker)
     except (OSError, ImportError) as error:  # Python needs semaphores for it, and they are in shared memory.
         reason = f"{jobs}, but processes cannot share memory here: {getattr(error, 'strerror', None) or error}"
         raise MisuseError("--jobs", reason, "--jobs 1, or a /dev/shm that can be written") from error
@@ -76,27 +76,34 @@ def worker_pool(jobs: int) -> Iterator[Executor | None]:
     pool.shutdown()
 
 
-def start_server() -> None:
-    """Start the server of worker processes, if cores for workers are there: it imports while this process goes on."""
-    if default_jobs(2 * CASES_A_WORKER) > 1:
-        _context()
+class _Pool(ProcessPoolExecutor):
+    def submit(self, *arguments: Any, **options: Any) -> Future[Any]:
+        start_server()
+        return super().submit(*arguments, **options)
 
 
 def _context() -> Any:
     """Return the way to start processes: from a server that has imported the harness, where there is one."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
-    from multiprocessing import forkserver  # Windows has none.
-
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOAD)
+    return context
+
+
+def start_server() -> None:
+    """Start the server of worker processes, unless it runs: it imports while this process goes on."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return
+    from multiprocessing import forkserver  # Windows has none.
+
+    _context()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         with one_thread_for_children():  # The server inherits both, and hears no Ctrl-C.
-            forkserver.ensure_running()  # It imports while the parent goes on.
+            forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    return context
 
 
 def _begin_worker() -> None:

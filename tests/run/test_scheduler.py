@@ -30,6 +30,7 @@ from contactverif.run.run import run
 from contactverif.run.scheduler import CaseChunk, WorkerError, begin_loading, decode, encode
 from contactverif.run.worker_pool import default_jobs, usable_cores, worker_pool
 
+LIMITS = Limits()
 PROPERTY_IDS = ("balance.moment", "patch.flat.transmission", "hard.deep", "hard.dead-zone")
 
 
@@ -61,6 +62,25 @@ def test_one_process_and_two_give_the_same_results_bit_by_bit(pool: Executor) ->
     assert facts(alone) == facts(shared)
     assert any(row.shrunk is not None for row in shared.rows)
     assert any(row.witness is not None for row in shared.rows)
+
+
+def test_a_formulation_that_stands_alone_is_judged_here_and_in_workers(pool: Executor) -> None:
+    subject = load_subject("vts-ppt", LIMITS)
+    assert isinstance(subject, RemoteSubject)
+    processes = set[int]()
+
+    def jobs() -> Iterator[scheduler.Job]:
+        while len(processes) < 2:  # A worker takes part as soon as it has started the process of the formulation.
+            yield scheduler.Job(os.getpid, (), processes.add)
+
+    scheduler.Scheduler(pool, subject=subject).work(jobs())
+    assert os.getpid() in processes
+    here, shared = (
+        run([subject], load_properties(PROPERTY_IDS), examples=60, seed=3, executor=executor, shrink="all")
+        for executor in (None, pool)
+    )
+    assert facts(here) == facts(shared)
+    host.end_all()
 
 
 def test_what_a_function_defines_runs_in_the_parent(pool: Executor) -> None:
@@ -176,8 +196,6 @@ def test_what_a_plugin_prints_in_a_worker_comes_to_the_parent(pool: Executor, mo
 # ---------------------------------------------------------------------------------------------------------------------
 # Workers load formulations as this process does: what loads, what does not, and what a user has mistyped.
 
-LIMITS = Limits()
-
 
 def test_what_has_begun_to_load_is_not_begun_again() -> None:
     for _ in range(2):
@@ -189,7 +207,7 @@ def test_what_has_begun_to_load_is_not_begun_again() -> None:
 
 
 def test_a_worker_loads_what_this_process_loads(pool: Executor) -> None:
-    (loader,) = begin_loading(["vts-me:n=4"], LIMITS, pool)
+    loader, _ = begin_loading(["vts-me:n=4", "nts"], LIMITS, pool)
     there, here = loader(), load_subject("vts-me:n=4", LIMITS)
     assert isinstance(there, Subject)
     assert isinstance(here, Subject)
@@ -197,7 +215,7 @@ def test_a_worker_loads_what_this_process_loads(pool: Executor) -> None:
 
 
 def test_the_compiled_code_of_a_workers_plugin_is_in_the_report(pool: Executor) -> None:
-    (loader,) = begin_loading(["sts"], LIMITS, pool)
+    loader, _ = begin_loading(["sts", "nts"], LIMITS, pool)
     subject = loader()
     assert isinstance(subject, Subject)
     assert any("numba" in str(file) for file in code_files(subject))
@@ -216,11 +234,11 @@ def test_a_mistyped_name_is_the_users_mistake_and_the_others_load(pool: Executor
 
 
 def test_a_wrapper_without_a_formulation_is_told_as_here(pool: Executor) -> None:
-    (loader,) = begin_loading(["two-pass"], LIMITS, pool)
+    loader, _ = begin_loading(["two-pass", "nts"], LIMITS, pool)
     with pytest.raises(MisuseError, match="two-pass/NAME"):
         loader()
 
 
 def test_what_does_not_load_says_why(pool: Executor) -> None:
-    (loader,) = begin_loading(["nts"], Limits(memory=1), pool)
+    loader, _ = begin_loading(["nts", "sts"], Limits(memory=1), pool)
     assert isinstance(loader(), NotLoaded)
