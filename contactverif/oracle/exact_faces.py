@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, measure_heights
 from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Ratios, as_integers, dot, roots
-from contactverif.oracle.flat_answers import area_of, cut_polygon
+from contactverif.oracle.flat_answers import cut_polygon, turn
 from contactverif.oracle.nearest import integers
 
 _UNIT_TRIANGLE = [(Fraction(0), Fraction(0)), (Fraction(1), Fraction(0)), (Fraction(0), Fraction(1))]
@@ -145,6 +146,6 @@ def covered_shares(lattice: FaceLattice) -> list[Fraction]:
         for corners in np.stack([along, up], axis=-1)[near][:, ::-1].tolist():
             places = [(Fraction(int(x), int(whole)), Fraction(int(y), int(whole))) for x, y in corners]
             part = cut_polygon(places, _UNIT_TRIANGLE)
-            share += 2 * area_of(part)
+            share += sum((turn(part[0], *pair) for pair in pairwise(part[1:])), Fraction(0))
         shares.append(share)
     return shares

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from math import isqrt
 from typing import Any
@@ -112,60 +113,32 @@ class View:
     cosine: FloatArray
 
 
-def closest_view(lattice: Lattice, points: ExactPoints, segments: IntArray) -> View:
-    """Return what points see of master segments (n_points,) along the normals of these segments."""
-    arm, along = _arm_and_along(lattice, points, segments)
-    squared = dot(along, along)
-    length = roots(squared)
-    return _view(
-        lattice,
-        points,
-        (arm, along),
-        xi=Ratios(dot(arm, along), points.weight * squared),
-        gap=Ratios(_cross(arm, along) << ROOT_SHIFT, points.weight * length * lattice.scale),
-        normal=Ratios(np.stack([along[:, 1], -along[:, 0]], axis=1) << ROOT_SHIFT, length[:, None]),
-    )
-
-
-def slave_normal_view(lattice: Lattice, points: ExactPoints, segments: IntArray) -> View:
-    """Return what points see of master segments (n_points,) along the normals of the slave segments.
+def _view(lattice: Lattice, points: ExactPoints, segments: IntArray, *, closest: bool) -> View:
+    """Return what points see of master segments (n_points,), along the normals of these or of the slave segments.
 
     A segment that is seen edge-on has its ξ and gap divided by 1 in place of 0; its cosine tells.
     """
     arm, along = _arm_and_along(lattice, points, segments)
-    advance = -dot(along, points.along)  # It is positive where the segments face each other.
+    carrier = -along if closest else points.along
+    advance = -dot(along, carrier)  # It is positive where the segments face each other.
     sign = np.where(advance < 0, -1, 1).astype(object)
     size = abs(advance) + (advance == 0)
-    length = roots(dot(points.along, points.along))
-    return _view(
-        lattice,
-        points,
-        (arm, along),
-        xi=Ratios(-sign * dot(arm, points.along), points.weight * size),
-        gap=Ratios(sign * length * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
-        normal=Ratios(np.stack([-points.along[:, 1], points.along[:, 0]], axis=1) << ROOT_SHIFT, length[:, None]),
-        advance=advance,
+    root = roots(dot(carrier, carrier))
+    distance = _sizes(arm, points.weight * lattice.scale)
+    master, slave = _sizes(along, lattice.scale), _sizes(points.along, lattice.scale)
+    above = Ratios(advance, np.full(len(arm), lattice.scale**2, dtype=object)).floats()
+    return View(
+        xi=Ratios(-sign * dot(arm, carrier), points.weight * size),
+        gap=Ratios(sign * root * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
+        normal=Ratios(np.stack([-carrier[:, 1], carrier[:, 0]], axis=1) << ROOT_SHIFT, root[:, None]),
+        lengths=distance + master + slave,
+        slave_length=slave,
+        master_length=master,
+        cosine=np.ones(len(arm)) if closest else above / (master * slave),
     )
 
 
-def _view(
-    lattice: Lattice,
-    points: ExactPoints,
-    vectors: tuple[Integers, Integers],
-    *,
-    xi: Ratios,
-    gap: Ratios,
-    normal: Ratios,
-    advance: Integers | None = None,
-) -> View:
-    """Return the view with its lengths, and with its cosine, if segments do not look along their own normals."""
-    arm, along = vectors
-    distance = _sizes(arm, points.weight * lattice.scale)
-    master, slave, cosine = _sizes(along, lattice.scale), _sizes(points.along, lattice.scale), np.ones(len(arm))
-    if advance is not None:
-        above = Ratios(advance, np.full(len(arm), lattice.scale**2, dtype=object)).floats()
-        cosine = above / (master * slave)
-    return View(xi, gap, normal, distance + master + slave, slave, master, cosine)
+closest_view, slave_normal_view = (partial(_view, closest=closest) for closest in (True, False))
 
 
 def run_against(lattice: Lattice, points: ExactPoints, segments: IntArray) -> BoolArray:

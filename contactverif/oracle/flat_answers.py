@@ -7,7 +7,7 @@ common is a convex domain, which is given: a face is cut with the edges of the d
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 
@@ -36,7 +36,8 @@ def uniform_pressure_weights_exact(interface: Interface, along: ArrayLike) -> li
         ordered = sorted(sorted(ends, key=places.__getitem__) for ends in surface.segments.tolist())
         ordered.sort(key=lambda ends: places[ends[0]])
         starts = [places[low] for low, _ in ordered]
-        for low, high in _stretches(other, places):
+        for chain in chain_ends(other):
+            low, high = sorted(places[node] for node in chain)
             for first, second in ordered[max(bisect_right(starts, low) - 1, 0) : bisect_right(starts, high)]:
                 begin, end = places[first], places[second]
                 if low <= begin and end <= high:
@@ -54,17 +55,12 @@ def uniform_pressure_weights(interface: Interface, along: ArrayLike) -> FloatArr
     return np.array([float(weight) for weight in uniform_pressure_weights_exact(interface, along)])
 
 
-def _stretches(surface: Surface, places: list[int]) -> list[tuple[int, int]]:
-    """Return the stretch that each chain covers."""
-    firsts, lasts = surface.segments[:, 0].tolist(), surface.segments[:, 1].tolist()
-    stretches: list[tuple[int, int]] = []
-    for segment in surface.chain_order.tolist():
-        if surface.neighbours[segment, 0] < 0:
-            begin = places[firsts[segment]]
-        if surface.neighbours[segment, 1] < 0:
-            end = places[lasts[segment]]
-            stretches.append((min(begin, end), max(begin, end)))
-    return stretches
+def chain_ends(surface: Surface) -> list[tuple[int, int]]:
+    """Return the first and the last node of each open chain."""
+    order = surface.chain_order
+    previous, following = surface.neighbours[order].T
+    ends = surface.segments[order[previous < 0], 0], surface.segments[order[following < 0], 1]
+    return list(zip(*(side.tolist() for side in ends), strict=True))
 
 
 def nodal_spring_weights(interface: Interface, along: ArrayLike, *, both_surfaces: bool = False) -> FloatArray:
@@ -77,16 +73,30 @@ def nodal_spring_weights(interface: Interface, along: ArrayLike, *, both_surface
     beside the other surface has no spring. With `both_surfaces` there are springs at the nodes of the master too.
     """
     places, _ = integers(np.asarray(along, dtype=np.float64))
-    forces = [Fraction(0)] * len(places)
+
+    def parts(node: int, ends: list[int]) -> list[Fraction]:
+        return [Fraction(places[ends[1]] - places[node]), Fraction(places[node] - places[ends[0]])]
+
+    return _spring_weights(interface, parts, both_surfaces)
+
+
+def _spring_weights(
+    interface: Interface, parts_at: Callable[[int, list[int]], list[Fraction]], both_surfaces: bool
+) -> FloatArray:
+    """Return the forces (n_nodes,) of springs. The parts of an element at a node add up to its own size.
+
+    Each is opposite one of its nodes, and all have the same sign where the node lies over the element.
+    """
+    forces = [Fraction(0)] * interface.n_nodes
     passes = [(interface.slave, interface.master), (interface.master, interface.slave)]
     for surface, other in passes if both_surfaces else passes[:1]:
-        for node in np.unique(surface.segments).tolist():
-            for first, second in other.segments.tolist():
-                span, arm = places[second] - places[first], places[node] - places[first]
-                if 0 <= Fraction(arm, span) <= 1:
+        for node in surface.nodes.tolist():
+            for corners in other.faces.tolist():
+                parts = parts_at(node, corners)
+                if min(parts) >= 0 or max(parts) <= 0:
                     forces[node] += 1
-                    forces[second] += Fraction(arm, span)
-                    forces[first] += 1 - Fraction(arm, span)
+                    for corner, part in zip(corners, parts, strict=True):
+                        forces[corner] += part / sum(parts)
                     break
     return np.array([float(force) for force in forces])
 
@@ -144,7 +154,7 @@ def uniform_surface_weights_exact(interface: Interface, plane: ArrayLike, domain
     for surface in (interface.slave, interface.master):
         for face in surface.faces.tolist():
             corners = [places[node] for node in face]
-            if _turn(corners[0], corners[1], corners[2]) < 0:
+            if turn(corners[0], corners[1], corners[2]) < 0:
                 face, corners = face[::-1], corners[::-1]
             for node, weight in zip(face, _integrate_shapes(corners, border), strict=True):
                 weights[node] += weight
@@ -164,46 +174,52 @@ def nodal_surface_weights(interface: Interface, plane: ArrayLike, *, both_surfac
     With `both_surfaces` there are springs at the nodes of the master too.
     """
     places = _as_points(plane)
-    forces = [Fraction(0)] * len(places)
-    passes = [(interface.slave, interface.master), (interface.master, interface.slave)]
-    for surface, other in passes if both_surfaces else passes[:1]:
-        for node in np.unique(surface.faces).tolist():
-            for face in other.faces.tolist():
-                parts = [_turn(places[node], places[face[i - 2]], places[face[i - 1]]) for i in range(3)]
-                if min(parts) >= 0 or max(parts) <= 0:
-                    forces[node] += 1
-                    for corner, part in zip(face, parts, strict=True):
-                        forces[corner] += part / sum(parts)
-                    break
-    return np.array([float(force) for force in forces])
+
+    def parts(node: int, face: list[int]) -> list[Fraction]:
+        return [turn(places[node], places[face[i - 2]], places[face[i - 1]]) for i in range(3)]
+
+    return _spring_weights(interface, parts, both_surfaces)
 
 
 def _as_points(values: ArrayLike) -> Polygon:
     return [(Fraction(x), Fraction(y)) for x, y in np.asarray(values, dtype=np.float64).tolist()]
 
 
-def _turn(a: Point, b: Point, c: Point) -> Fraction:
+def turn(a: Point, b: Point, c: Point) -> Fraction:
     """Return twice the area of a triangle, positive if its corners run counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
-    """Return ∫ of each shape function of a face over its part in the domain."""
+    """Return ∫ of each shape function of a face over its part in the domain.
+
+    A linear function over a triangle is its value at the centroid times the area.
+    """
     edges = list(zip(border, border[1:] + border[:1], strict=True))
-    if all(_turn(start, end, corner) >= 0 for start, end in edges for corner in corners):
-        return [_turn(*corners) / 6] * 3 if len(corners) == _TRIANGLE else _whole_quadrilateral(corners)
+    whole = all(turn(start, end, corner) >= 0 for start, end in edges for corner in corners)
     if len(corners) != _TRIANGLE:
-        raise MisuseError(
-            "plane", "a quadrilateral partly outside of the domain", "triangles, or none cut by the border"
-        )
-    return _triangle_over(corners, cut_polygon(corners, border))
+        if not whole:
+            needed = "triangles, or none cut by the border"
+            raise MisuseError("plane", "a quadrilateral partly outside of the domain", needed)
+        return _whole_quadrilateral(corners)
+    size = turn(*corners)
+    if whole:
+        return [size / 6] * 3
+    part, weights = cut_polygon(corners, border), [Fraction(0)] * 3
+    for second, third in pairwise(part[1:]):
+        fan = part[0], second, third
+        area = turn(*fan) / 2
+        centroid = (sum((x for x, _ in fan), Fraction(0)) / 3, sum((y for _, y in fan), Fraction(0)) / 3)
+        for i in range(3):
+            weights[i] += area * turn(corners[(i + 1) % 3], corners[(i + 2) % 3], centroid) / size
+    return weights
 
 
 def cut_polygon(polygon: Polygon, border: Polygon) -> Polygon:
     """Return the part of a convex polygon in another one, at most empty."""
     for start, end in zip(border, border[1:] + border[:1], strict=True):  # Keep what is to the left of each edge.
         part: Polygon = []
-        sides = [_turn(start, end, corner) for corner in polygon]
+        sides = [turn(start, end, corner) for corner in polygon]
         for k, (corner, side) in enumerate(zip(polygon, sides, strict=True)):
             following, there = polygon[(k + 1) % len(polygon)], sides[(k + 1) % len(polygon)]
             if side >= 0:
@@ -216,27 +232,6 @@ def cut_polygon(polygon: Polygon, border: Polygon) -> Polygon:
     return polygon
 
 
-def area_of(polygon: Polygon) -> Fraction:
-    """Return the area of a polygon."""
-    corners = polygon[1:]
-    return sum((_turn(polygon[0], *pair) for pair in pairwise(corners)), Fraction(0)) / 2
-
-
-def _triangle_over(corners: Polygon, part: Polygon) -> Sequence[Fraction]:
-    """Return ∫ of the linear shape functions of a triangle over a convex polygon in it, at most empty.
-
-    A linear function over a triangle is its value at the centroid times the area.
-    """
-    whole, weights = _turn(*corners), [Fraction(0)] * 3
-    for k in range(1, len(part) - 1):
-        fan = (part[0], part[k], part[k + 1])
-        area = _turn(*fan) / 2
-        centroid = (sum((x for x, _ in fan), Fraction(0)) / 3, sum((y for _, y in fan), Fraction(0)) / 3)
-        for i in range(3):
-            weights[i] += area * _turn(corners[(i + 1) % 3], corners[(i + 2) % 3], centroid) / whole
-    return weights
-
-
 def _whole_quadrilateral(corners: Polygon) -> Sequence[Fraction]:
     """Return ∫ of the bilinear shape functions, with the Jacobian a₀ + a₁ s + a₂ t on [−1, 1]²."""
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -246,7 +241,7 @@ def _whole_quadrilateral(corners: Polygon) -> Sequence[Fraction]:
     )
     origin: Point = (Fraction(0), Fraction(0))
     middle, by_s, by_t = (
-        _turn(origin, (first[0], first[1]), (second[0], second[1])) / 16
+        turn(origin, (first[0], first[1]), (second[0], second[1])) / 16
         for first, second in ((along, up), (along, twist), (twist, up))
     )
     return [middle + s * by_s / 3 + t * by_t / 3 for s, t in signs]

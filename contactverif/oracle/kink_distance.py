@@ -78,9 +78,9 @@ def kink_margin(
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """The master surface in floats; axes are those of a surface's segments."""
+    """The segments of the master in floats."""
 
-    first: FloatArray  # (n_segments, dim), as for the second ends and the tangents.
+    first: FloatArray  # (n_segments, 2), as are the second ends and the tangents.
     second: FloatArray
     length: FloatArray  # (n_segments,)
     tangent: FloatArray
@@ -103,39 +103,27 @@ def _margin(difference: FloatArray, tangent: FloatArray, inverse_length: FloatAr
     return np.abs(_dots(difference, tangent)) / (3 * (1 + size * inverse_length))
 
 
-def _distances(line: _Line, points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return distances (n_points, n_segments) to the closed segments, and the nearest segments (n_points,)."""
-    dx, dy = (points[:, None, k] - line.first[:, k] for k in (0, 1))
-    ex, ey = (points[:, None, k] - line.second[:, k] for k in (0, 1))
-    foot = dx * line.tangent[:, 0] + dy * line.tangent[:, 1]
-    gap = dx * line.tangent[:, 1] - dy * line.tangent[:, 0]
-    before, behind = foot <= 0, foot >= line.length
-    distance = np.where(before, np.hypot(dx, dy), np.where(behind, np.hypot(ex, ey), np.abs(gap)))
-    overshoot = np.maximum(np.maximum(-foot, foot - line.length), 0.0)
-    least = distance.min(axis=1, keepdims=True)
-    overshoot[distance > least * (1 + 64 * UNIT_ROUNDOFF)] = np.inf
-    home: IntArray = overshoot.argmin(axis=1)
-    return distance, home
-
-
 def _nearest_margin(line: _Line, points: FloatArray) -> tuple[IntArray, float]:
     """Return the nearest segments (n_points,) and the least margin of that choice, the gap's sign and free ends."""
-    distance, home = _distances(line, points)
-    rows = np.arange(len(points))
-    nearest = distance[rows, home]
+    dx, dy = (points[:, None, k] - line.first[:, k] for k in (0, 1))  # (n_points, n_segments)
+    ex, ey = (points[:, None, k] - line.second[:, k] for k in (0, 1))
+    feet = dx * line.tangent[:, 0] + dy * line.tangent[:, 1]
+    gaps = dx * line.tangent[:, 1] - dy * line.tangent[:, 0]
+    beyond = np.where(feet >= line.length, np.hypot(ex, ey), np.abs(gaps))
+    distance = np.where(feet <= 0, np.hypot(dx, dy), beyond)
+    past = np.maximum(np.maximum(-feet, feet - line.length), 0.0)
+    past[distance > distance.min(axis=1, keepdims=True) * (1 + 64 * UNIT_ROUNDOFF)] = np.inf
+    rows, home = np.arange(len(points)), past.argmin(axis=1)
     length, inverse, tangent = line.length[home], 1 / line.length[home], line.tangent[home]
-    difference = points - line.first[home]
-    foot, gap = _dots(difference, tangent), _dots(difference, tangent[:, ::-1] * [1, -1])
-    overshoot = np.maximum(np.maximum(-foot, foot - length), 0.0)
-    least = float((np.abs(gap) / (3 * (1 + overshoot * inverse))).min(initial=np.inf))
-    by_distance = (distance - nearest[:, None]) / 4
+    least = float((np.abs(gaps[rows, home]) / (3 * (1 + past[rows, home] * inverse))).min(initial=np.inf))
+    by_distance = (distance - distance[rows, home, None]) / 4
     by_distance[rows, home] = np.inf
     for side, vertex, far in ((0, line.first, line.second), (1, line.second, line.first)):
         other = line.neighbours[home, side]
         outward = points - vertex[home]
         free = other < 0
-        for past in (0.0, _SNAP):
-            end = outward[free] + (1 if side == 0 else -1) * past * (length[:, None] * tangent)[free]
+        for share in (0.0, _SNAP):
+            end = outward[free] + (1 if side == 0 else -1) * share * (length[:, None] * tangent)[free]
             least = min(least, float(_margin(end, tangent[free], inverse[free]).min(initial=np.inf)))
         mean = tangent + line.tangent[other]
         size = np.hypot(*mean.T)

@@ -123,26 +123,21 @@ def nearest_segments(nodes: FloatArray, segments: IntArray, point: tuple[float, 
     numbers = iter(values)
     corners = zip(numbers, numbers, numbers, numbers, strict=True)  # The coordinates of both nodes of each candidate.
     near = nearest_of(
-        [
-            reach(segment, (ax, ay), (bx, by), (x, y))
-            for segment, (ax, ay, bx, by) in zip(candidates.tolist(), corners, strict=True)
-        ]
+        reach(segment, (ax, ay), (bx, by), (x, y))
+        for segment, (ax, ay, bx, by) in zip(candidates.tolist(), corners, strict=True)
     )
     area = scale * scale
-    distance = Fraction(near[0].above, near[0].squared * area)
-    return Nearest(
-        distance,
-        tuple(
-            NearSegment(
-                segment=each.segment,
-                xi=Fraction(each.along, each.squared),
-                squared_overshoot=Fraction(each.past * each.past, each.squared * area),
-                signed_squared_gap=Fraction(each.across * abs(each.across), each.squared * area),
-                foot=("segment", each.segment) if each.end < 0 else ("node", int(segments[each.segment, each.end])),
-            )
-            for each in near
-        ),
+    answers = (
+        NearSegment(
+            segment=each.segment,
+            xi=Fraction(each.along, each.squared),
+            squared_overshoot=Fraction(each.past * each.past, each.squared * area),
+            signed_squared_gap=Fraction(each.across * abs(each.across), each.squared * area),
+            foot=("segment", each.segment) if each.end < 0 else ("node", int(segments[each.segment, each.end])),
+        )
+        for each in near
     )
+    return Nearest(Fraction(near[0].above, near[0].squared * area), tuple(answers))
 
 
 def _candidates(nodes: FloatArray, segments: IntArray, point: FloatArray) -> IntArray:

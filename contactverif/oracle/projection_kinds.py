@@ -7,18 +7,19 @@ measured, not by how a strategy makes it. The one exception is 89.9°, which has
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from itertools import permutations
 from math import cos, isclose, radians, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import Interface
+from contactverif.oracle.exact_points import Integers, as_integers
+from contactverif.oracle.nearest import integers, reach
 
 TAU = Fraction(1e-2)  # Formulations may still see contact past a free end by this share of the segment.
-Vector = tuple[Fraction, Fraction]
 
 
 def is_of_kind(interface: Interface, z: FloatArray, kind: str, slave_segment: int, c: float) -> bool:
@@ -35,13 +36,13 @@ def kind_of(interface: Interface, z: FloatArray, slave_segment: int, c: float) -
     return next((kind for kind, test in KIND_TESTS.items() if test(probe)), "other")
 
 
-@dataclass(frozen=True, slots=True)
-class _Foot:
-    """The projection of a point onto one segment."""
+class _Foot(NamedTuple):
+    """The projection of a point onto one segment. Feet sort by distance, then by overshoot."""
 
+    squared: Fraction  # The squared distance to the closed segment, in units of the lattice, and the squared overshoot.
+    squared_overshoot: Fraction
     segment: int
     xi: Fraction  # Unclipped.
-    squared: Fraction  # The squared distance to the closed segment.
 
     @property
     def is_inside(self) -> bool:
@@ -49,52 +50,35 @@ class _Foot:
 
 
 class _Probe:
-    """A slave point, and what the master looks like from there."""
+    """A slave point, and what the master looks like from there, in integers on one lattice."""
 
     def __init__(self, interface: Interface, z: FloatArray, slave_segment: int, c: float) -> None:
-        values = [Fraction(value) for value in np.asarray(z)[: interface.n_unknowns].tolist()]
-        self.nodes: list[Vector] = list(zip(values[::2], values[1::2], strict=True))
+        nodes = as_integers(integers(np.asarray(z)[: interface.n_unknowns])[0]).reshape(-1, 2)
         self.slave: list[list[int]] = interface.slave.segments.tolist()
         self.master: list[list[int]] = interface.master.segments.tolist()
         self.neighbours: list[list[int]] = interface.master.neighbours.tolist()
         self.carrier, self.c = self.slave[slave_segment], c
-        share = (1 + Fraction(c)) / 2
-        first, second = (self.nodes[node] for node in self.carrier)
-        self.point = _interpolate(first, second, share)
+        first, second = nodes[self.carrier]
+        above, below = float(c).as_integer_ratio()
+        self.point: Integers = (below - above) * first + (below + above) * second
+        self.nodes: Integers = 2 * below * nodes
+        self.feet = self.feet_of(self.point)
+        self.home = self.feet[0]
+        self.tied = [foot for foot in self.feet if foot.squared == self.home.squared]
 
-    @cached_property
-    def feet(self) -> list[_Foot]:
-        """The feet on all segments, the nearest first, of equally near ones that with the least overshoot."""
-        return self.feet_of(self.point)
+    def feet_of(self, point: Integers) -> list[_Foot]:
+        """Return the feet on all segments, the nearest first, of equally near ones that with the least overshoot."""
+        feet, (x, y) = [], point
+        for segment, ends in enumerate(self.master):
+            first, second = self.nodes[ends]
+            near = reach(segment, first, second, (x, y))
+            distance, overshoot = Fraction(near.above, near.squared), Fraction(near.past**2, near.squared)
+            feet.append(_Foot(distance, overshoot, segment, Fraction(near.along, near.squared)))
+        return sorted(feet)
 
-    @cached_property
-    def home(self) -> _Foot:
-        """The foot on the nearest segment."""
-        return self.feet[0]
-
-    @property
-    def tied(self) -> list[_Foot]:
-        """The feet on all segments that are equally near."""
-        return [foot for foot in self.feet if foot.squared == self.home.squared]
-
-    def feet_of(self, point: Vector) -> list[_Foot]:
-        ranked = []
-        for segment in range(len(self.master)):
-            first, second = self.ends(segment)
-            along, away = _minus(second, first), _minus(point, first)
-            xi = _dot(away, along) / _dot(along, along)
-            inside = min(max(xi, Fraction(0)), Fraction(1))
-            distance = _minus(point, _interpolate(first, second, inside))
-            squared = _dot(distance, distance)
-            overshoot = (xi - inside) ** 2 * _dot(along, along)
-            ranked.append((squared, overshoot, segment, _Foot(segment, xi, squared)))
-        return [foot for *_, foot in sorted(ranked, key=lambda entry: entry[:3])]
-
-    def ends(self, segment: int) -> tuple[Vector, Vector]:
-        return self.nodes[self.master[segment][0]], self.nodes[self.master[segment][1]]
-
-    def direction(self, segment: int) -> Vector:
-        return _minus(*reversed(self.ends(segment)))
+    def direction(self, segment: int) -> Integers:
+        first, second = self.nodes[self.master[segment]]
+        return np.asarray(second - first)
 
     def chain(self, segment: int) -> list[int]:
         """Return the segments of a master chain, from the first one of an open chain."""
@@ -106,19 +90,9 @@ class _Probe:
             chain.append(following)
         return chain
 
-    def turn(self) -> tuple[Fraction, Fraction] | None:
-        """Return cross and dot product of the two nearest segments, in chain order; None if they share no node."""
-        if len(self.feet) < 2:
-            return None
-        pair = self.feet[0].segment, self.feet[1].segment
-        for first, second in (pair, pair[::-1]):
-            if self.neighbours[first][1] == second:
-                u, v = self.direction(first), self.direction(second)
-                return u[0] * v[1] - u[1] * v[0], _dot(u, v)
-        return None
-
+    @property
     def past(self) -> Fraction | None:
-        """Return how far the foot is past a free end, in lengths of the segment; None if it is past none."""
+        """How far the foot is past a free end, in lengths of the segment; None where the nearer end is not free."""
         side = int(self.home.xi > Fraction(1, 2))
         if self.neighbours[self.home.segment][side] >= 0:
             return None
@@ -138,8 +112,7 @@ def _role(probe: _Probe, role: str) -> bool:
     covered = chain[chain.index(b) : chain.index(a) + 1]  # The master runs against the slave.
     if len(covered) < 3:
         return False
-    place = {covered[0]: "first", covered[-1]: "last"}.get(probe.home.segment, "intermediate")
-    return place == role
+    return {covered[0]: "first", covered[-1]: "last"}.get(probe.home.segment, "intermediate") == role
 
 
 def _at_node(probe: _Probe, *, free: bool) -> bool:
@@ -154,54 +127,52 @@ def _coincident(probe: _Probe) -> bool:
     while len(nodes) > size:
         size = len(nodes)
         nodes.update(node for ends in probe.slave if nodes.intersection(ends) for node in ends)
-    feet = [probe.feet_of(probe.nodes[node])[0] for node in nodes]
-    return abs(probe.c) == 1 and all(foot.xi in (0, 1) for foot in feet)
+    return abs(probe.c) == 1 and all(probe.feet_of(probe.nodes[node])[0].xi in (0, 1) for node in nodes)
 
 
 def _vertex(probe: _Probe, sign: int, *, sharp: bool = False) -> bool:
     """Return whether the two nearest segments meet at a vertex that sticks out (sign 1) or in (−1), or is sharp."""
-    turn = probe.turn()
-    if turn is None:
-        return False
-    cross, dot = turn
-    return dot < 0 and cross != 0 if sharp else cross * sign > 0
+    for first, second in permutations([foot.segment for foot in probe.feet[:2]], 2):
+        if probe.neighbours[first][1] == second:
+            u, v = probe.direction(first), probe.direction(second)
+            cross = int(u[0] * v[1] - u[1] * v[0])
+            return _dot(u, v) < 0 and cross != 0 if sharp else cross * sign > 0
+    return False
 
 
 def _past_end(probe: _Probe, *, inside: bool) -> bool:
-    past = probe.past()
-    return past is not None and (0 < past <= TAU if inside else past > TAU)
+    return probe.past is not None and (0 < probe.past <= TAU if inside else probe.past > TAU)
 
 
 def _small_overlap(probe: _Probe) -> bool:
     """Return whether the point is a slave node over the end of a chain, and its segment goes on past that end."""
-    past = probe.past()
     other = probe.nodes[probe.carrier[0 if probe.c == 1 else 1]]
-    first, along = probe.ends(probe.home.segment)[0], probe.direction(probe.home.segment)
-    xi = _dot(_minus(other, first), along) / _dot(along, along)
+    first, along = probe.nodes[probe.master[probe.home.segment][0]], probe.direction(probe.home.segment)
+    xi = Fraction(_dot(other - first, along), _dot(along, along))
     outside = xi > 1 if probe.home.xi > Fraction(1, 2) else xi < 0
-    return abs(probe.c) == 1 and past is not None and Fraction(-1, 2) <= past < 0 and outside
+    return abs(probe.c) == 1 and probe.past is not None and Fraction(-1, 2) <= probe.past < 0 and outside
 
 
 def _angle(probe: _Probe, degrees: float) -> bool:
     """Return whether the point is over the inside of a segment and its slave segment turned by an angle against it."""
-    first, second = (probe.nodes[node] for node in probe.carrier)
-    slave, master = _minus(second, first), probe.direction(probe.home.segment)
+    first, second = probe.nodes[probe.carrier]
+    slave, master = second - first, probe.direction(probe.home.segment)
     if not probe.home.is_inside:
         return False
     facing = -_dot(slave, master)  # Zero degrees is antiparallel.
     if degrees == 90:
         return facing == 0
     if degrees == 180:
-        return facing < 0 and slave[0] * master[1] == slave[1] * master[0]
-    cosine = float(facing) / sqrt(_dot(slave, slave) * _dot(master, master))
-    return isclose(cosine, cos(radians(degrees)), rel_tol=1e-4)
+        return facing < 0 and bool(slave[0] * master[1] == slave[1] * master[0])
+    cosine = sqrt(Fraction(facing**2, _dot(slave, slave) * _dot(master, master)))
+    return facing > 0 and isclose(cosine, cos(radians(degrees)), rel_tol=1e-4)
 
 
 def _second_body(probe: _Probe) -> bool:
     """Return whether the line through the point along the normal of the nearest segment meets two chains."""
     along, chains = probe.direction(probe.home.segment), set()
-    for segment in range(len(probe.master)):
-        first, second = (_dot(_minus(end, probe.point), along) for end in probe.ends(segment))
+    for segment, ends in enumerate(probe.master):
+        first, second = (probe.nodes[ends] - probe.point) @ along
         if first * second <= 0:
             chains.add(min(probe.chain(segment)))
     return probe.home.is_inside and len(chains) > 1
@@ -217,7 +188,7 @@ def _closing(probe: _Probe) -> bool:
 
 def _other_node(probe: _Probe) -> bool:
     """Return whether some node is nearer than both ends of the nearest segment."""
-    arms = {node: _minus(probe.nodes[node], probe.point) for ends in probe.master for node in ends}
+    arms = {node: probe.nodes[node] - probe.point for ends in probe.master for node in ends}
     distances = {node: _dot(arm, arm) for node, arm in arms.items()}
     least = min(distances[node] for node in probe.master[probe.home.segment])
     return _inside(probe) and min(distances.values()) < least
@@ -251,13 +222,5 @@ KIND_TESTS: dict[str, Callable[[_Probe], bool]] = {
 }
 
 
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1]
-
-
-def _dot(a: Vector, b: Vector) -> Fraction:
-    return a[0] * b[0] + a[1] * b[1]
-
-
-def _interpolate(first: Vector, second: Vector, share: Fraction) -> Vector:
-    return first[0] + share * (second[0] - first[0]), first[1] + share * (second[1] - first[1])
+def _dot(a: Integers, b: Integers) -> int:
+    return int(a @ b)

@@ -27,8 +27,7 @@ from contactverif.sampling.hypothesis_draws import (
     find_difference,
     one_thread,
     reproducible,
-    shrink_choices,
-    shrink_drawn,
+    shrink_case,
 )
 
 # A strategy, or a strategy for each kind of situation: the kinds take turns, so that each gets the same share.
@@ -54,9 +53,7 @@ class Sampling:
     @classmethod
     def at(cls, place: Interface | Case | None, examples: int, seed: int) -> Sampling:
         """Return the sampling on an interface, on a scene, or on random ones."""
-        if isinstance(place, Case):
-            return cls(examples, seed, place.interface, place)
-        return cls(examples, seed, place)
+        return cls(examples, seed, place.interface, place) if isinstance(place, Case) else cls(examples, seed, place)
 
     def source(self, question: Property) -> CaseSource | None:
         """Return the source of the cases; None if the property cannot be checked on this interface or scene."""
@@ -128,29 +125,25 @@ def draw_block(
     if isinstance(source, tuple):
         check_names(source)
         return PlannedCases(source, exhausted=True)
-    report = progress or (lambda _: None)
-    past = number * BLOCK
-    size = min(BLOCK, examples - past)
-    draws = _draw_block(source, seed, number, size, _counted_from(past, report))
+    draws = _draw_block(source, seed, examples, number, progress)
     if draws is None:
-        return _draw_with_engine(source, seed, examples, report)
-    short = len(draws) < size
-    return PlannedCases(tuple(draw.case for draw in draws), short, short or past + size == examples)
+        return _draw_with_engine(source, seed, examples, progress)
+    end = number * BLOCK + len(draws)
+    short = end < min(examples, (number + 1) * BLOCK)
+    return PlannedCases(tuple(draw.case for draw in draws), short, short or end == examples)
 
 
 def draws_blocks(source: CaseSource, *, seed: str, examples: int) -> bool:
     """Return whether cases are drawn block by block; otherwise the first block has all cases."""
-    return not isinstance(source, tuple) and _block_of(source, seed, examples, 0) is not None
+    return not isinstance(source, tuple) and _draw_block(source, seed, examples, 0) is not None
 
 
 def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> Case:
     """Return the case with this number of those of `draw_cases`."""
     if isinstance(source, tuple):
         return source[number]
-    draws = _block_of(source, seed, examples, number)
-    if draws is None:
-        return _draw_with_engine(source, seed, examples, lambda _: None).cases[number]
-    return draws[number % BLOCK].case
+    draws = _draw_block(source, seed, examples, number // BLOCK)
+    return _draw_with_engine(source, seed, examples).cases[number] if draws is None else draws[number % BLOCK].case
 
 
 def with_case(sampling: Sampling, question: Property, number: int, outcome: Outcome) -> Outcome:
@@ -179,17 +172,18 @@ def shrink(
     """
     if isinstance(source, tuple):
         return
-    draws = _block_of(source, seed, examples, first)
+    draws = _draw_block(source, seed, examples, first // BLOCK)
     if draws is not None:
         strategies = _strategies_in_turn(source)
         _, strategy = strategies[first % len(strategies)]
-        shrink_choices(strategy, draws[first % BLOCK].stored_choices(), seed=seed, fails=fails, limit=limit)
+        choices = draws[first % BLOCK].stored_choices()
+        shrink_case(strategy, seed=seed, fails=fails, limit=limit, choices=choices)
         return
-    parts = _parts(source, seed, examples)
-    n, place = 0, first
+    parts, n, place = _parts(source, seed, examples), 0, first
     if len(parts) > 1:
-        n, place = _deal([draw_all(*part, progress=lambda _: None)[0] for part in parts])[first]
-    shrink_drawn(*parts[n], first=place, fails=fails, limit=limit)
+        n, place = _deal([draw_all(*part)[0] for part in parts])[first]
+    strategy, own_seed, share = parts[n]
+    shrink_case(strategy, seed=own_seed, fails=fails, limit=limit, examples=share, first=place)
 
 
 def check_names(cases: Sequence[Case]) -> None:
@@ -200,16 +194,10 @@ def check_names(cases: Sequence[Case]) -> None:
             raise MisuseError("cases", actual, "a finite list whose cases have a name each, all different")
 
 
-def _block_of(source: RandomSource, seed: str, examples: int, number: int) -> list[Draw] | None:
-    """Return the block of the case with this number; None if hypothesis' engine draws it."""
-    block = number // BLOCK
-    return _draw_block(source, seed, block, min(BLOCK, examples - block * BLOCK), lambda _: None)
-
-
 def _draw_block(
-    source: RandomSource, seed: str, number: int, size: int, progress: Callable[[int], None]
+    source: RandomSource, seed: str, examples: int, number: int, progress: Callable[[int], None] | None = None
 ) -> list[Draw] | None:
-    """Return the first `size` cases of a block; None if hypothesis' engine must draw all blocks.
+    """Return the cases of a block; None if hypothesis' engine must draw all blocks.
 
     A strategy with few different cases may run out. Only the engine knows whether it has more, so it draws all of them;
     where that shows late, the block is short.
@@ -222,18 +210,14 @@ def _draw_block(
     ]
     draws: list[Draw] = []
     with reproducible():
-        for place in range(number * BLOCK, number * BLOCK + size):
+        for place in range(number * BLOCK, min(examples, (number + 1) * BLOCK)):
             draw = next(streams[place % len(streams)], None)
             if draw is None:
                 return None if number == 0 else draws
             draws.append(draw)
-            progress(len(draws))
+            if progress:
+                progress(place + 1)
     return draws
-
-
-def _counted_from(past: int, progress: Callable[[int], None]) -> Callable[[int], None]:
-    """Return a progress that also counts the cases of the past."""
-    return lambda count: progress(past + count)
 
 
 def _strategies_in_turn(source: RandomSource) -> list[tuple[str, SearchStrategy[Case]]]:
@@ -258,12 +242,13 @@ def _parts(source: RandomSource, seed: str, examples: int) -> list[tuple[SearchS
     return [part for part in parts if part[2]]
 
 
-def _draw_with_engine(source: RandomSource, seed: str, examples: int, progress: Callable[[int], None]) -> PlannedCases:
+def _draw_with_engine(
+    source: RandomSource, seed: str, examples: int, progress: Callable[[int], None] | None = None
+) -> PlannedCases:
     cases: list[tuple[Case, ...]] = []
     complete = True
     for strategy, own_seed, share in _parts(source, seed, examples):
-        report = _counted_from(sum(map(len, cases)), progress)
-        part, exhausted = draw_all(strategy, own_seed, share, progress=report)
+        part, exhausted = draw_all(strategy, own_seed, share, progress, sum(map(len, cases)))
         cases.append(part)
         complete &= exhausted or len(part) == share
     return PlannedCases(tuple(cases[n][place] for n, place in _deal(cases)), complete)

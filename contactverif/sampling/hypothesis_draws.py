@@ -60,8 +60,6 @@ try:
 except ImportError:  # pragma: no cover  # `find_difference` says so.
     BuildContext = ConjectureData = LazyStrategy = object  # type: ignore[assignment, misc]
 
-Fails = Callable[[Case], bool]
-
 PATIENCE = 100  # The number of choices in a row that make no new case before a strategy counts as having no other.
 # The probabilities with which a case repeats an integer, and with which it makes the simplest choice. Each case has one
 # of these pairs: some errors show only where lengths, slopes or depths are equal, others best in a small mesh.
@@ -126,12 +124,10 @@ def _draw_some(strategy: Any) -> list[Any]:
 
 def draw_different(strategy: SearchStrategy[Case], *, seed: str, simplest: bool) -> Iterator[Draw]:
     """Yield different cases, with `simplest` the simplest first; end when the strategy seems to have no other."""
-    past: set[tuple[Any, ...]] = set()
+    past, random, checked, in_vain = set[tuple[Any, ...]](), Random(seed), dict[int, Any](), 0
     if simplest:
         data = ConjectureData(random=None, prefix=(ChoiceTemplate("simplest", count=None),))
         yield from _draw_new(strategy, data, past)
-    random, checked = Random(seed), dict[int, Any]()
-    in_vain = 0
     while in_vain < PATIENCE:
         in_vain += 1
         for draw in _draw_new(strategy, _RandomChoices(random, checked), past):
@@ -258,9 +254,16 @@ class _RandomChoices(ConjectureData):
 
 
 def draw_all(
-    strategy: SearchStrategy[Case], seed: str, examples: int, *, progress: Callable[[int], None]
+    strategy: SearchStrategy[Case],
+    seed: str,
+    examples: int,
+    progress: Callable[[int], None] | None = None,
+    past: int = 0,
 ) -> tuple[tuple[Case, ...], bool]:
-    """Return different cases that the engine draws, and whether the strategy has no others; it may have fewer."""
+    """Return different cases that the engine draws, and whether the strategy has no others; it may have fewer.
+
+    The progress counts the cases of the past, too.
+    """
     cases: list[Case] = []
     stopped: list[str] = []
 
@@ -269,7 +272,8 @@ def draw_all(
     @given(strategy)
     def take(case: Case) -> None:
         cases.append(case)
-        progress(len(cases))
+        if progress:
+            progress(past + len(cases))
 
     statistics: Any = collector  # Hypothesis declares it as None.
     with reproducible(), statistics.with_value(lambda facts: stopped.append(facts.get("stopped-because", ""))):
@@ -280,22 +284,23 @@ def draw_all(
     return tuple(cases), stopped == ["nothing left to do"]
 
 
-def shrink_choices(strategy: SearchStrategy[Case], choices: bytes, *, seed: str, fails: Fails, limit: int) -> None:
-    """Shrink the case that a strategy makes of some choices, as if an earlier run of hypothesis had stored it."""
-    stored = _OneFailure(choices)
-    _shrink(strategy, _settings(1, Phase.reuse, Phase.shrink, database=stored), 0, seed=seed, fails=fails, limit=limit)
-
-
-def shrink_drawn(
-    strategy: SearchStrategy[Case], seed: str, examples: int, *, first: int, fails: Fails, limit: int
+def shrink_case(
+    strategy: SearchStrategy[Case],
+    *,
+    seed: str,
+    fails: Callable[[Case], bool],
+    limit: int,
+    choices: bytes = b"",
+    examples: int = 1,
+    first: int = 0,
 ) -> None:
-    """Shrink the case with the number `first` of those of `draw_all`. The cases before it are drawn once more."""
-    _shrink(strategy, _settings(examples, Phase.generate, Phase.shrink), first, seed=seed, fails=fails, limit=limit)
+    """Shrink the case that a strategy makes of some choices, as if an earlier run of hypothesis had stored it.
 
-
-def _shrink(
-    strategy: SearchStrategy[Case], run_settings: settings, first: int, *, seed: str, fails: Fails, limit: int
-) -> None:
+    Without choices, shrink the case with the number `first` of those of `draw_all`: those before it are drawn again.
+    """
+    run_settings = _settings(examples, Phase.generate, Phase.shrink)
+    if choices:
+        run_settings = _settings(1, Phase.reuse, Phase.shrink, database=_OneFailure(choices))
     n_drawn = n_judged = 0
 
     @run_settings  # Above the seed, which would take the database away.

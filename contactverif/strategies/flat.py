@@ -11,7 +11,7 @@ a Pythagorean triple. All this is exact, but products of the turned coordinates 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, partial
+from functools import cache
 from itertools import cycle
 from typing import overload
 
@@ -75,7 +75,7 @@ def _panels() -> SearchStrategy[list[Sides]]:
     # The refinement is drawn first and shrinks first, or one segment in four would count as simpler than one in two.
     overhang, lengths = st.integers(0, 3), samples.lengths()
     side = st.builds(_places, _REFINEMENTS, _REPEATS, lengths, lengths, overhang, overhang, samples.SEVENTHS)
-    return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
+    return samples.one_or_two(side)
 
 
 def _places(
@@ -83,8 +83,8 @@ def _places(
 ) -> Sides:
     """Return a slave chain and a master chain that goes beyond it by `left` and `right`.
 
-    What the master lengths do not cover is one more segment, and what is too much is cut; refined ones are repeated
-    as long as needed. The slave moves into the left overhang by some sevenths of it.
+    The last master segment is what its lengths do not cover, and what is too much is cut; refined lengths are repeated.
+    The slave moves into the left overhang by some sevenths of it.
     """
     slave_x = samples.ends_of([*slave] * repeats)
     end = slave_x[-1] + right
@@ -112,10 +112,7 @@ def normal_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
 
 @random_source("contactverif.strategies.class_meshes.single_cases", needs=OF_CLASS)
 def single_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-    """Return cases of uniform penetration whose inner master nodes lie on slave nodes or in the middle of segments.
-
-    Given an interface, states of that one; None if it is not flat, not covered, or not of this class.
-    """
+    """Return cases as `normal_cases` does, whose inner master nodes may also lie in the middle of slave segments."""
     return _cases(interface, midpoints=True)
 
 
@@ -123,8 +120,7 @@ def single_cases(interface: Interface | None = None) -> SearchStrategy[Case] | N
 def overhung_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
     """Return cases as `single_cases` does, on meshes whose master goes beyond the slave by half a segment or more.
 
-    No master node lies on an end node of the slave, so no node of either surface faces a free end of the other. Given
-    an interface, this is `single_cases`.
+    No master node lies on an end node of the slave, so no node of either surface faces a free end of the other.
     """
     return _cases(interface, midpoints=True, least=1)
 
@@ -141,9 +137,8 @@ def _cases(interface: Interface | None, *, midpoints: bool, least: int = 0) -> S
 @cache
 def _class_panels(midpoints: bool, least: int) -> SearchStrategy[list[Sides]]:
     middles, overhang = _CARRIES if midpoints else st.just([0]), st.integers(least, _FURTHEST)
-    inner = st.just(least > 0)
-    side = st.builds(_class_places, _CLASS_REPEATS, samples.lengths(), _CARRIES, middles, overhang, overhang, inner)
-    return st.one_of(st.lists(side, min_size=1, max_size=1), st.lists(side, min_size=1, max_size=2))
+    sides = samples.lengths(), _CARRIES, middles, overhang, overhang, st.just(least > 0)
+    return samples.one_or_two(st.builds(_class_places, _CLASS_REPEATS, *sides))
 
 
 def _class_places(
@@ -161,11 +156,11 @@ def _class_places(
     on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
     """
     segments = np.array([*slave] * repeats)
-    slave_x = samples.ends_of([*slave] * repeats)
-    deal = partial(samples.repeat_cyclically, count=len(slave_x))
-    nodes = slave_x[deal(at_nodes) == 1]
-    nodes = nodes[(nodes > slave_x[0]) & (nodes < slave_x[-1])] if inner else nodes
-    middles = (slave_x[:-1] + segments / 2)[deal(at_middles)[:-1] == 1]
+    slave_x = samples.ends_of(segments)
+    carries, middle_carries = (samples.repeat_cyclically(each, len(slave_x)) == 1 for each in (at_nodes, at_middles))
+    if inner:
+        carries[[0, -1]] = False
+    nodes, middles = slave_x[carries], (slave_x[:-1] + segments / 2)[middle_carries[:-1]]
     first, last = slave_x[0] - left / 2 * segments[0], slave_x[-1] + right / 2 * segments[-1]
     return slave_x, np.unique(np.concatenate([[first], nodes, middles, [last]]))
 
@@ -189,43 +184,39 @@ def exact_flat_cases(draw: DrawFn) -> Case:
     translation that rounds no coordinate. The penetration is 2^-28 to 2^-6 of a segment; every slave point projects
     inside the master.
     """
-    turn, slave_lengths, master_lengths = draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
-    depth = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS)
-    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
-    shift, offsets = draw(_SHIFTS), draw(samples.OFFSETS)
-    fineness = FINENESS if shift.any() else _FINENESS_AT_REST
-    slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, fineness, fineness)
-    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
-    return Case(case.interface, case.z, penalty, {**case.parameters, "shift": shift}, seed)
+    return _lattice_state(draw, tilted=False)
 
 
 @samples.on_own_meshes
 def linear_flat_cases(draw: DrawFn) -> Case:
     """Return states like those of `exact_flat_cases` whose slave is straight and has a slope, the parameter "slope"."""
+    return _lattice_state(draw, tilted=True)
+
+
+def _lattice_state(draw: DrawFn, *, tilted: bool) -> Case:
     turn, slave_lengths, master_lengths = draw(_ANY_TURN), draw(_LENGTHS), draw(_LENGTHS)
-    depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
+    if tilted:
+        depth, rise = 2.0 ** -draw(_COARSE_EXPONENTS), draw(_RISES)
+    else:
+        depth, rise = draw(_QUARTERS) / 4 * 2.0 ** -draw(_EXPONENTS), 0
     penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
     shift, offsets = draw(_SHIFTS), draw(samples.OFFSETS)
-    # Heights are places times a power of two, so that they need some bits more than places.
-    slave, master = _slave_and_master(slave_lengths, master_lengths, offsets, _COARSE, FINENESS)
-    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
-    # The longest slave is 16 long, so that the penetration is 5/8 of that of the middle node or more.
-    slope = depth * rise / 128
-    (p, q, _), middle = turn, slave[len(slave) // 2]
-    positions = case.positions.copy()
-    positions[: len(slave)] += np.outer(slope * (slave - middle), [-q, p])
-    parameters = {"direction": case.parameters["direction"], "slope": np.array(slope), "shift": shift}
-    return Case(case.interface, positions.reshape(-1), penalty, parameters, seed)
+    fineness = FINENESS if tilted or shift.any() else _FINENESS_AT_REST
 
-
-def _slave_and_master(
-    slave_lengths: list[int], master_lengths: list[int], offsets: list[int], slave_bits: int, master_bits: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return places along the line, moved by up to 1/16 and rounded; the master goes beyond the slave by 1."""
-
-    def place(x: FloatArray, over: int, bits: int) -> FloatArray:
+    def place(x: FloatArray, over: int, bits: int) -> FloatArray:  # Moved by up to 1/16, and rounded.
         return samples.on_lattice(x + samples.repeat_cyclically(offsets, len(x)) / over / 16, bits)
 
     slave, master = samples.ends_of(slave_lengths), samples.ends_of(master_lengths)
-    end = slave[-1] + 1
-    return place(slave, 7, slave_bits), place(np.array([-1.0, *master[master < end], end]), 13, master_bits)
+    end = slave[-1] + 1  # The master goes beyond the slave by 1.
+    # Heights are places times a power of two, so that they need some bits more than places.
+    slave = place(slave, 7, _COARSE if tilted else fineness)
+    master = place(np.array([-1.0, *master[master < end], end]), 13, fineness)
+    case = flat_state("", slave.tolist(), flat_master(master.tolist()), depth, turn=turn)
+    positions, parameters = case.positions.copy(), {**case.parameters, "shift": shift}
+    if tilted:
+        # The longest slave is 16 long, so that the penetration is 5/8 of that of the middle node or more.
+        slope = depth * rise / 128
+        (p, q, _), middle = turn, slave[len(slave) // 2]
+        positions[: len(slave)] += np.outer(slope * (slave - middle), [-q, p])
+        parameters = {"direction": case.parameters["direction"], "slope": np.array(slope), "shift": shift}
+    return Case(case.interface, positions.reshape(-1), penalty, parameters, seed)

@@ -27,19 +27,6 @@ STEEPEST = 1e-3  # An edge seen at a smaller slope than this from a point counts
 SMALLEST = 0.25  # The smallest factor for a slave, and the inverse of the largest.
 
 
-def _covered_start(start: float, slave: Sequence[float], width: float) -> float:
-    """Return where a slave of these lengths starts so that half of one of its segments lies between 0 and `width`.
-
-    Half of its first or last segment fits into the width.
-    """
-    if _covered_halves(start + samples.ends_of(slave), 0.0, width):
-        return start
-    if start >= 0:
-        return min(start, width - slave[0] / 2)
-    total = float(sum(slave))
-    return min(max(start, slave[-1] / 2 - total), width - total)
-
-
 def _sink_below(slave: FloatArray, line: FloatArray, depth: float) -> FloatArray:
     """Lower a slave (n, 2) until half of a segment is below the line (m, 2) by `depth`. Both run from left to right."""
     heights = []
@@ -92,9 +79,9 @@ class Ring:
     master: Sequence[int]
     degrees: int  # The angle; 360 is closed.
     inner_slave: bool  # The slave is the disc, else the hole around it.
-    # As of `Broken`, measured along the radius. Then the slave grows or shrinks as a whole until half of a segment
-    # penetrates.
-    quarters: Sequence[int]
+    quarters: Sequence[
+        int
+    ]  # As of `Broken`, along the radius; then the slave is scaled until half a segment is closed.
     unit: float
 
     def __call__(self, offsets: Sequence[int]) -> samples.Panel:
@@ -202,7 +189,11 @@ class Broken:
             needed = max(self.slave[0], self.slave[-1]) / 2 + 2 * (length / 8)
             if line[-1, 0] < needed:
                 line = np.vstack([line, [needed + length / 8, line[-1, 1]]])
-            start = _covered_start(start, self.slave, line[-1, 0] - length / 8)
+            # Half of the first or last segment fits into the width.
+            width, total = line[-1, 0] - length / 8, float(sum(self.slave))
+            if not _covered_halves(start + samples.ends_of(self.slave), 0.0, width):
+                to_right = min(max(start, self.slave[-1] / 2 - total), width - total)
+                start = min(start, width - self.slave[0] / 2) if start >= 0 else to_right
         x = start + samples.ends_of(self.slave)
         reference = np.column_stack([x, samples.on_lattice(np.interp(x, *line.T))])
         flatter = 2.0 ** floor(min(0.0, log2(2 * length / (x[-1] - x[0]))))
@@ -235,9 +226,8 @@ class Broken:
 def _broken_lines() -> SearchStrategy[Broken]:
     """Return flat panels with neighbours' lengths of any ratio, bent panels with lengths of 1 to 4."""
     flat = samples.lengths().map(lambda along: [(length, 0, 0) for length in along])
-    bent = st.lists(
-        st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL)), min_size=1, max_size=6
-    )
+    step = st.tuples(st.integers(1, 4).map(float), st.integers(-4, 4), st.integers(0, _WALL))
+    bent = st.lists(step, min_size=1, max_size=6)
     plain = samples.lengths(graded=False).map(lambda along: [(length + 1) // 2 for length in along])
     others = st.integers(-2, 2), _TILTS, _DEPTH, samples.depth_units()
     return st.one_of(
@@ -260,19 +250,15 @@ def _panels(smooth: bool) -> SearchStrategy[list[Broken | Ring]]:
     """Return one or two panels; ledges, which are kinks, only if not smooth."""
     shapes: list[SearchStrategy[Broken | Ring]] = [*[_broken_lines()] * 3, _rings(), _rings()]
     if not smooth:
-        plain = samples.lengths(graded=False)  # drawn from like the others, so that these do not shrink to a ledge
-        shapes.append(
-            st.builds(_ledge, plain, plain, st.sampled_from([-1, -1, 1]), samples.depths(), samples.depth_units())
-        )
-    panel = st.one_of(*shapes)
-    return st.one_of(st.lists(panel, min_size=1, max_size=1), st.lists(panel, min_size=1, max_size=2))
+        plain = samples.lengths(graded=False)  # Drawn from like the others, so that these do not shrink to a ledge.
+        others = st.sampled_from([-1, -1, 1]), samples.depths(), samples.depth_units()
+        shapes.append(st.builds(_ledge, plain, plain, *others))
+    return samples.one_or_two(st.one_of(*shapes))
 
 
 _RISES = st.sampled_from([0.0, 0.25, -0.25, 1.0, -1.0])  # The rise of a vertex above its neighbours, per length.
 _QUARTERS = st.lists(st.integers(0, 8), min_size=1, max_size=4)  # Penetrations; 0 is a gap of exactly zero.
-_SEGMENT = st.tuples(
-    st.integers(0, 3).map(lambda k: 2.0**k), st.integers(0, 3)
-)  # The length, and the quarter under a master node.
+_SEGMENT = st.tuples(st.integers(0, 3).map(lambda k: 2.0**k), st.integers(0, 3))  # Length; quarter under a master node.
 
 
 @st.composite

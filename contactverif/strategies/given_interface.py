@@ -19,6 +19,7 @@ from contactverif.contract.interface import (
     turns_of,
     ways_to_master,
 )
+from contactverif.oracle.flat_answers import chain_ends
 from contactverif.strategies.samples import OFFSETS, PENALTIES, SEEDS, depth_units, depths, repeat_cyclically, shifts
 
 # A slave segment or face that is bent onto the master keeps this share of its size, seen along itself or its normal.
@@ -43,12 +44,15 @@ def flat_cases(interface: Interface) -> SearchStrategy[Case] | None:
     heights, along = nodes @ normal, nodes @ direction
     if max(np.ptp(heights[:n_slave]), np.ptp(heights[n_slave:])) > roundoff:
         return None
-    forward = _forward(interface.slave, along, 1, roundoff) and _forward(interface.master, along, -1, roundoff)
-    slave, master = (_stretches(surface, along) for surface in (interface.slave, interface.master))
-    if not forward or not all(
-        any(low >= first - roundoff and high <= last + roundoff for first, last in master) for low, high in slave
-    ):
-        return None
+    for surface, way in ((interface.slave, 1), (interface.master, -1)):
+        if not (way * np.diff(along[surface.segments], axis=1) > roundoff).all():
+            return None
+    slave, master = (
+        [sorted(along[list(ends)]) for ends in chain_ends(side)] for side in (interface.slave, interface.master)
+    )
+    for low, high in slave:
+        if not any(low >= first - roundoff and high <= last + roundoff for first, last in master):
+            return None
     return _flat_states(interface, along, direction, normal, float(heights[:n_slave].mean() - heights[n_slave:].mean()))
 
 
@@ -73,26 +77,19 @@ def _flat_states(
     return Case(interface, positions.reshape(-1), penalty, parameters, seed)
 
 
-def _stretches(surface: Surface, along: FloatArray) -> list[tuple[float, float]]:
-    """Return where each open chain begins and where it ends, as coordinates along the line."""
-    previous, following = surface.neighbours[surface.chain_order].T
-    begins = along[surface.segments[surface.chain_order[previous < 0], 0]]
-    ends = along[surface.segments[surface.chain_order[following < 0], 1]]
-    return [(min(chain), max(chain)) for chain in zip(begins.tolist(), ends.tolist(), strict=True)]
-
-
-def _forward(surface: Surface, along: FloatArray, way: int, roundoff: float) -> bool:
-    steps = np.diff(along[surface.segments], axis=1)
-    return bool((way * steps > roundoff).all())
-
-
 def states(interface: Interface, smooth: bool) -> SearchStrategy[Case]:
     """Return random states of the interface.
 
     The slave is bent onto the master, so that most of its nodes touch whatever the gap of the mesh is. Then all nodes
     move in waves, the slave is pushed as a whole until its deepest node penetrates, and a coprime offset is added.
     """
-    return _states(interface, _close_gaps(interface), smooth)
+    closed = _bend_slave(
+        interface,
+        *ways_to_master(interface),
+        lambda arms: np.hypot(*arms.T),
+        lambda nodes: np.diff(nodes[interface.slave.segments], axis=1)[:, 0],
+    )
+    return _states(interface, closed, smooth)
 
 
 @st.composite
@@ -100,8 +97,7 @@ def _states(draw: DrawFn, interface: Interface, closed: FloatArray, smooth: bool
     quarters, unit = draw(depths()), draw(depth_units())
     slave_waves, master_waves = draw(_MODES), draw(_MODES)
     penalty, seed = draw(PENALTIES), draw(SEEDS)
-    offset_on = smooth or draw(_ON) > 0
-    offsets = draw(OFFSETS) if offset_on else [0]
+    offsets = draw(OFFSETS) if smooth or draw(_ON) > 0 else [0]
     n_slave, shortest = interface.n_slave_nodes, _shortest_segment(interface)
     depth = quarters[0] / 4 * unit * shortest
     positions = closed.copy()
@@ -129,15 +125,6 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
     for k, amplitude in enumerate(amplitudes):
         displacement[:, (k + 1 + axis) % 2] += amplitude / 8 * np.cos(k * np.pi * place + k)
     return displacement
-
-
-def _close_gaps(interface: Interface) -> FloatArray:
-    return _bend_slave(
-        interface,
-        *ways_to_master(interface),
-        lambda arms: np.hypot(*arms.T),
-        lambda nodes: np.diff(nodes[interface.slave.segments], axis=1)[:, 0],
-    )
 
 
 def _bend_slave(

@@ -3,7 +3,7 @@
 `Case.kind` names the kind; the parameters "probe_segment" and "probe_c" name the slave point. Every kind is
 constructed, and none is filtered; `contactverif.oracle.is_of_kind` says whether a case is of its kind, and a test asks.
 
-A sketch stands on a lattice so coarse that `ExactTurn` moves it without rounding, even to an offset of 2^20.
+A sketch stands on a lattice so coarse that an exact turn moves it without rounding, even to an offset of 2^20.
 Coordinates are below 2^8 and multiples of 2^-32, so what a sketch shows exactly (a tie, a hit node) stays exact. Only a
 sketch whose kind survives rounding may set `exact` to False; it gets a full mantissa.
 
@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
-from math import cos, floor, hypot, ldexp, log2, radians, sin
+from functools import cache
+from math import cos, floor, ldexp, log2, radians, sin
 from typing import overload
 
 import numpy as np
@@ -28,20 +28,27 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.oracle.projection_kinds import TAU, kind_of
 from contactverif.strategies.given_interface import touches
-from contactverif.strategies.samples import PENALTIES, SEEDS, SHUFFLES, Chain, Motion, assemble_chains, motions
+from contactverif.strategies.samples import (
+    FURTHEST,
+    PENALTIES,
+    SEEDS,
+    SHUFFLES,
+    Chain,
+    assemble_chains,
+    exact_turns,
+    motions,
+)
 
 Point = tuple[float, float]
 Steps = tuple[list[Point], int]  # Vectors of slave segments from left to right, and which of them carries the point.
 
 _PAST = float(TAU)  # Formulations may still see contact past a free end by this share of the segment.
-FURTHEST = 2**20  # The largest offset, in units of the lattice.
 _FINEST = 31  # Distances from a bisector go down to 2^-31 and 0.
 _NODES_AND_OTHERS = (-1.0, 1.0, -0.5, 0.5, 0.0, -1.0, 1.0)  # Places c; every other one is a node.
 _C = st.sampled_from(_NODES_AND_OTHERS)
 # With Gauss points, which are not on the lattice.
 _ROUND_C = st.sampled_from((*_NODES_AND_OTHERS, -(3**-0.5), 3**-0.5, 0.75))
 _TILTS = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])  # The slope of a slave segment.
-_TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
 _STRETCHES = st.sampled_from([1.0, 2.0, 0.5, 0.75])  # The slave's reference over its present length.
 _COUNTS = st.integers(0, 2)
 # Whether a second pair of chains is in contact. Hypothesis draws the simplest value more often than others, so two
@@ -66,35 +73,6 @@ _GAPS = st.builds(_gap, *_SIZES, st.sampled_from([-1, 1, -1, 1, -1, 0]))
 _NONZERO_GAPS = st.builds(_gap, *_SIZES, st.sampled_from([-1, 1]))
 
 
-@dataclass(frozen=True, slots=True)
-class ExactTurn:
-    """A similarity x → 2^k (W x + shift), whose turn W is a Pythagorean one, so that lattice points are not rounded."""
-
-    turn: tuple[int, int] = (1, 0)  # The first column of W = [[a, −b], [b, a]]; a² + b² is a square.
-    shift: tuple[int, int] = (0, 0)  # In units of the lattice.
-    exponent: int = 0
-
-    @property
-    def scale(self) -> float:
-        """The factor of all lengths, an integer × 2^k."""
-        return ldexp(hypot(*self.turn), self.exponent)
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the points (n, 2), moved."""
-        (a, b), (x, y) = self.turn, points.T
-        moved: FloatArray = np.column_stack([a * x - b * y, b * x + a * y]) + self.shift
-        return np.ldexp(moved, self.exponent)
-
-
-@cache
-def exact_turns() -> SearchStrategy[ExactTurn | Motion]:
-    """Return rest, or exact similarities with offsets up to 2^20."""
-    place = st.one_of(st.integers(-64, 64), st.integers(-FURTHEST + 2**12, FURTHEST - 2**12))
-    exponent = st.one_of(st.just(0), st.integers(-20, 20))
-    turns = st.builds(ExactTurn, st.sampled_from(_TURNS), st.tuples(place, place), exponent)
-    return st.one_of(st.just(ExactTurn()), turns, turns)
-
-
 _ANY_MOTIONS = st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
 
 
@@ -102,7 +80,6 @@ _ANY_MOTIONS = st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
 class Sketch:
     """Slave and master chains, and the slave point that they are about."""
 
-    kind: str  # The kind of projection.
     # The master's chains, the body on the left: a master on the x-axis runs in −x, a slave above it in +x.
     masters: Sequence[Chain]
     slave: Chain
@@ -126,7 +103,7 @@ class Sketch:
 
 
 @st.composite
-def _sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
+def _cases_of_kind(draw: DrawFn, kind: str, sketches: SearchStrategy[Sketch]) -> Case:
     """Draw a sketch and put it somewhere.
 
     Many kinds are open, edge-on or past an end. So most cases have company: beside the sketch stands a slave segment in
@@ -151,10 +128,9 @@ def _sketch_cases(draw: DrawFn, sketches: SearchStrategy[Sketch]) -> Case:
         slaves, masters, references = [*slaves, slave], [*masters, master], [*references, slave]
     interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
     current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
-    first = int(np.flatnonzero(order == sketch.segment)[0])
-    (segment,) = np.flatnonzero(interface.slave.segments[:, 0] == first)
+    (segment,) = np.flatnonzero(order[interface.slave.segments[:, 0]] == sketch.segment)
     parameters = {"probe_segment": np.array(float(segment)), "probe_c": np.array(sketch.c)}
-    return Case(interface, motion(current).reshape(-1), penalty, parameters, seed, kind=sketch.kind)
+    return Case(interface, motion(current).reshape(-1), penalty, parameters, seed, kind=kind)
 
 
 @st.composite
@@ -164,12 +140,12 @@ def _slave_steps(draw: DrawFn, unit: float) -> Steps:
     return [(length, length * draw(_TILTS)) for _ in range(before + 1 + after)], before
 
 
-def _sketch(kind: str, masters: Sequence[Chain], point: Point, c: float, steps: Steps, **flags: bool) -> Sketch:
+def _sketch(masters: Sequence[Chain], point: Point, c: float, steps: Steps, **flags: bool) -> Sketch:
     """Return the sketch of an open slave chain that has the point at c of one of its segments."""
     vectors, segment = np.array(steps[0], dtype=np.float64), steps[1]
     nodes = np.concatenate([np.zeros((1, 2)), np.cumsum(vectors, axis=0)])
     start = np.array(point) - nodes[segment] - (1 + c) / 2 * vectors[segment]
-    return Sketch(kind, masters, Chain(nodes + start), segment, c, **flags)
+    return Sketch(masters, Chain(nodes + start), segment, c, **flags)
 
 
 def _upper_side(left_to_right: Sequence[Point]) -> Chain:
@@ -201,16 +177,14 @@ def _feet_inside(draw: DrawFn, *, exact: bool = False) -> tuple[float, Point]:
     return length, (part * length, draw(_GAPS) * room * length)
 
 
-@st.composite
-def _inside(draw: DrawFn, kind: str) -> Sketch:
+def _inside(draw: DrawFn) -> Sketch:
     """Draw a foot inside a segment, whose neighbours are bent by up to 45°."""
     length, point = draw(_feet_inside())
     c, steps = draw(_ROUND_C), draw(_slave_steps(length))
-    return _sketch(kind, [_graph(draw, length)], point, c, steps)
+    return _sketch([_graph(draw, length)], point, c, steps)
 
 
-@st.composite
-def _angle(draw: DrawFn, kind: str, degrees: float) -> Sketch:
+def _angle(draw: DrawFn, degrees: float) -> Sketch:
     """Draw a foot inside a segment; the slave segment is turned against the master by this angle, either way."""
     exact = {90.0: (0.0, 1.0), 180.0: (-1.0, 0.0)}
     length, point = draw(_feet_inside(exact=degrees in exact))
@@ -218,16 +192,15 @@ def _angle(draw: DrawFn, kind: str, degrees: float) -> Sketch:
     along, across = exact.get(degrees, (cos(radians(degrees)), sin(radians(degrees))))
     vectors = [(size * along, size * across * draw(st.sampled_from([1.0, -1.0])))] * draw(st.integers(1, 3))
     segment = draw(st.integers(0, len(vectors) - 1))
-    return _sketch(kind, [_graph(draw, length)], point, c, (vectors, segment), exact=degrees in exact)
+    return _sketch([_graph(draw, length)], point, c, (vectors, segment), exact=degrees in exact)
 
 
-@st.composite
-def _one_of_several(draw: DrawFn, kind: str) -> Sketch:
+def _one_of_several(draw: DrawFn, role: str) -> Sketch:
     """Draw a slave segment over three to six master segments; its point is over the first, the last, or another.
 
     The order is that of the master, which runs in −x.
     """
-    width, role = draw(_WHOLE_LENGTHS), kind.partition(" ")[0]
+    width = draw(_WHOLE_LENGTHS)
     c = draw(st.sampled_from({"first": (0.5, 1.0), "intermediate": (0.0, -0.5, 0.5), "last": (-0.5, -1.0)}[role]))
     # Master nodes lie at odd sixteenths of the slave segment, and the point at an eighth.
     here = round(8 * (1 + c))
@@ -241,38 +214,34 @@ def _one_of_several(draw: DrawFn, kind: str) -> Sketch:
     tilt = draw(st.sampled_from([0.0, 0.125, -0.125, 0.25]))
     point = ((1 + c) / 2 * width, draw(_GAPS) * width / 8)
     steps = [(width, tilt * width)] * (before + 1 + after), before
-    return _sketch(kind, [_upper_side([(node * width, 0.0) for node in nodes])], point, c, steps, mirrored=False)
+    return _sketch([_upper_side([(node * width, 0.0) for node in nodes])], point, c, steps, mirrored=False)
 
 
-@st.composite
-def _past_end(draw: DrawFn, kind: str) -> Sketch:
+def _past_end(draw: DrawFn, *, inside: bool) -> Sketch:
     """Draw a point past the free left end of the master by somewhat less, or somewhat more, than τ of its segment."""
-    length, c, inside = draw(_WHOLE_LENGTHS), draw(_ROUND_C), "inside" in kind
+    length, c = draw(_WHOLE_LENGTHS), draw(_ROUND_C)
     off = ldexp(1.0, -draw(st.integers(1 if inside else -7, 20)))
     past = _PAST * (1 - off if inside else 1 + off)
     steps, gap = draw(_slave_steps(length)), draw(_GAPS) * length
-    return _sketch(kind, [_graph(draw, length, left=False)], (-past * length, gap), c, steps)
+    return _sketch([_graph(draw, length, left=False)], (-past * length, gap), c, steps)
 
 
-@st.composite
-def _free_end(draw: DrawFn, kind: str) -> Sketch:
+def _free_end(draw: DrawFn) -> Sketch:
     """Draw a point whose foot is exactly the free left end of the master."""
     length, c = draw(_WHOLE_LENGTHS), draw(_C)
     steps, gap = draw(_slave_steps(length)), draw(_GAPS) * length
-    return _sketch(kind, [_graph(draw, length, left=False)], (0.0, gap), c, steps, exact=True)
+    return _sketch([_graph(draw, length, left=False)], (0.0, gap), c, steps, exact=True)
 
 
-@st.composite
-def _small_overlap(draw: DrawFn, kind: str) -> Sketch:
+def _small_overlap(draw: DrawFn) -> Sketch:
     """Draw a slave whose last node is 2^-k of a master segment inside the master's free end, the rest outside."""
     length, overlap = draw(_WHOLE_LENGTHS), ldexp(1.0, -draw(st.integers(2, 30)))
     vectors, segment = draw(_slave_steps(2 * length))
     point, steps = (overlap * length, draw(_GAPS) * length * 0.5), (vectors[: segment + 1], segment)
-    return _sketch(kind, [_graph(draw, length, left=False)], point, 1.0, steps, exact=True)
+    return _sketch([_graph(draw, length, left=False)], point, 1.0, steps, exact=True)
 
 
-@st.composite
-def _closing_segment(draw: DrawFn, kind: str) -> Sketch:
+def _closing_segment(draw: DrawFn) -> Sketch:
     """Draw a disc or a hole, and a point over the segment that joins its last node to the first.
 
     The slave is open, or a closed box whose own closing segment carries the point.
@@ -284,15 +253,14 @@ def _closing_segment(draw: DrawFn, kind: str) -> Sketch:
     masters, point, size = [Chain(np.array(nodes), closed=True)], (x, y / 2), length / 4
     c, steps = draw(_ROUND_C), draw(_slave_steps(size))
     if not draw(st.booleans()):
-        return _sketch(kind, masters, point, c, steps, ordered=True)
-    sketch = _sketch(kind, masters, point, c, ([(size, 0.0)], 0), ordered=True)
+        return _sketch(masters, point, c, steps, ordered=True)
+    sketch = _sketch(masters, point, c, ([(size, 0.0)], 0), ordered=True)
     left, right = sketch.slave.points
     box = np.array([right, right + [0, size], left + [0, size], left])
     return replace(sketch, slave=Chain(box, closed=True), segment=3)
 
 
-@st.composite
-def _second_body(draw: DrawFn, kind: str) -> Sketch:
+def _second_body(draw: DrawFn) -> Sketch:
     """Draw another chain of the master behind the first; the point may even be nearer to the second."""
     length, part = draw(_WHOLE_LENGTHS), draw(st.integers(1, 7)) / 8
     behind = length * draw(st.sampled_from([1.0, 0.25, 0.0625]))
@@ -305,19 +273,17 @@ def _second_body(draw: DrawFn, kind: str) -> Sketch:
     second = _upper_side([(x * length, -behind) for x in (-0.5, *cuts, 1.5)])
     if draw(st.booleans()):  # The second chain faces away: it is the lower side of the first body.
         second = Chain(second.points[::-1])
-    return _sketch(kind, [first, second], (part * length, gap), c, steps)
+    return _sketch([first, second], (part * length, gap), c, steps)
 
 
-@st.composite
-def _other_node(draw: DrawFn, kind: str) -> Sketch:
+def _other_node(draw: DrawFn) -> Sketch:
     """Draw a point over the middle of a long segment, nearer to the tip of a hook than to both ends of it."""
     c, tip = draw(_ROUND_C), (8.0 + draw(st.integers(0, 2)), draw(st.sampled_from([3.0, 4.0, -3.0, -4.0])))
     steps, gap = draw(_slave_steps(0.25)), 2 * draw(_GAPS)
-    return _sketch(kind, [_upper_side([(0.0, 0.0), (16.0, 0.0), tip])], (8.0, gap), c, steps)
+    return _sketch([_upper_side([(0.0, 0.0), (16.0, 0.0), tip])], (8.0, gap), c, steps)
 
 
-@st.composite
-def _node_hit(draw: DrawFn, kind: str) -> Sketch:
+def _node_hit(draw: DrawFn) -> Sketch:
     """Draw a point whose foot on the nearest segment is exactly a node between two segments.
 
     The left segment is collinear, or bent to the side where the node stays nearest.
@@ -325,11 +291,10 @@ def _node_hit(draw: DrawFn, kind: str) -> Sketch:
     gap, right, left = draw(_NONZERO_GAPS), draw(_SIDES), draw(_SIDES)
     slope = draw(_SLOPES) * (1 if gap < 0 else -1)
     line = [(-left, slope * left), (0.0, 0.0), (right, 0.0), *((right + length, 0.0) for length in draw(_ENDS))]
-    return _sketch(kind, [_upper_side(line)], (0.0, gap), draw(_C), draw(_slave_steps(1.0)), exact=True)
+    return _sketch([_upper_side(line)], (0.0, gap), draw(_C), draw(_slave_steps(1.0)), exact=True)
 
 
-@st.composite
-def _coincident_nodes(draw: DrawFn, kind: str) -> Sketch:
+def _coincident_nodes(draw: DrawFn) -> Sketch:
     """Draw matching meshes: each slave node stands over a master node, at the same place if the gap is zero."""
     steps = draw(st.lists(st.tuples(_SIDES, _SLOPES, st.sampled_from([1, -1])), min_size=1, max_size=4))
     level, gap = draw(st.sampled_from([True, False])), draw(_GAPS)
@@ -339,26 +304,25 @@ def _coincident_nodes(draw: DrawFn, kind: str) -> Sketch:
     more = [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
     segment, c = draw(st.integers(0, len(steps) - 1)), draw(st.sampled_from([-1.0, 1.0]))
     slave = Chain(np.array([(x, y + (gap if level else 0.0)) for x, y in line]))
-    return Sketch(kind, [_upper_side(line + more)], slave, segment, c, exact=True)
+    return Sketch([_upper_side(line + more)], slave, segment, c, exact=True)
 
 
-@st.composite
-def _vertex(draw: DrawFn, kind: str) -> Sketch:
+def _vertex(draw: DrawFn, up: int = 0) -> Sketch:
     """Draw a point near the bisector of a vertex, on it, or off it by 2^-k, on either side of the master.
+
+    The neighbours of the vertex are up (1) or down (−1) from it; by default either, and steep, so that it is sharp.
 
     Where the vertex sticks out, a penetrating point may be nearest to two segments, and an open one to the node alone;
     where it sticks in, it is the other way round.
     """
-    if kind == "master angle below 90°":
-        up, steep = draw(st.sampled_from([-1, 1])), draw(st.sampled_from([2.0, 4.0, 8.0]))
-    else:
-        up, steep = (-1 if kind == "convex vertex" else 1), draw(st.sampled_from([1.0, 0.5, 0.25, 0.125]))
+    slopes = [1.0, 0.5, 0.25, 0.125] if up else [2.0, 4.0, 8.0]
+    up, steep = up or draw(st.sampled_from([-1, 1])), draw(st.sampled_from(slopes))
     left, right = draw(_SIDES), draw(_SIDES)
     line = [(-left, up * steep * left), (0.0, 0.0), (right, up * steep * right)]
     line += [(line[-1][0] + length, line[-1][1]) for length in draw(_ENDS)]
     gap, c, steps = draw(_NONZERO_GAPS), draw(_C), draw(_slave_steps(1.0))
     point = (draw(_off_the_bisector(abs(gap) * min(steep, 1.0))), gap)
-    return _sketch(kind, [_upper_side(line)], point, c, steps, exact=True)
+    return _sketch([_upper_side(line)], point, c, steps, exact=True)
 
 
 @st.composite
@@ -373,46 +337,44 @@ def _off_the_bisector(draw: DrawFn, reach: float) -> float:
     return draw(st.one_of(st.just(0.0), size, size.map(lambda distance: -distance)))
 
 
-@st.composite
-def _three_segments(draw: DrawFn, kind: str) -> Sketch:
+def _three_segments(draw: DrawFn) -> Sketch:
     """Draw the centre of a groove or of a rib: three segments are equally near."""
     width, wall = draw(_SIDES), draw(st.sampled_from([1.0, 0.5, 2.0]))
     top, groove = wall * width, draw(st.booleans())
     line = [(-width, top), (-width, -width), (width, -width), (width, top)]
-    return _at_origin(draw, kind, line if groove else [(x, -y) for x, y in line])
+    return _at_origin(draw, line if groove else [(x, -y) for x, y in line])
 
 
-@st.composite
-def _three_nodes(draw: DrawFn, kind: str) -> Sketch:
+def _three_nodes(draw: DrawFn) -> Sketch:
     """Draw a point to which three tips of the master, or three bottoms of its grooves, are equally near."""
     end = draw(st.sampled_from([8.0, 6.0]))
     tips = [(-5.0, -end), (-3.0, -4.0), (-2.0, -end), (0.0, -5.0), (2.0, -end), (3.0, -4.0), (5.0, -end)]
-    return _at_origin(draw, kind, tips if draw(st.booleans()) else [(x, -y) for x, y in tips])
+    return _at_origin(draw, tips if draw(st.booleans()) else [(x, -y) for x, y in tips])
 
 
-def _at_origin(draw: DrawFn, kind: str, line: Sequence[Point]) -> Sketch:
-    return _sketch(kind, [_upper_side(line)], (0.0, 0.0), draw(_C), draw(_slave_steps(0.5)), exact=True)
+def _at_origin(draw: DrawFn, line: Sequence[Point]) -> Sketch:
+    return _sketch([_upper_side(line)], (0.0, 0.0), draw(_C), draw(_slave_steps(0.5)), exact=True)
 
 
-_MAKERS: dict[str, Callable[[str], SearchStrategy[Sketch]]] = {
+_MAKERS: dict[str, Callable[[DrawFn], Sketch]] = {
     "inside a segment": _inside,
-    "first of several segments": _one_of_several,
-    "intermediate of several segments": _one_of_several,
-    "last of several segments": _one_of_several,
+    "first of several segments": lambda draw: _one_of_several(draw, "first"),
+    "intermediate of several segments": lambda draw: _one_of_several(draw, "intermediate"),
+    "last of several segments": lambda draw: _one_of_several(draw, "last"),
     "node hit exactly": _node_hit,
     "coincident nodes": _coincident_nodes,
-    "convex vertex": _vertex,
-    "concave vertex": _vertex,
+    "convex vertex": lambda draw: _vertex(draw, -1),
+    "concave vertex": lambda draw: _vertex(draw, 1),
     "master angle below 90°": _vertex,
     "equidistant from three segments": _three_segments,
     "equidistant from three nodes": _three_nodes,
     "free end hit exactly": _free_end,
-    "past a free end, inside τ": _past_end,
-    "past a free end, outside τ": _past_end,
+    "past a free end, inside τ": lambda draw: _past_end(draw, inside=True),
+    "past a free end, outside τ": lambda draw: _past_end(draw, inside=False),
     "overlap going to zero": _small_overlap,
-    "edge-on, 89.9°": partial(_angle, degrees=89.9),
-    "edge-on, 90°": partial(_angle, degrees=90.0),
-    "from behind": partial(_angle, degrees=180.0),
+    "edge-on, 89.9°": lambda draw: _angle(draw, 89.9),
+    "edge-on, 90°": lambda draw: _angle(draw, 90.0),
+    "from behind": lambda draw: _angle(draw, 180.0),
     "second body behind": _second_body,
     "closing segment": _closing_segment,
     "nearest node not on nearest segment": _other_node,
@@ -433,7 +395,7 @@ _DEGREES = st.sampled_from([*[0.0] * 6, *[5.0, -20.0, 45.0] * 2, 89.9, 90.0, 180
 @cache
 def cases_of_kind(kind: str) -> SearchStrategy[Case]:
     """Return cases of one kind; the parameters "probe_segment" and "probe_c" name the slave point of this kind."""
-    return _sketch_cases(_MAKERS[kind](kind))
+    return _cases_of_kind(kind, st.composite(_MAKERS[kind])())
 
 
 @overload
@@ -451,9 +413,7 @@ def projection_states(interface: Interface | None = None) -> SearchStrategy[Case
     Hypothesis varies what it has drawn before, so the shares of the kinds differ widely; `projections_by_kind` gives
     each kind its share.
     """
-    if interface is not None:
-        return _states(interface)
-    return st.one_of(*map(cases_of_kind, KINDS))
+    return st.one_of(*map(cases_of_kind, KINDS)) if interface is None else _states(interface)
 
 
 @st.composite

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
 from itertools import accumulate, cycle, islice, pairwise
-from math import ceil, ldexp, log2
+from math import ceil, hypot, ldexp, log2
+from typing import TypeVar
 
 import numpy as np
 from hypothesis import strategies as st
@@ -19,8 +20,9 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
+
+_Item = TypeVar("_Item")
 
 PENALTIES = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-8, 24))  # A small integer × 2^k.
 SEEDS = st.integers(0, 2**16)  # The seed of what a property draws at random for a case.
@@ -30,6 +32,8 @@ SEVENTHS = st.integers(0, 6)
 # over 13 for the master. All are coprime to the powers of two, and to each other, so that none undoes another.
 OFFSETS = st.lists(st.integers(1, 6), min_size=1, max_size=7)
 _QUARTER_TURNS = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}  # exact (cos, sin)
+FURTHEST = 2**20  # The largest offset of an exact turn, in units of the lattice.
+_EXACT_TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
 
 
 def on_own_meshes(draw_case: Callable[[DrawFn], Case]) -> Callable[..., SearchStrategy[Case] | None]:
@@ -44,27 +48,22 @@ def on_own_meshes(draw_case: Callable[[DrawFn], Case]) -> Callable[..., SearchSt
 
 
 @cache
-def lengths(*, most: int = 6, graded: bool = True) -> SearchStrategy[list[float]]:
-    """Return lengths of 1 to `most` consecutive segments: 1 to 8.
+def lengths(*, graded: bool = True) -> SearchStrategy[list[float]]:
+    """Return lengths of 1 to 6 consecutive segments: 1 to 8.
 
-    One list in five has neighbours' ratios up to 7 × 2^20.
+    If they are graded, one list in five has neighbours' ratios up to 7 × 2^20.
     """
-    if most < 1:
-        raise MisuseError("most", f"{most}", "at least one segment")
-    plain = st.lists(st.integers(1, 8).map(float), min_size=1, max_size=most)
+    plain = st.lists(st.integers(1, 8).map(float), min_size=1, max_size=6)
     if not graded:
         return plain
-    wide = st.lists(st.builds(ldexp, st.integers(1, 7).map(float), st.integers(-10, 10)), min_size=1, max_size=most)
+    wide = st.lists(st.builds(ldexp, st.integers(1, 7).map(float), st.integers(-10, 10)), min_size=1, max_size=6)
     return st.one_of(plain, plain, plain, plain, wide)
 
 
 @cache
-def depths(*, lowest: int = 1, most: int = 4) -> SearchStrategy[list[int]]:
-    """Return penetrations in quarters of some unit, to be dealt out in turn to the nodes.
-
-    A negative penetration is an opening.
-    """
-    return st.lists(st.integers(lowest, 8), min_size=1, max_size=most)
+def depths(*, lowest: int = 1) -> SearchStrategy[list[int]]:
+    """Return penetrations in quarters of some unit, to be dealt out in turn to the nodes; below 0 are openings."""
+    return st.lists(st.integers(lowest, 8), min_size=1, max_size=4)
 
 
 @cache
@@ -73,52 +72,74 @@ def depth_units(*, finest: int = 8) -> SearchStrategy[float]:
     return st.integers(0, finest).map(lambda e: 2.0**-e)
 
 
+def one_or_two(panels: SearchStrategy[_Item]) -> SearchStrategy[list[_Item]]:
+    """Return lists of one or two."""
+    return st.one_of(st.lists(panels, min_size=1, max_size=1), st.lists(panels, min_size=1, max_size=2))
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A rigid motion after a scaling: x → 2^k (Q x + shift)."""
+    """A similarity x → 2^k (Q x + shift), in 2-D.
 
-    degrees: int = 0  # The angle of the rotation Q, counter-clockwise; quarter turns are exact.
+    Q is a rotation. Or it is a Pythagorean matrix of integers [[a, −b], [b, a]], which stretches too: it rounds no
+    point of a lattice.
+    """
+
+    degrees: int = 0  # The angle of the rotation, counter-clockwise; quarter turns are exact.
     shift: tuple[int, int] = (0, 0)  # In units of the lattice.
     exponent: int = 0
+    legs: tuple[int, int] | None = None  # (a, b), in place of the angle.
 
     @property
     def scale(self) -> float:
-        """The factor 2^k of all lengths."""
-        return ldexp(1.0, self.exponent)
+        """The factor of all lengths: 2^k, or an integer × 2^k."""
+        return ldexp(hypot(*self.legs) if self.legs else 1.0, self.exponent)
 
     @property
-    def cos_sin(self) -> tuple[np.longdouble, np.longdouble]:
-        """Cosine and sine of the angle, in extended precision if the machine has it."""
+    def column(self) -> tuple[np.longdouble, np.longdouble]:
+        """The first column of Q, in extended precision if the machine has it."""
+        if exact := self.legs or _QUARTER_TURNS.get(self.degrees):
+            return np.longdouble(exact[0]), np.longdouble(exact[1])
         angle = np.longdouble(self.degrees) * np.arccos(np.longdouble(-1)) / 180
-        cos, sin = _QUARTER_TURNS.get(self.degrees, (np.cos(angle), np.sin(angle)))
-        return np.longdouble(cos), np.longdouble(sin)
+        return np.cos(angle), np.sin(angle)
 
     @property
     def direction(self) -> FloatArray:
-        """The unit vector (2,) that the lattice's x-axis becomes."""
-        return np.array(self.cos_sin, dtype=np.float64)
+        """The vector (2,) that the unit vector along the lattice's x-axis becomes before the scaling."""
+        return np.array(self.column, dtype=np.float64)
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the points (n, 2), moved; each coordinate is rounded once, from extended precision."""
-        cos, sin = self.cos_sin
-        x, y = points.astype(np.longdouble).T
+        """Return the points (n, 2), moved; each coordinate is rounded once, from extended precision.
+
+        A matrix of integers needs none: off its lattice each operation is rounded.
+        """
+        real = np.float64 if self.legs else np.longdouble
+        cos, sin = map(real, self.column)
+        x, y = points.astype(real).T
         moved = np.column_stack([cos * x - sin * y + self.shift[0], sin * x + cos * y + self.shift[1]])
-        return (moved * self.scale).astype(np.float64)
-
-
-REST = Motion()
+        return (moved * ldexp(1.0, self.exponent)).astype(np.float64)
 
 
 @cache
-def motions(*, exact: bool = False, furthest: int = 64, exponents: int = 20) -> SearchStrategy[Motion]:
-    """Return rest or any rigid motion; only quarter turns if `exact`.
-
-    Translations up to `furthest`, scales 2^±`exponents`.
-    """
+def motions(*, exact: bool = False, furthest: int = 64) -> SearchStrategy[Motion]:
+    """Return rest or any rigid motion, only quarter turns if `exact`; translations up to `furthest`, scales 2^±20."""
     degrees = st.sampled_from([0, 90, 180, 270]) if exact else st.integers(0, 359)
     place = st.integers(-furthest, furthest)
-    exponent = st.one_of(st.just(0), st.integers(-exponents, exponents))
-    return st.one_of(st.just(REST), st.builds(Motion, degrees, st.tuples(place, place), exponent))
+    exponent = st.one_of(st.just(0), st.integers(-20, 20))
+    return st.one_of(st.just(Motion()), st.builds(Motion, degrees, st.tuples(place, place), exponent))
+
+
+@cache
+def exact_turns() -> SearchStrategy[Motion]:
+    """Return rest, or Pythagorean similarities with offsets up to 2^20."""
+    place = st.one_of(st.integers(-64, 64), st.integers(-FURTHEST + 2**12, FURTHEST - 2**12))
+    exponent = st.one_of(st.just(0), st.integers(-20, 20))
+
+    def turn(legs: tuple[int, int], shift: tuple[int, int], exponent: int) -> Motion:
+        return Motion(0, shift, exponent, legs)
+
+    turns = st.builds(turn, st.sampled_from(_EXACT_TURNS), st.tuples(place, place), exponent)
+    return st.one_of(st.just(Motion()), turns, turns)
 
 
 def shifts(offsets: Sequence[int], count: int) -> FloatArray:

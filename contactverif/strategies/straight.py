@@ -6,10 +6,9 @@ Each rule for gaps sees the same straight line or plane opposite. Everything sta
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
-from itertools import cycle
+from itertools import accumulate, cycle, takewhile
 from math import ceil, log2
 
 import numpy as np
@@ -19,7 +18,6 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
 from contactverif.strategies import samples
-from contactverif.strategies.projection_situations import exact_turns
 from contactverif.strategies.surfaces import SpaceMotion, surface_pairs
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
@@ -40,9 +38,8 @@ def tilted_cases(draw: DrawFn) -> Case:
 
     The slave's reference is level, so that its lengths there are others than in the state.
     """
-    slope = draw(_SIXTEENTHS) * draw(_SIGNS) / 16
-    slave, master, reference, _ = _layout(draw, slope)
-    return _place(draw, slave, master, reference)
+    slave, master, _ = _layout(draw, draw(_SIXTEENTHS) * draw(_SIGNS) / 16)
+    return _place(draw, slave, master)
 
 
 @random_source("contactverif.strategies.straight.steep_cases")
@@ -61,8 +58,7 @@ def steep_cases(draw: DrawFn) -> Case:
     reach = float(ceil(depth.max() * slope) + 1)
     first, second = (float(samples.on_lattice(np.array(draw(samples.SEVENTHS) / 7))) for _ in range(2))
     x, master_x = x + first, reach * (np.arange(3.0, -2.0, -1.0) - second)
-    level = np.column_stack([x, np.zeros(len(x))])
-    return _place(draw, np.column_stack([x, -depth]), np.column_stack([master_x, np.zeros(5)]), level)
+    return _place(draw, np.column_stack([x, -depth]), np.column_stack([master_x, np.zeros(5)]))
 
 
 @random_source("contactverif.strategies.straight.bent_end_cases")
@@ -73,15 +69,14 @@ def bent_end_cases(draw: DrawFn) -> Case:
     The parameter "bent" (n_unknowns,) holds the positions after the two unloaded end segments of the master have turned
     about the nodes that join them to the flat part.
     """
-    slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
-    slave, master, reference, reach = _layout(draw, slope)
+    slave, master, reach = _layout(draw, draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16)
     ends = []
     for corner, side in ((master[0], 1.0), (master[-1], -1.0)):
         bend = draw(_BENDS)
         ends.append(samples.on_lattice(corner + reach * np.array([side * np.cos(bend), -np.sin(bend)])))
     straight = np.vstack([master[0] + [reach, 0.0], master, master[-1] - [reach, 0.0]])
     bent = np.vstack([ends[0], master, ends[1]])
-    return _place(draw, slave, straight, reference, bent=np.vstack([slave, bent]))
+    return _place(draw, slave, straight, bent=np.vstack([slave, bent]))
 
 
 @samples.on_own_meshes
@@ -91,42 +86,31 @@ def cases_over_a_body(draw: DrawFn) -> Case:
     The parameter "behind" (n, 2) holds the nodes of a surface of the second body: it lies behind the master, farther
     than any point penetrates, and is walked as the master is.
     """
-    slope = draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16
-    slave, master, reference, reach = _layout(draw, slope)
+    slave, master, reach = _layout(draw, draw(_LEVEL_OR_TILTED) * draw(_SIGNS) / 16)
     depth = reach * draw(_DISTANCES)
     behind = np.column_stack([np.linspace(master[0, 0] + reach, master[-1, 0] - reach, 4), np.full(4, -2 * depth)])
-    return _place(draw, slave, master, reference, behind=samples.on_lattice(behind))
+    return _place(draw, slave, master, behind=samples.on_lattice(behind))
 
 
-def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Draw slave, flat master and slave reference in walking order, and a length larger than all depths."""
+def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, float]:
+    """Draw slave and flat master in walking order, and a length larger than all depths."""
     x = samples.ends_of(draw(_SLAVE))
     shallow = draw(_QUARTERS) / 4 * draw(samples.depth_units(finest=6)) * float((x[1:] - x[:-1]).min())
     depth = shallow + (slope * (x - x[0]) if slope > 0 else slope * (x - x[-1]))
     # Lines along the slave's normal meet the master less than one depth aside; two depths keep off the corners.
     reach = float(ceil(2 * depth.max()) + 1)
     x = x + float(samples.on_lattice(np.array(draw(samples.SEVENTHS) / 7)))
-    master_x = _cover(draw(samples.lengths(graded=False)), -reach, float(ceil(x[-1])) + reach)
-    slave = np.column_stack([x, -depth])
+    steps, end = cycle(draw(samples.lengths(graded=False))), float(ceil(x[-1])) + reach
+    master_x = [*takewhile(lambda place: place < end, accumulate(steps, initial=-reach)), end]
     master = np.column_stack([master_x[::-1], np.zeros(len(master_x))])
-    return slave, master, np.column_stack([x, np.zeros(len(x))]), reach
+    return np.column_stack([x, -depth]), master, reach
 
 
-def _cover(steps: Sequence[float], start: float, end: float) -> FloatArray:
-    """Return ascending places from start to end whose distances are these in turn; the last is what is left."""
-    places = [start]
-    for step in cycle(steps):
-        if places[-1] + step >= end:
-            break
-        places.append(places[-1] + step)
-    return np.array([*places, end])
-
-
-def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, reference: FloatArray, **others: FloatArray) -> Case:
+def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, **others: FloatArray) -> Case:
     """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
-    motion, penalty = draw(exact_turns()), draw(samples.PENALTIES)
+    motion, penalty = draw(samples.exact_turns()), draw(samples.PENALTIES)
     seed, shuffle = draw(samples.SEEDS), draw(samples.SHUFFLES)
-    slaves, masters, references = ([samples.Chain(points)] for points in (slave, master, reference))
+    slaves, masters, references = ([samples.Chain(points)] for points in (slave, master, slave * [1.0, 0.0] + 0.0))
     interface, order = samples.assemble_chains(slaves, masters, references, motion.scale, shuffle)
     parameters = {name: motion(points) for name, points in others.items()}
     if "bent" in parameters:  # The positions of all nodes

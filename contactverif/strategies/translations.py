@@ -138,8 +138,8 @@ def sliding_cases(draw: DrawFn) -> Case:
     nodes = np.vstack([slave, line[::-1]])
     moved = nodes + np.where(np.arange(len(nodes)) < len(slave), way, 0.0)[:, None] * [1.0, 0.0]
     z, end = motion(nodes[order]).reshape(-1), motion(moved[order]).reshape(-1)
-    opens = _opens_at_once(slave, line, way)
-    return Case(interface, z, penalty, {"path": end - z, "opens": np.array(float(opens))}, seed)
+    opens = np.array(float(_opens_at_once(slave, line, way)))
+    return Case(interface, z, penalty, {"path": end - z, "opens": opens}, seed)
 
 
 def _opens_at_once(slave: FloatArray, line: FloatArray, way: float) -> bool:

@@ -41,18 +41,20 @@ def test_forces_of_the_paper(name: str, table: str) -> None:
     assert weights == slave + master[::-1]  # master nodes run from right to left
 
 
-def test_an_overhanging_master_is_loaded_where_it_is_covered() -> None:
-    interface, _ = chains([(1, 0), (2, 0)], [(4, 0), (0, 0)])
-    weights = uniform_pressure_weights_exact(interface, interface.nodes[:, 0])
-    half = Fraction(1, 2)
-    assert weights == [half, half, Fraction(3, 8), Fraction(5, 8)]
-
-
-def test_an_overhanging_slave_is_loaded_where_it_is_covered() -> None:
-    """The other way round the same numbers, whichever surface is the slave; and both sides may overhang."""
-    for last, first, weights in ((2, 1, "5/8 3/8 1/2 1/2"), (8, 3, "1/8 7/8 1/10 9/10"), (8, 5, "0 0 0 0")):
-        interface, _ = chains([(0, 0), (4, 0)], [(last, 0), (first, 0)])
-        assert uniform_pressure_weights_exact(interface, interface.nodes[:, 0]) == [*map(Fraction, weights.split())]
+@pytest.mark.parametrize(
+    ("slave", "master", "weights"),
+    [
+        ((1, 2), (4, 0), "1/2 1/2 3/8 5/8"),
+        ((0, 4), (2, 1), "5/8 3/8 1/2 1/2"),
+        ((0, 4), (8, 3), "1/8 7/8 1/10 9/10"),
+        ((0, 4), (8, 5), "0 0 0 0"),
+    ],
+)
+def test_what_overhangs_is_loaded_where_it_is_covered(
+    slave: tuple[float, float], master: tuple[float, float], weights: str
+) -> None:
+    interface, _ = chains([(x, 0) for x in slave], [(x, 0) for x in master])
+    assert uniform_pressure_weights_exact(interface, interface.nodes[:, 0]) == [*map(Fraction, weights.split())]
 
 
 @CHECKED

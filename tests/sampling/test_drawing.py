@@ -16,7 +16,7 @@ from contactverif.contract.case import random_source
 from contactverif.run.rows import WHOLE
 from contactverif.run.run import run
 from contactverif.sampling.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
-from contactverif.sampling.hypothesis_draws import draw_different, find_difference, shrink_choices
+from contactverif.sampling.hypothesis_draws import draw_different, find_difference, shrink_case
 
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]])
 ERROR = Quantity("error", "1e-6", "a number for a test")
@@ -116,7 +116,7 @@ def test_hypothesis_makes_the_same_case_of_the_same_choices() -> None:
         draws = draw_different(strategy, seed=name, simplest=True)
         for draw in (next(draws) for _ in range(4)):
             replayed: list[Case] = []
-            shrink_choices(strategy, draw.stored_choices(), seed="", fails=replayed.append, limit=5)
+            shrink_case(strategy, choices=draw.stored_choices(), seed="", fails=replayed.append, limit=5)
             assert same_case(replayed[0], draw.case), name
 
 
@@ -125,7 +125,7 @@ def test_all_kinds_of_choices_are_stored() -> None:
     strategy: Any = parts.filter(lambda values: values[3])
     for draw in [draw for draw, _ in zip(draw_different(strategy, seed="1", simplest=False), range(50), strict=False)]:
         replayed: list[Any] = []
-        shrink_choices(strategy, draw.stored_choices(), seed="", fails=replayed.append, limit=1)
+        shrink_case(strategy, choices=draw.stored_choices(), seed="", fails=replayed.append, limit=1)
         assert repr(replayed[0]) == repr(draw.case)
 
 
