@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface
-from contactverif.oracle.nearest import Reach, integers, nearest_of, reach
+from contactverif.oracle.nearest import integers, nearest_of, reach
 
 Integers = NDArray[Any]  # An array of Python integers of any size.
 
@@ -39,8 +39,7 @@ class Lattice:
     def from_state(cls, interface: Interface, z: FloatArray) -> Lattice:
         """Return the lattice of a state z (n_unknowns + …,), whose numbers count as the rationals that they are."""
         values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
-        nodes = np.array(values, dtype=object).reshape(-1, 2)
-        return cls(nodes, scale, interface.slave.segments, interface.master.segments)
+        return cls(as_integers(values).reshape(-1, 2), scale, interface.slave.segments, interface.master.segments)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,39 +196,31 @@ def closest_excess(lattice: Lattice, points: ExactPoints, segments: IntArray) ->
     Both are (n_points,): a length ≥ 0, and the exact number of segments at the least distance. `segments` (n_points,)
     are the master segments that were chosen.
     """
-    point, candidate = _near_pairs(lattice, points, segments)
-    nodes, master = [tuple(node) for node in lattice.nodes.tolist()], lattice.master.tolist()
-    places, weights = [tuple(place) for place in points.place.tolist()], points.weight.tolist()
-    reaches: list[dict[int, Reach]] = [{} for _ in places]
-    for number, segment in zip(point.tolist(), candidate.tolist(), strict=True):
-        first, second = master[segment]
-        reaches[number][segment] = reach(segment, nodes[first], nodes[second], places[number], weights[number])
+    # Floats with a safe bound only leave out segments that cannot be nearest.
+    corners, places = Ratios(lattice.nodes, as_integers([lattice.scale])).floats(), positions(lattice, points).floats()
+    first, second = corners[lattice.master[:, 0]], corners[lattice.master[:, 1]]
+    along = second - first
+    share = ((places[:, None] - first) * along).sum(axis=-1) / (along**2).sum(axis=-1)
+    foot = first + np.clip(share, 0, 1)[..., None] * along
+    distance = np.hypot(*np.moveaxis(places[:, None] - foot, -1, 0))
+    doubt = 64 * UNIT_ROUNDOFF * np.abs(corners).max()
+    near = distance <= distance.min(axis=1, keepdims=True) * (1 + _SAFE) + doubt
+    near[np.arange(len(segments)), segments] = True
+    nodes, master = lattice.nodes.tolist(), lattice.master.tolist()
     excess, ties = np.zeros(len(segments)), np.empty(len(segments), dtype=np.int64)
-    for number, (choice, others) in enumerate(zip(segments.tolist(), reaches, strict=True)):
-        near = nearest_of(others.values())
-        ties[number] = len(near)
-        a, b, c, d = others[choice].above, others[choice].squared, near[0].above, near[0].squared
+    for number, (place, weight) in enumerate(zip(points.place.tolist(), points.weight.tolist(), strict=True)):
+        reaches = {
+            segment: reach(segment, nodes[master[segment][0]], nodes[master[segment][1]], place, weight)
+            for segment in np.flatnonzero(near[number]).tolist()
+        }
+        choice, (nearest, *others) = reaches[int(segments[number])], nearest_of(reaches.values())
+        ties[number] = 1 + len(others)
+        a, b, c, d = choice.above, choice.squared, nearest.above, nearest.squared
         if a * d > c * b:  # Squared distances still carry unit².
-            unit = weights[number] * lattice.scale
+            unit = weight * lattice.scale
             total = np.sqrt(a / (b * unit**2)) + np.sqrt(c / (d * unit**2))
             excess[number] = float((a * d - c * b) / (b * d * unit**2) / total)
     return excess, ties
-
-
-def _near_pairs(lattice: Lattice, points: ExactPoints, choice: IntArray) -> tuple[IntArray, IntArray]:
-    """Return points and master segments, sorted by point: all that may be the nearest, and the choice."""
-    nodes = Ratios(lattice.nodes, np.array(lattice.scale, dtype=object)).floats()
-    place = positions(lattice, points).floats()
-    first, second = nodes[lattice.master[:, 0]], nodes[lattice.master[:, 1]]
-    along = second - first
-    share = ((place[:, None] - first) * along).sum(axis=-1) / (along**2).sum(axis=-1)
-    foot = first + np.clip(share, 0, 1)[..., None] * along
-    distance = np.hypot(*np.moveaxis(place[:, None] - foot, -1, 0))
-    doubt = 64 * UNIT_ROUNDOFF * np.abs(nodes).max()
-    near = distance <= distance.min(axis=1, keepdims=True) * (1 + _SAFE) + doubt
-    near[np.arange(len(choice)), choice] = True
-    point, candidate = np.nonzero(near)
-    return point, candidate
 
 
 def seen_excess(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
@@ -12,6 +10,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import (
     ONE_SIDED,
+    PLANE,
     STEEPEST_FACING,
     TRIANGLE,
     Interface,
@@ -83,13 +82,7 @@ def states(interface: Interface, smooth: bool) -> SearchStrategy[Case]:
     The slave is bent onto the master, so that most of its nodes touch whatever the gap of the mesh is. Then all nodes
     move in waves, the slave is pushed as a whole until its deepest node penetrates, and a coprime offset is added.
     """
-    closed = _bend_slave(
-        interface,
-        *ways_to_master(interface),
-        lambda arms: np.hypot(*arms.T),
-        lambda nodes: np.diff(nodes[interface.slave.segments], axis=1)[:, 0],
-    )
-    return _states(interface, closed, smooth)
+    return _states(interface, _bend_slave(interface, *ways_to_master(interface)), smooth)
 
 
 @st.composite
@@ -127,25 +120,23 @@ def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
     return displacement
 
 
-def _bend_slave(
-    interface: Interface,
-    ways: FloatArray,
-    directions: FloatArray,
-    length: Callable[[FloatArray], FloatArray],
-    measure: Callable[[FloatArray], FloatArray],
-) -> FloatArray:
+def _bend_slave(interface: Interface, ways: FloatArray, directions: FloatArray) -> FloatArray:
     """Return positions (n_nodes, dim) in which each slave node that has a way (n_slave,) to the master lies on it.
 
     Any other slave node moves as the nearest node that has one. Where this would shrink a segment or face to less than
-    `LEAST_SHARE` of its size, or turn it too far, the slave stays as it is. `length` is that of vectors (n, dim), and
-    `measure` gives the vector of each segment, or the normal of each face.
+    `LEAST_SHARE` of its size, or turn it too far, the slave stays as it is.
     """
-    nodes, n_slave = interface.nodes, interface.n_slave_nodes
+    nodes, n_slave, in_plane = interface.nodes, interface.n_slave_nodes, interface.dim == PLANE
     facing, closed = np.flatnonzero(np.isfinite(ways)), nodes.copy()
     if len(facing):
-        nearest = [facing[length(nodes[facing] - node).argmin()] for node in nodes[:n_slave]]
+        arms = (nodes[facing] - node for node in nodes[:n_slave])
+        distances = (np.hypot(*arm.T) if in_plane else np.sqrt((arm**2).sum(axis=1)) for arm in arms)
+        nearest = [facing[distance.argmin()] for distance in distances]
         closed[:n_slave] += ways[nearest, None] * directions[nearest]
-    before, after = measure(nodes), measure(closed)
+    before, after = (
+        (corners[:, 1] - corners[:, 0] if in_plane else turns_of(corners).sum(axis=1))
+        for corners in (nodes[interface.slave.faces], closed[interface.slave.faces])
+    )  # The vector of each segment, or the normal of each face.
     kept = np.einsum("ij,ij->i", before, after) >= LEAST_SHARE * np.einsum("ij,ij->i", before, before)
     return closed if kept.all() else nodes.copy()
 
@@ -228,15 +219,8 @@ def close_surfaces(interface: Interface, directions: FloatArray) -> FloatArray:
 
     Any other slave node moves as the nearest node that does, unless that would shrink a slave face too much.
     """
-    places = interface.nodes[: interface.n_slave_nodes]
-    ways = np.array([_way_along(interface, *pair) for pair in zip(places, directions, strict=True)])
-    return _bend_slave(
-        interface,
-        ways,
-        directions,
-        lambda arms: np.sqrt((arms**2).sum(axis=1)),
-        lambda nodes: turns_of(nodes[interface.slave.faces]).sum(axis=1),
-    )
+    pairs = zip(interface.nodes[: interface.n_slave_nodes], directions, strict=True)
+    return _bend_slave(interface, np.array([_way_along(interface, *pair) for pair in pairs]), directions)
 
 
 def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -> float:

@@ -66,19 +66,13 @@ def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
 
 @random_source("contactverif.strategies.solids.variant_cases", needs=UNIFORM)
 def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return the patch test's variants: each case has the parameter "variant", an index into VARIANTS.
-
-    Given a scene, that scene alone; None if its pressure is not known, or the slave overhangs the master.
-    """
+    """Return scenes as `block_cases` does, the patch test's variants: "variant" is an index into VARIANTS."""
     return _variants() if scene is None else _uniform(scene, overhang=False)
 
 
 @random_source("contactverif.strategies.solids.dead_zone_cases", needs="a known pressure and an overhang")
 def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return a random block that overhangs its master inside a slave segment, on one side or both.
-
-    The pressure is uniform. Given a scene, that scene alone; None if its pressure is not known, or nothing overhangs.
-    """
+    """Return scenes as `block_cases` does whose slave overhangs its master inside a segment, on one side or both."""
     return _dead_zones() if scene is None else _uniform(scene, overhang=True)
 
 
@@ -95,10 +89,7 @@ def solid_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
 
 @random_source("contactverif.strategies.solids.closed_cases")
 def closed_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return scenes as `solid_cases` does, all of the interface in contact: for what has nothing to do with opening.
-
-    Given a scene, that scene alone.
-    """
+    """Return scenes as `solid_cases` does, all of the interface in contact: for what has nothing to do with opening."""
     return _tilted_blocks(_CLOSED_TILTS) if scene is None else solid_cases(scene)
 
 
@@ -123,10 +114,12 @@ def _variants(draw: DrawFn) -> Case:
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     strain, poisson, seed = draw(_STRAINS), (draw(_POISSON), draw(_POISSON)), draw(SEEDS)
-    ratio = 10.0 ** draw(st.integers(-6, 6)) if VARIANTS[variant] == "unequal materials" else 1.0
-    degrees = draw(st.sampled_from(INCLINATIONS)) if VARIANTS[variant] == "inclined" else 0.0
-    position = draw(st.integers(0, POSITIONS - 1)) if VARIANTS[variant] == "sliding" else 0
-    beside = (draw(st.integers(1, 4)), draw(st.integers(1, 4))) if VARIANTS[variant] in ("sliding", "punch") else (0, 0)
+    name, beside = VARIANTS[variant], (0, 0)
+    ratio = 10.0 ** draw(st.integers(-6, 6)) if name == "unequal materials" else 1.0
+    angle = np.radians(draw(st.sampled_from(INCLINATIONS)) if name == "inclined" else 0.0)
+    position = draw(st.integers(0, POSITIONS - 1)) if name == "sliding" else 0
+    if name in ("sliding", "punch"):
+        beside = draw(_WIDER), draw(_WIDER)
     x = ends_of(slave)
     master_x = _cut(master, x[-1] + sum(beside)) - beside[0]
     # A thin stiff body on a soft one bends at nearly no force, and its stress would be roundoff: height ≥ width/4.
@@ -139,9 +132,9 @@ def _variants(draw: DrawFn) -> Case:
         tuple([unit * height for height in side] for side in layers),
         (1.0, ratio),
         poisson,
-        Placing((float(np.cos(np.radians(degrees))), float(np.sin(np.radians(degrees))))),
+        Placing((float(np.cos(angle)), float(np.sin(angle)))),
         pressure=strain * min(1.0, ratio),
-        rigid_master=VARIANTS[variant] == "rigid master",
+        rigid_master=name == "rigid master",
     )
     return replace(scene, facts={**scene.facts, "variant": np.array(float(variant))}).case(seed=seed)
 

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import pytest
@@ -44,8 +45,6 @@ ANY = Property("patch.any", "patch", "No error.", (ERROR,), stiff_cases, no_erro
 
 
 class Silent:
-    """A formulation of which nobody asks anything."""
-
     traits = Traits()
 
     def residual(self, interface: Interface, pairing: Any, z: Any) -> Any:
@@ -59,11 +58,7 @@ def penalties(cases: Any) -> list[float]:
     return [case.penalty for case in cases]
 
 
-def random_sources() -> dict[str, Any]:
-    """Return {strategy: source} of all installed properties with random cases."""
-    questions = [question for question in load_properties() if isinstance(question, Property)]
-    sources = {strategy_name(question): question.cases(None) for question in questions}
-    return {name: source for name, source in sources.items() if not isinstance(source, tuple)}
+INSTALLED = [question for question in load_properties() if isinstance(question, Property)]
 
 
 def test_properties_with_the_same_strategy_share_their_cases() -> None:
@@ -86,17 +81,11 @@ def test_a_strategy_has_its_stored_name_or_that_of_its_property(cases: Callable[
     assert strategy_name(replace(ANY, cases=cases)) == name
 
 
-def test_two_installed_strategies_never_have_the_same_name() -> None:
-    questions = [question for question in load_properties() if isinstance(question, Property)]
-    functions = {(strategy_name(question), getattr(question.cases, "make", question.cases)) for question in questions}
-    assert len(functions) == len({name for name, _ in functions})
-
-
-def test_installed_properties_share_strategies() -> None:
-    questions = [question for question in load_properties() if isinstance(question, Property)]
-    names = [strategy_name(question) for question in questions]
+def test_installed_properties_share_strategies_of_different_names() -> None:
+    names = [strategy_name(question) for question in INSTALLED]
+    functions = {(strategy_name(question), getattr(question.cases, "make", question.cases)) for question in INSTALLED}
+    assert len(functions) == len(set(names))
     assert names.count("contactverif.strategies.general.smooth_cases") >= 6
-    assert len(random_sources()) <= 22
 
 
 def test_the_choice_and_the_order_of_properties_change_no_case() -> None:
@@ -111,10 +100,12 @@ def test_the_choice_and_the_order_of_properties_change_no_case() -> None:
 
 def test_hypothesis_makes_the_same_case_of_the_same_choices() -> None:
     """Hypothesis shrinks a case from its choices, so the choices must be what hypothesis itself would have drawn."""
-    for name, source in random_sources().items():
+    sources = {strategy_name(question): question.cases(None) for question in INSTALLED}
+    random_sources = {name: source for name, source in sources.items() if not isinstance(source, tuple)}
+    assert len(random_sources) <= 22
+    for name, source in random_sources.items():
         strategy = next(iter(source.values())) if isinstance(source, Mapping) else source
-        draws = draw_different(strategy, seed=name, simplest=True)
-        for draw in (next(draws) for _ in range(4)):
+        for draw in islice(draw_different(strategy, seed=name, simplest=True), 4):
             replayed: list[Case] = []
             shrink_case(strategy, choices=draw.stored_choices(), seed="", fails=replayed.append, limit=5)
             assert same_case(replayed[0], draw.case), name
@@ -123,7 +114,7 @@ def test_hypothesis_makes_the_same_case_of_the_same_choices() -> None:
 def test_all_kinds_of_choices_are_stored() -> None:
     parts = st.tuples(st.floats(), st.text(), st.binary(), st.booleans(), st.integers(), st.integers(0, 5), st.just(1))
     strategy: Any = parts.filter(lambda values: values[3])
-    for draw in [draw for draw, _ in zip(draw_different(strategy, seed="1", simplest=False), range(50), strict=False)]:
+    for draw in islice(draw_different(strategy, seed="1", simplest=False), 50):
         replayed: list[Any] = []
         shrink_case(strategy, choices=draw.stored_choices(), seed="", fails=replayed.append, limit=1)
         assert repr(replayed[0]) == repr(draw.case)
