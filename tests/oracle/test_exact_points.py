@@ -1,5 +1,6 @@
 """The exact view of the master from points, and the nearest segments, against rationals by hand and a plain loop."""
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
@@ -12,6 +13,7 @@ from contactverif.oracle.exact_points import (
     Coverage,
     ExactPoints,
     Lattice,
+    View,
     closest_excess,
     closest_view,
     lies_in_shadow,
@@ -27,11 +29,10 @@ U = 2.0**-53
 FAR = 2.0**40
 
 
-def on_slope(shift: float = 0.0) -> tuple[Interface, Lattice]:
-    """One level slave segment of length 4 under a master of slope 3/4 and length 5, and its lattice."""
-    slave, master = np.array([[0.0, 0], [4, 0]]), np.array([[4.0, 3], [0, 0]])
-    interface = Interface.from_chains(slave, master)
-    return interface, Lattice.from_state(interface, (interface.nodes + shift).reshape(-1))
+def on_slope(shift: float = 0.0) -> Lattice:
+    """One level slave segment of length 4 under a master of slope 3/4 and length 5."""
+    interface = Interface.from_chains(np.array([[0.0, 0], [4, 0]]), np.array([[4.0, 3], [0, 0]]))
+    return Lattice.from_state(interface, (interface.nodes + shift).reshape(-1))
 
 
 def point_at(lattice: Lattice, c: float) -> ExactPoints:
@@ -39,31 +40,31 @@ def point_at(lattice: Lattice, c: float) -> ExactPoints:
 
 
 @pytest.mark.parametrize("shift", [0.0, FAR])
-def test_the_closest_view_is_that_of_rationals(shift: float) -> None:
-    _, lattice = on_slope(shift)
-    view = closest_view(lattice, point_at(lattice, 0.25), np.array([0]))  # The point (5/2, 0)
-    assert view.gap.floats().tolist() == [-1.5]
-    assert view.xi.floats().tolist() == [float(Fraction(3, 5))]
-    assert view.normal.floats().tolist() == [[-0.6, 0.8]]
-    assert view.gap.errors(np.array([-1.5 + 2**-52])).tolist() == [2**-52]
+@pytest.mark.parametrize(
+    ("look", "gap", "xi", "normal", "cosine"),
+    [
+        (closest_view, -1.5, 0.6, [-0.6, 0.8], 1.0),
+        (slave_normal_view, -1.875, 0.375, [0.0, 1.0], 0.8),  # Straight up to the slope, at the height of 15/8
+    ],
+)
+def test_a_view_is_that_of_rationals(
+    look: Callable[..., View], gap: float, xi: float, normal: list[float], cosine: float, shift: float
+) -> None:
+    lattice = on_slope(shift)
+    point, segments = point_at(lattice, 0.25), np.array([0])  # The point (5/2, 0)
+    view = look(lattice, point, segments)
+    assert view.gap.floats().tolist() == [gap]
+    assert view.xi.floats().tolist() == [xi]
+    assert view.normal.floats().tolist() == [normal]
+    assert view.gap.errors(np.array([gap + 2**-52])).tolist() == [2**-52]
     assert np.isnan(view.gap.errors(np.array([np.nan]))).all()
-    assert view.cosine.tolist() == [1.0]
+    assert view.cosine == pytest.approx([cosine], rel=1e-15)
     assert view.lengths == pytest.approx(4 + 5 + np.hypot(1.5, 3), rel=1e-15)
-
-
-@pytest.mark.parametrize("shift", [0.0, FAR])
-def test_the_view_along_the_slave_s_normal_is_that_of_rationals(shift: float) -> None:
-    _, lattice = on_slope(shift)
-    view = slave_normal_view(lattice, point_at(lattice, 0.25), np.array([0]))
-    assert view.gap.floats().tolist() == [-1.875]  # Straight up to the slope, at the height of 15/8
-    assert view.xi.floats().tolist() == [0.375]
-    assert view.normal.floats().tolist() == [[0.0, 1.0]]
-    assert view.cosine == pytest.approx([0.8], rel=1e-15)
-    assert run_against(lattice, point_at(lattice, 0.25), np.array([0])).tolist() == [True]
+    assert run_against(lattice, point, segments).tolist() == [True]
 
 
 def test_positions_are_formed_from_nodes_and_c() -> None:
-    _, lattice = on_slope(1 / 3)
+    lattice = on_slope(1 / 3)
     rounded = np.array([[4 / 3 + 1 / 3, 1 / 3]])
     c = 2 * (4 / 3) / 4 - 1
     errors = positions(lattice, point_at(lattice, c)).errors(rounded)

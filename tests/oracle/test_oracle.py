@@ -172,14 +172,9 @@ def test_nothing_is_decided_otherwise_within_the_margin(case: Case, share: float
         assert decisions(case, case.z + moves.reshape(-1)) == before
 
 
-def test_a_margin_is_of_the_size_of_the_distance() -> None:
+def test_a_margin_is_of_the_size_of_the_distance_and_no_point_has_none_of_its_own() -> None:
     interface, z = chains([(1, -0.5), (3, -0.5)], [(8, 0), (0, 0)])
-    margin = kink_margin(interface, z, [0], [0.0])
-    assert 0.5 / 4 < margin < 0.5
-
-
-def test_no_point_has_no_margin_of_its_own() -> None:
-    interface, z = chains([(1, -0.5), (3, -0.5)], [(8, 0), (0, 0)])
+    assert 0.5 / 4 < kink_margin(interface, z, [0], [0.0]) < 0.5
     assert kink_margin(interface, z, [-1, 0], [0.0, np.nan]) == 1.0  # ℓ/8 of the master
 
 
