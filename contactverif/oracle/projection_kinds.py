@@ -92,7 +92,7 @@ class _Probe:
 
     @property
     def past(self) -> Fraction | None:
-        """How far the foot is past a free end, in lengths of the segment; None where the nearer end is not free."""
+        """The way of the foot past a free end, in lengths of the segment; None where the nearer end is not free."""
         side = int(self.home.xi > Fraction(1, 2))
         if self.neighbours[self.home.segment][side] >= 0:
             return None
