@@ -91,16 +91,14 @@ class PlannedCases:
     last: bool = True  # No further block follows.
 
 
-def draw_cases(
-    source: CaseSource, *, seed: str, examples: int, progress: Callable[[int], None] | None = None
-) -> PlannedCases:
+def draw_cases(source: CaseSource, *, seed: str, examples: int) -> PlannedCases:
     """Draw all planned cases; the first is the simplest that the strategy makes. Kinds follow one another in turn.
 
     A case that a strategy filters out is not counted. There are fewer if the strategy has fewer.
     """
     cases: list[Case] = []
     for number in range(number_of_blocks(examples)):
-        block = draw_block(source, seed=seed, examples=examples, number=number, progress=progress)
+        block = draw_block(source, seed=seed, examples=examples, number=number)
         cases += block.cases
         if block.last:
             break
@@ -156,15 +154,7 @@ def with_case(sampling: Sampling, question: Property, number: int, outcome: Outc
     return replace(outcome, case_or_summary=case)
 
 
-def shrink(
-    source: CaseSource,
-    *,
-    seed: str,
-    examples: int,
-    first: int,
-    fails: Callable[[Case], bool],
-    limit: int = SHRINK_CALLS,
-) -> None:
+def shrink(source: CaseSource, *, seed: str, examples: int, first: int, fails: Callable[[Case], bool]) -> None:
     """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
 
     `first` is the number of the first case that fails. The cases before it are not judged again. A formulation that
@@ -177,13 +167,13 @@ def shrink(
         strategies = _strategies_in_turn(source)
         _, strategy = strategies[first % len(strategies)]
         choices = draws[first % BLOCK].stored_choices()
-        shrink_case(strategy, seed=seed, fails=fails, limit=limit, choices=choices)
+        shrink_case(strategy, seed=seed, fails=fails, limit=SHRINK_CALLS, choices=choices)
         return
     parts, n, place = _parts(source, seed, examples), 0, first
     if len(parts) > 1:
         n, place = _deal([draw_all(*part)[0] for part in parts])[first]
     strategy, own_seed, share = parts[n]
-    shrink_case(strategy, seed=own_seed, fails=fails, limit=limit, examples=share, first=place)
+    shrink_case(strategy, seed=own_seed, fails=fails, limit=SHRINK_CALLS, examples=share, first=place)
 
 
 def check_names(cases: Sequence[Case]) -> None:

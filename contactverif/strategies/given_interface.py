@@ -69,7 +69,7 @@ def _flat_states(
 ) -> Case:
     quarters, unit = draw(_QUARTERS), draw(depth_units(finest=6))
     penalty, seed = draw(PENALTIES), draw(SEEDS)
-    penetration = quarters / 16 * unit * _shortest_segment(interface)
+    penetration = quarters / 16 * unit * least_height(interface, interface.nodes)
     positions = interface.nodes.copy()
     positions[: interface.n_slave_nodes] -= (opening + penetration) * normal
     parameters = {"penetration": np.array(penetration), "along": along, "direction": direction}
@@ -91,7 +91,7 @@ def _states(draw: DrawFn, interface: Interface, closed: FloatArray, smooth: bool
     slave_waves, master_waves = draw(_MODES), draw(_MODES)
     penalty, seed = draw(PENALTIES), draw(SEEDS)
     offsets = draw(OFFSETS) if smooth or draw(_ON) > 0 else [0]
-    n_slave, shortest = interface.n_slave_nodes, _shortest_segment(interface)
+    n_slave, shortest = interface.n_slave_nodes, least_height(interface, interface.nodes)
     depth = quarters[0] / 4 * unit * shortest
     positions = closed.copy()
     for waves, part in ((slave_waves, slice(0, n_slave)), (master_waves, slice(n_slave, None))):
@@ -105,8 +105,9 @@ def _states(draw: DrawFn, interface: Interface, closed: FloatArray, smooth: bool
     return Case(interface, positions.reshape(-1), penalty, {}, seed)
 
 
-def _shortest_segment(interface: Interface) -> float:
-    return float(min(side.lengths(interface.nodes).min() for side in (interface.slave, interface.master)))
+def least_height(interface: Interface, nodes: FloatArray) -> float:
+    """Return the length of the shortest segment, or the least height of a face, of both surfaces."""
+    return float(min(side.heights(nodes).min() for side in (interface.slave, interface.master)))
 
 
 def _waves(nodes: FloatArray, amplitudes: list[int]) -> FloatArray:
@@ -190,8 +191,7 @@ def _face_states(draw: DrawFn, interface: Interface, closed: FloatArray, directi
     penalty, seed = draw(PENALTIES), draw(SEEDS)
     offsets = draw(OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
     n_slave, positions = interface.n_slave_nodes, closed.copy()
-    least = float(min(side.heights(closed).min() for side in (interface.slave, interface.master)))
-    depth = quarters / 4 * unit * least
+    depth = quarters / 4 * unit * least_height(interface, closed)
     warps = repeat_cyclically(slave_warps, n_slave)
     shares = 1 + (warps - warps.max()) / 4  # −1 to 1, and 1 at the deepest node.
     positions[:n_slave] += depth * shares[:, None] * directions

@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import cos, floor, ldexp, log2, radians, sin
-from typing import overload
 
 import numpy as np
 from hypothesis import strategies as st
@@ -393,31 +392,16 @@ _DEGREES = st.sampled_from([*[0.0] * 6, *[5.0, -20.0, 45.0] * 2, 89.9, 90.0, 180
 
 
 @cache
-def cases_of_kind(kind: str) -> SearchStrategy[Case]:
-    """Return cases of one kind; the parameters "probe_segment" and "probe_c" name the slave point of this kind."""
-    return _cases_of_kind(kind, st.composite(_MAKERS[kind])())
+def projections_by_kind() -> dict[str, SearchStrategy[Case]]:
+    """Return a strategy for each kind, so that each gets its share of a run.
 
-
-@overload
-def projections_by_kind(interface: None = None) -> dict[str, SearchStrategy[Case]]: ...
-@overload
-def projections_by_kind(interface: Interface | None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]: ...
-def projections_by_kind(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case]:
-    """Return a strategy for each kind, so that each gets its share of a run; one strategy for a mesh of the user."""
-    return {kind: cases_of_kind(kind) for kind in KINDS} if interface is None else _states(interface)
-
-
-def projection_states(interface: Interface | None = None) -> SearchStrategy[Case]:
-    """Return cases of all kinds of projection, mixed with others by `st.one_of`.
-
-    Hypothesis varies what it has drawn before, so the shares of the kinds differ widely; `projections_by_kind` gives
-    each kind its share.
+    The parameters "probe_segment" and "probe_c" of a case name the slave point of this kind.
     """
-    return st.one_of(*map(cases_of_kind, KINDS)) if interface is None else _states(interface)
+    return {kind: _cases_of_kind(kind, st.composite(make)()) for kind, make in _MAKERS.items()}
 
 
 @st.composite
-def _states(draw: DrawFn, interface: Interface) -> Case:
+def projection_states(draw: DrawFn, interface: Interface) -> Case:
     """Draw a state of the interface: a point of a slave segment stands in or past a master segment, or on it.
 
     The slave is moved as a whole. On any mesh another segment may turn out to be nearer, so the oracle names the kind.

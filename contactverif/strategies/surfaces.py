@@ -21,7 +21,7 @@ from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.problems.flat_states import rotation
 from contactverif.strategies import samples
-from contactverif.strategies.given_interface import given_surface_states
+from contactverif.strategies.given_interface import given_surface_states, least_height
 from contactverif.strategies.translations import FINENESS, FURTHEST
 
 
@@ -163,13 +163,11 @@ class SurfacePair:
             random, n_slave = np.random.default_rng(self.shuffle), len(slave)
             order = np.concatenate([random.permutation(n_slave), n_slave + random.permutation(len(plane) - n_slave)])
             number = np.argsort(order)  # The new number of each node.
-            plane, faces = (
-                plane[order],
-                [
-                    np.array([np.roll(row, int(random.integers(len(row)))) for row in random.permutation(number[side])])
-                    for side in faces
-                ],
-            )
+            plane = plane[order]
+            faces = [
+                np.array([np.roll(row, int(random.integers(len(row)))) for row in random.permutation(number[side])])
+                for side in faces
+            ]
         nodes = np.column_stack([plane, np.zeros(len(plane))])
         return Interface(nodes, Surface(faces[0]), Surface(faces[1])), plane, _SQUARE * factors
 
@@ -225,7 +223,7 @@ def _matched_pairs() -> SearchStrategy[SurfacePair]:
     return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, samples.SHUFFLES)
 
 
-_QUARTERS = st.integers(1, 8)  # The penetration, in quarters of a unit of the least height of a face.
+_QUARTERS = st.integers(1, 8)  # The penetration of the middle, in quarters of a unit of the least height of a face.
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.flat_surface_cases")
@@ -268,8 +266,7 @@ def _flat_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
     quarters, unit = draw(_QUARTERS), draw(samples.depth_units())
     motion, penalty, seed = draw(space_motions()), draw(samples.PENALTIES), draw(samples.SEEDS)
     interface, plane, domain = pair.lay_out()
-    heights = [side.heights(interface.nodes).min() for side in (interface.slave, interface.master)]
-    penetration = quarters / 4 * unit * 2.0 ** np.floor(np.log2(min(heights)))
+    penetration = quarters / 4 * unit * 2.0 ** np.floor(np.log2(least_height(interface, interface.nodes)))
     current = interface.nodes.copy()
     current[: interface.n_slave_nodes, 2] -= penetration
     parameters = {
@@ -282,7 +279,6 @@ def _flat_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
     return Case(reference, motion(current).reshape(-1), penalty, parameters, seed)
 
 
-_MIDDLE_QUARTERS = st.integers(1, 8)  # The depth of the middle in quarters of a unit of the least height.
 _SLOPES = st.sampled_from([0.0, 0.125, -0.125, 0.375, -0.375, 1.0, -1.0])
 _FINENESS = FINENESS + 1  # One bit more: far away all 53 are full, so that the middle of an edge is rounded.
 _PLACES = st.integers(-(2**FURTHEST) + 2**6, 2**FURTHEST - 2**6)
@@ -295,22 +291,22 @@ def surface_cases(
 ) -> SearchStrategy[Case] | None:
     """Return tilted and warped states, of which half have surfaces on the same domain, with all its ties.
 
-    On an interface of the user they are states of this.
+    Given an interface, states of that one.
     """
-    states = _tilted_states(surface_pairs(faces=faces), smooth=False)
-    return states if interface is None else given_surface_states(interface, smooth=False)
+    if interface is not None:
+        return given_surface_states(interface, smooth=False)
+    return _tilted_states(surface_pairs(faces=faces), space_motions(), smooth=False)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
 def smooth_surface_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> SearchStrategy[Case] | None:
-    """Return tilted and warped states off the lattice, over a larger master: for derivatives.
-
-    On an interface of the user they are states of this.
-    """
-    states = _tilted_states(surface_pairs(same_domain=False, stretched=False, faces=faces), smooth=True)
-    return states if interface is None else given_surface_states(interface, smooth=True)
+    """Return cases as `surface_cases` does, off the lattice, over a larger master: for derivatives."""
+    if interface is not None:
+        return given_surface_states(interface, smooth=True)
+    pairs = surface_pairs(same_domain=False, stretched=False, faces=faces)
+    return _tilted_states(pairs, space_motions(), smooth=True)
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
@@ -326,8 +322,8 @@ def translated_surface_cases(
 
 
 @st.composite
-def _translated_states(draw: DrawFn, pair: SearchStrategy[SurfacePair]) -> Case:
-    case = draw(_tilted_states(pair, smooth=True, motions=space_motions(furthest=0, exponents=0)))
+def _translated_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
+    case = draw(_tilted_states(pairs, space_motions(furthest=0, exponents=0), smooth=True))
     shift = np.array([draw(_PLACES), draw(_PLACES), draw(_PLACES)], dtype=np.float64)
     nodes, z = (samples.on_lattice(values, _FINENESS) for values in (case.interface.nodes, case.z))
     return replace(case, interface=case.interface.at(nodes), z=z, parameters={"shift": shift})
@@ -335,19 +331,15 @@ def _translated_states(draw: DrawFn, pair: SearchStrategy[SurfacePair]) -> Case:
 
 @st.composite
 def _tilted_states(
-    draw: DrawFn,
-    pairs: SearchStrategy[SurfacePair],
-    smooth: bool,
-    motions: SearchStrategy[SpaceMotion] | None = None,
+    draw: DrawFn, pairs: SearchStrategy[SurfacePair], motions: SearchStrategy[SpaceMotion], *, smooth: bool
 ) -> Case:
     pair = draw(pairs)
-    quarters, unit = draw(_MIDDLE_QUARTERS), draw(samples.depth_units())
+    quarters, unit = draw(_QUARTERS), draw(samples.depth_units())
     slopes, warps = (draw(_SLOPES), draw(_SLOPES)), (draw(_WARPS), draw(_WARPS))
-    motion = draw(space_motions() if motions is None else motions)
-    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
+    motion, penalty, seed = draw(motions), draw(samples.PENALTIES), draw(samples.SEEDS)
     offsets = draw(samples.OFFSETS) if smooth else [0]  # Drawn last, so that the offset shrinks last.
     interface, _, domain = pair.lay_out()
-    least = float(min(side.heights(interface.nodes).min() for side in (interface.slave, interface.master)))
+    least = least_height(interface, interface.nodes)
     n_slave, current = interface.n_slave_nodes, interface.nodes.copy()
     # Offsets of 0 to 1/16, on lattices that are coprime to the powers of two.
     current[:n_slave] += samples.repeat_cyclically(offsets, 3 * n_slave).reshape(-1, 3) / [7.0, 11.0, 13.0] / 16 * least
