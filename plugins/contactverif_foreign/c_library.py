@@ -22,18 +22,9 @@ from contactverif.contract.formulation import Handle, Pairing, check_penalty
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.geometry.projection import PointOnSegment, Tree, nearest_segment, node, search_tree
+from contactverif_foreign import shared_library
 from contactverif_foreign.element_pairs import walk_chains
-from contactverif_foreign.shared_library import (
-    Argument,
-    GuardedSlot,
-    SlotRows,
-    find_file,
-    find_function,
-    load_library,
-    parse_numbers,
-    parse_traits_text,
-    traits_beside,
-)
+from contactverif_foreign.shared_library import Argument, GuardedSlot, SlotRows
 from contactverif_foreign.user_element import assemble, unknowns_of
 
 OUTSIDE = -2  # The neighbour does not belong to the element.
@@ -336,23 +327,23 @@ def c(
         `traits_beside`.
     """
     check_penalty(penalty)
-    path = find_file(file)
+    path = shared_library.find_file(file)
     make = LibraryElements if tangent else LibraryForces
-    numbers = parse_numbers("option props", props)
+    numbers = shared_library.parse_numbers("option props", props)
     return make(_read_traits(path, traits), float(penalty), _load_functions(path), elements, numbers, order)
 
 
 @lru_cache(maxsize=16)  # A formulation is made anew for the penalty of each case.
 def _load_functions(path: Path) -> _Functions:
-    library = load_library(path)
-    version = find_function(library, path, "cv_version")()
+    library = shared_library.load_library(path)
+    version = shared_library.find_function(library, path, "cv_version")()
     if version != VERSION:
         needed = f"{VERSION}, that of contactverif.h of this contactverif"
         raise MisuseError("option file", f"{path.name} of version {version}", needed)
     pointer, number = ctypes.c_void_p, ctypes.c_int
-    element = find_function(library, path, "cv_element")
+    element = shared_library.find_function(library, path, "cv_element")
     element.argtypes = [pointer, number, pointer, pointer, pointer]
-    pair = find_function(library, path, "cv_pair") if hasattr(library, "cv_pair") else None
+    pair = shared_library.find_function(library, path, "cv_pair") if hasattr(library, "cv_pair") else None
     if pair is not None:
         pair.argtypes = [pointer, number, pointer]
     return _Functions(element, pair)
@@ -361,10 +352,12 @@ def _load_functions(path: Path) -> _Functions:
 @lru_cache(maxsize=16)
 def _read_traits(path: Path, file: str) -> Traits:
     """Return the traits of a library: those of a file that the user names, what it says itself, or a file beside it."""
-    library = load_library(path)
+    library = shared_library.load_library(path)
     if file or not hasattr(library, "cv_traits"):
-        return traits_beside(path, file)
-    function = find_function(library, path, "cv_traits")
+        return shared_library.traits_beside(path, file)
+    function = shared_library.find_function(library, path, "cv_traits")
     function.restype = ctypes.c_char_p
     text = function()
-    return traits_beside(path) if text is None else parse_traits_text(text.decode("utf-8", "replace"), "cv_traits")
+    if text is None:
+        return shared_library.traits_beside(path)
+    return shared_library.parse_traits_text(text.decode("utf-8", "replace"), "cv_traits")

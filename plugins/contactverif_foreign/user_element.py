@@ -25,18 +25,9 @@ from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import Handle, Pairing, check_count, check_penalty, check_tau
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
+from contactverif_foreign import shared_library
 from contactverif_foreign.element_pairs import RULES, Elements
-from contactverif_foreign.shared_library import (
-    Argument,
-    GuardedSlot,
-    SlotRows,
-    find_file,
-    find_function,
-    fortran_names,
-    load_library,
-    parse_numbers,
-    traits_beside,
-)
+from contactverif_foreign.shared_library import Argument, GuardedSlot, SlotRows
 
 
 class Convention:
@@ -187,20 +178,20 @@ def _load_element(
     check_count(svars, "svars", 0)
     if isinstance(nodes, bool) or nodes not in RULES:
         raise MisuseError("option nodes", repr(nodes), f"one of {', '.join(map(str, RULES))}")
-    path = find_file(file)
-    routine = _load_routine(convention, path, fortran_names(name), svars)
-    properties = parse_numbers("option props", props)
+    path = shared_library.find_file(file)
+    routine = _load_routine(convention, path, shared_library.fortran_names(name), svars)
+    properties = shared_library.parse_numbers("option props", props)
     return UserElement(_read_traits(path, traits), float(penalty), routine, nodes, properties, tau)
 
 
 # A formulation is made anew for the penalty of each case.
-_read_traits = lru_cache(maxsize=16)(traits_beside)
+_read_traits = lru_cache(maxsize=16)(shared_library.traits_beside)
 
 
 @lru_cache(maxsize=16)
 def _load_routine(convention: Convention, path: Path, names: tuple[str, ...], state_variables: int) -> Routine:
-    library = load_library(path)
-    function = find_function(library, path, *names)
+    library = shared_library.load_library(path)
+    function = shared_library.find_function(library, path, *names)
     function.restype = None
     return Routine(convention, library, function, state_variables)
 
@@ -326,7 +317,7 @@ class _Feap(Convention):
             "eltran": ("=6d", 0.0, 0.0, 0.0, 1.0, 0.0, 0.0),  # bpr(3), ctan(3)
         }
         for block, (kinds, *values) in blocks.items():
-            for name in fortran_names(block):
+            for name in shared_library.fortran_names(block):
                 if hasattr(library, name):
                     memory = (ctypes.c_char * struct.calcsize(kinds)).in_dll(library, name)
                     struct.pack_into(kinds, memory, 0, *values)
