@@ -49,9 +49,7 @@ _OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {
     "place": "--mesh",
 }
 _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlier versions, now all --out.
-_STOPPED = 130  # The exit status after Ctrl-C, of typer and of shells.
-_CLOSED_PIPE = 128 + signal.SIGPIPE
-_MISUSE = 2
+_STOPPED, _CLOSED_PIPE, _MISUSE = 130, 128 + signal.SIGPIPE, 2  # Exit statuses, as shells and typer have them.
 _MOST_COLUMNS = 10_000
 
 
@@ -108,18 +106,21 @@ def _exit_status(error: Exception) -> int:
         case BrokenPipeError():  # The reader, such as `head`, has closed the pipe.
             _discard_output()
             return _CLOSED_PIPE
-        case MisuseError():
-            argument = _OPTIONS.get(error.argument, error.argument)
-            return _refuse(str(MisuseError(argument, error.found, error.needed)))
-        case ContactverifError():
-            return _refuse(str(error))
-        case OSError(strerror=str()) | MemoryError() | UnicodeEncodeError():
-            return _refuse(_words_of_machine(error))
         case typer.Abort():
             if isinstance(error.__cause__, EOFError):  # Typer takes it for the end of what a user types.
                 raise error.__cause__
             return _STOPPED
-    return _refuse(_words_of_usage_error(error))
+        case MisuseError():
+            reason = str(MisuseError(_OPTIONS.get(error.argument, error.argument), error.found, error.needed))
+        case ContactverifError():
+            reason = str(error)
+        case OSError(strerror=str()) | MemoryError() | UnicodeEncodeError():
+            reason = _words_of_machine(error)
+        case _:
+            reason = _words_of_usage_error(error)
+    if reason:
+        typer.echo(f"contactverif: {one_line(' '.join(reason.split()))}", err=True)
+    return _MISUSE
 
 
 def _words_of_machine(error: OSError | MemoryError | UnicodeEncodeError) -> str:
@@ -138,10 +139,7 @@ def _words_of_machine(error: OSError | MemoryError | UnicodeEncodeError) -> str:
 
 
 def _words_of_usage_error(error: Exception) -> str:
-    """Return what typer says of a wrong command line; raise any other error again.
-
-    Typer hides the classes of these errors, so their attributes tell them.
-    """
+    """Return what typer says of a wrong command line; raise any other error again. Typer hides their classes."""
     format_message = getattr(error, "format_message", None)
     if format_message is None:
         raise error
@@ -151,12 +149,6 @@ def _words_of_usage_error(error: Exception) -> str:
     words = format_message()
     command_path = getattr(getattr(error, "ctx", None), "command_path", "contactverif")
     return f"{words} (see {command_path} --help)" if words else ""  # Without arguments typer has shown the help.
-
-
-def _refuse(reason: str) -> int:
-    if reason:
-        typer.echo(f"contactverif: {one_line(' '.join(reason.split()))}", err=True)
-    return _MISUSE
 
 
 def _discard_output() -> None:

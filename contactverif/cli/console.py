@@ -1,8 +1,4 @@
-"""The terminal: how wide it is, and how text is printed.
-
-Whatever a command prints goes through `show`, `show_verbatim` or `echo`, which let no control character of a plugin or
-a file reach the terminal.
-"""
+"""The terminal: how wide it is, and how text is printed, without a control character of a plugin or a file."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The progress of a run on standard error: a line for each row that is judged, and how far the whole run is.
-
-A terminal has a bar for that below the rows, and a file a line every few seconds, for any long work.
+"""The progress of a run on standard error: a line for each row, and below it a bar, or in a file a line now and then.
 
 While the bar is up, Ctrl-C ends the run at the next case at the latest. Python drops an interrupt that arrives in a
 callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.

@@ -23,13 +23,7 @@ from contactverif.contract.subject import Subject
 from contactverif.isolation.file_reader import check_ordinary
 from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
-from contactverif.plugins.registry import (
-    formulation_names,
-    load_formulation,
-    the_formulation,
-    the_property,
-    the_subject,
-)
+from contactverif.plugins import registry
 from contactverif.problems.catalogue import load_scene
 from contactverif.run.audit import Audit
 from contactverif.run.audit import audit as audit_run
@@ -65,7 +59,7 @@ def replay(
     example = read_case(report, case)
     _check_surfaces(example.case, files)
     instead = formulation if engine is None else with_engines((), [engine])[0]
-    subject = the_subject(instead or announce_stored(example.formulation), options.limits())
+    subject = registry.the_subject(instead or announce_stored(example.formulation), options.limits())
     outcome = _judge_and_draw(example, subject, files)  # Before anything is printed: a file may not be writable.
     echo(as_text(example.case))
     table = Table([Column(head, wrap=True) for head in ("", "formulation", "verdict", "reason")])
@@ -98,7 +92,7 @@ def draw(
                 raise MisuseError("--scene", f"{scene} and {option} {value}", "one of the two")
         case_of_scene = load_scene(scene).case()
         if not names:
-            raise MisuseError("--formulation", "nothing", f"some of {', '.join(formulation_names())}")
+            raise MisuseError("--formulation", "nothing", f"some of {', '.join(registry.formulation_names())}")
         complete = _draw_solved(case_of_scene, names, scene, files, limits)
     else:
         example = _read_stored(report, case)
@@ -109,7 +103,7 @@ def draw(
             _check_surfaces(example.case, files)
             if len(names) > 1:
                 raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
-            subject = the_formulation(names[0] if names else announce_stored(example.formulation), limits)
+            subject = registry.the_formulation(names[0] if names else announce_stored(example.formulation), limits)
             _judge_and_draw(example, subject, files)
             if not files.paths:
                 echo(as_text(example.case))
@@ -119,7 +113,7 @@ def draw(
 
 
 def _judge_and_draw(example: Counterexample, subject: Subject, files: OutputFiles) -> Outcome:
-    question = the_property(example.property_id)
+    question = registry.the_property(example.property_id)
     outcome = judge_if_applicable(question, example.case, subject)
     for path in files.paths.values():
         draw_outcome(subject, question, outcome, path, argument="--out")
@@ -138,7 +132,7 @@ def announce_stored(name: str) -> str:
     Running it runs installed code with options that a stranger may have chosen.
     """
     base, options = parse_name("REPORT", name)
-    installed = formulation_names()
+    installed = registry.formulation_names()
     for part in base.split("/"):
         if part not in installed:
             needed = "an installed one: install its plugin, or give --formulation NAME"
@@ -164,7 +158,7 @@ def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFile
     if PARAVIEW in files.names and len(names) > 1:
         file_for_many = f"{files.names[PARAVIEW]} for {len(names)} formulations"
         raise MisuseError("--out", file_for_many, "one --formulation: a .vtu file holds one solution")
-    scene = solve_scene(case, [load_formulation(name, limits) for name in names])
+    scene = solve_scene(case, [registry.load_formulation(name, limits) for name in names])
     for suffix, path in files.paths.items() if scene.solutions else ():
         if suffix == PARAVIEW:
             write_vtu(scene, scene.solutions[0], path)
@@ -209,8 +203,8 @@ def audit(report: Path, share: float, options: RunOptions) -> int:
     except (KeyError, ValueError):
         raise MisuseError("REPORT", "a report without its number of cases or its seed", "an undamaged report") from None
     sampling, limits = Sampling.at(read_place(options), examples, seed), options.limits()
-    subjects = [the_subject(name, limits) for name in run.formulations]
-    result = audit_run(run, subjects, [the_property(id_) for id_ in run.properties], sampling, share)
+    subjects = [registry.the_subject(name, limits) for name in run.formulations]
+    result = audit_run(run, subjects, [registry.the_property(id_) for id_ in run.properties], sampling, share)
     with TemporaryDirectory() as folder:
         derived = Path(folder) / "derived.nc"
         write(result.derived, derived)

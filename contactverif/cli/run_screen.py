@@ -1,8 +1,7 @@
-"""The screens of a run: what is wrong and what is kept in few lines, or every row with the coverage of its cases.
+"""The screens of a run, in memory or from a file: a few lines, or every row with the coverage of its cases.
 
-A screen reads a `Run`, from memory or from a file, and needs no more than 80 columns. In few lines each formulation
-has what breaks a promise first, with the most telling mesh, then what fails without one, then what fails as stated, and
-at last the families of what passes. Words of the table of all rows are explained below it.
+A screen needs no more than 80 columns. In few lines each formulation has what breaks a promise first, with the most
+telling mesh, then what fails without one, what fails as stated, and the families of what passes.
 """
 
 from __future__ import annotations
@@ -19,25 +18,10 @@ from rich.text import Text
 from contactverif.api.run_files import REPORT, RUN_FILES, write_run
 from contactverif.cli.console import columns, echo, fold, indent_below, line, show, show_verbatim
 from contactverif.cli.options import OutputFiles, Screen
+from contactverif.contract import result as results
 from contactverif.contract.counterexample import Counterexample, counterexamples, failing_examples
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
-from contactverif.contract.result import (
-    BROKEN_BY_FAILING,
-    NOT_HERE,
-    NOT_JUDGED,
-    OMITTED,
-    OPPOSITE_SIGN,
-    CaseCounts,
-    Coverage,
-    Result,
-    Row,
-    Run,
-    add_by_kind,
-    coverage_of,
-    percent,
-    total,
-    whole_percent,
-)
+from contactverif.contract.result import CaseCounts, Coverage, Result, Row, Run
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.plot.text import as_text
@@ -146,7 +130,7 @@ def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], signs: Sequence[s
         names = []
         for row in by_rank(rows):
             if row.result is result and row.unexpected:
-                otherwise = result is Result.BROKEN_PROMISE and row.unexpected != BROKEN_BY_FAILING
+                otherwise = result is Result.BROKEN_PROMISE and row.unexpected != results.BROKEN_BY_FAILING
                 names.append(f"{row.formulation} {row.property_id}{f' ({row.unexpected})' if otherwise else ''}")
         names += not_loaded if result is Result.NOT_LOADED else []
         if names:
@@ -210,7 +194,7 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
     title = f"{name}: {', '.join(words)}" if words else name
     yield fold(title, width, "bold red" if wrong else "bold", indent=0)
     if name in run.opposite_signs:
-        yield fold(OPPOSITE_SIGN, width, "bold red", indent=2)
+        yield fold(results.OPPOSITE_SIGN, width, "bold red", indent=2)
     if name in run.diagnoses:
         yield fold(f"diagnosis: {run.diagnoses[name]}", width, "bold", indent=2)
     if (first := first_failure(rows)) is not None:
@@ -223,7 +207,7 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
         yield Text("")
     yield from _part("also wrong", wrong[1:], width, _MOST_WRONG)
     if omitted := [row for row in rows if row.omitted]:
-        reason = omitted[0].reason.removeprefix(OMITTED)
+        reason = omitted[0].reason.removeprefix(results.OMITTED)
         yield fold(f"{len(omitted)} properties were not asked: {reason}. --keep-going asks them all.", width, indent=0)
     for row in rows:  # A doubt about a formulation that passes, or how stiff its springs are.
         if row.result is Result.PASS and (remark := "; ".join(filter(None, (row.suspicion, _finding(row))))):
@@ -259,7 +243,7 @@ def _words(row: Row, room: int) -> str:
 
     Where there is no room for all, it is the name of the number that is cut.
     """
-    before = f"{row.unexpected}; " if row.unexpected not in ("", BROKEN_BY_FAILING, NOT_JUDGED) else ""
+    before = f"{row.unexpected}; " if row.unexpected not in ("", results.BROKEN_BY_FAILING, results.NOT_JUDGED) else ""
     behind = f"; known: {row.known}" if row.known else ""
     if row.verdict is not Verdict.FAIL or row.breach or row.closest is None or row.fails_in_words:
         return _shorten(f"{before}{row.reason}{behind}".removesuffix("; "), room)
@@ -279,8 +263,8 @@ def _families(rows: Sequence[Row], width: int) -> Iterator[Text]:
     for row in rows:
         if row.result not in (Result.NOT_APPLICABLE, Result.NOT_PROVIDED):
             passing.setdefault(row.info.family, []).append(row.result is Result.PASS)
-        if row.reason.startswith(NOT_HERE):
-            families = lacking.setdefault(row.reason.removeprefix(NOT_HERE), {})
+        if row.reason.startswith(results.NOT_HERE):
+            families = lacking.setdefault(row.reason.removeprefix(results.NOT_HERE), {})
             families.setdefault(row.info.family, []).append(row.property_id)
     words = [f"{family} {sum(each)} of {len(each)}" for family, each in passing.items() if any(each)]
     if words:
@@ -358,7 +342,7 @@ def run_table(run: Run, width: int) -> Iterator[Text]:
     is no room. Below the table stands the coverage.
     """
     for name in run.opposite_signs:
-        yield fold(f"{name}: {OPPOSITE_SIGN}", width, style="bold red", indent=0)
+        yield fold(f"{name}: {results.OPPOSITE_SIGN}", width, style="bold red", indent=0)
         yield Text("")
     yield Text(headline(run.provenance))
     if run.rows:
@@ -404,16 +388,13 @@ def _lines(rows: Sequence[Row], max_width: int) -> Iterator[Text]:
 
 
 def _entries(row: Row) -> tuple[str, ...]:
-    number = row.closest.number if row.closest is not None else None
-    return (
-        row.property_id,
-        _PROMISES[row.promise],
-        str(row.result),
-        f"{row.judged}/{row.planned}" if row.planned else "–",
-        whole_percent(row.contact_share) if row.contact_share is not None else "",
-        _short(number.value) if number is not None else "",
-        f"{number.sign} {_short(number.tolerance)}" if number is not None else "",
-    )
+    judged = f"{row.judged}/{row.planned}" if row.planned else "–"
+    touch = results.whole_percent(row.contact_share) if row.contact_share is not None else ""
+    closest = tolerance = ""
+    if row.closest is not None:
+        number = row.closest.number
+        closest, tolerance = _short(number.value), f"{number.sign} {_short(number.tolerance)}"
+    return row.property_id, _PROMISES[row.promise], str(row.result), judged, touch, closest, tolerance
 
 
 def _short(number: float) -> str:
@@ -434,15 +415,14 @@ def _legend(results: Collection[Result], max_width: int) -> Iterator[Text]:
 
 def coverage_text(run: Run, width: int) -> Iterator[Text]:
     """Yield the shares of undecided and idle cases, then the cases of each kind; properties of equal kinds together."""
-    everything = coverage_of(run)
-    if not everything:
-        return
-    yield from _shares(everything, width)
-    with_kinds: dict[tuple[str, ...], list[Coverage]] = {}
+    everything = results.coverage_of(run)
+    if everything:
+        yield from _shares(everything, width)
+    groups: dict[tuple[str, ...], list[Coverage]] = {}
     for coverage in everything:
         if coverage.kinds:
-            with_kinds.setdefault(tuple(coverage.kinds), []).append(coverage)
-    for group in with_kinds.values():
+            groups.setdefault(tuple(coverage.kinds), []).append(coverage)
+    for group in groups.values():
         yield from _kinds(group, width)
 
 
@@ -457,14 +437,12 @@ def _shares(everything: Sequence[Coverage], width: int) -> Iterator[Text]:
     size = max(len("property"), *(len(each.info.id) for each in incomplete))
     yield line(f"  {'property':{size}}  {'cases':>7}  {'undecided':>9}  {'idle':>7}", style="bold")
     for each in incomplete:
-        shares = f"{percent(each.counts.undecided_share):>9}  {percent(each.counts.idle_share):>7}"
+        shares = f"{results.percent(each.counts.undecided_share):>9}  {results.percent(each.counts.idle_share):>7}"
         yield line(f"  {each.info.id:{size}}  {each.counts.cases:7}  {shares}")
-        reasons = [*each.reasons.items()]
-        for reason, number in reasons[:_MOST_REASONS]:
+        for reason, number in [*each.reasons.items()][:_MOST_REASONS]:
             yield fold(f"{number} undecided: {reason}", width, "dim")
-        if others := reasons[_MOST_REASONS:]:
-            more = sum(number for _, number in others)
-            yield fold(f"{more} undecided for {len(others)} other reasons", width, "dim")
+        if others := [*each.reasons.values()][_MOST_REASONS:]:
+            yield fold(f"{sum(others)} undecided for {len(others)} other reasons", width, "dim")
     if len(incomplete) < len(everything):
         words = "In all other properties every case was decided, and something was in contact."
         yield fold(words, width, "dim", indent=2)
@@ -483,26 +461,22 @@ def _kinds(group: Sequence[Coverage], width: int) -> Iterator[Text]:
         numbers = counts.cases, counts.judged, counts.failed, counts.undecided, counts.idle
         return "  ".join(f"{n:>{len(name)}}" for name, n in zip(_KIND_COLUMNS, numbers, strict=True))
 
-    kinds = add_by_kind(each.kinds for each in group)
-    properties = ", ".join(each.info.id for each in group)
-    yield fold(f"Cases of each kind in {properties}{_together(group)}", width, "bold", indent=0)
+    kinds = results.add_by_kind(each.kinds for each in group)
+    title = f"Cases of each kind in {', '.join(each.info.id for each in group)}{_together(group)}"
+    yield fold(title, width, "bold", indent=0)
     size = min(max(len("kind"), *map(len, kinds)), _LONGEST_KIND)
     yield line(f"  {'kind':{size}}  {'  '.join(_KIND_COLUMNS)}", style="bold")
     for kind, counts in kinds.items():
         style = "yellow" if counts.judged == counts.idle else ""  # Nothing of this kind was judged in contact.
         yield line(f"  {(kind or _NO_KIND)[:size]:{size}}  {cells(counts)}", style=style)
-    yield line(f"  {'all':{size}}  {cells(total(kinds.values()))}", style="dim")
-    weak = {
-        each.info.id: ", ".join(
-            f"{kind or _NO_KIND} {counts.judged}/{counts.cases}"
-            for kind, counts in each.kinds.items()
-            if counts.judged < counts.cases / 2
-        )
-        for each in (group if len(group) > 1 else ())
-    }
-    if any(weak.values()):
+    yield line(f"  {'all':{size}}  {cells(results.total(kinds.values()))}", style="dim")
+    weak: dict[str, list[str]] = {}
+    for each in group if len(group) > 1 else ():
+        for kind, counts in each.kinds.items():
+            if counts.judged < counts.cases / 2:
+                weak.setdefault(each.info.id, []).append(f"{kind or _NO_KIND} {counts.judged}/{counts.cases}")
+    if weak:
         yield line("  Kinds of which a property could judge less than half:", style="yellow")
     for id_, words in weak.items():
-        if words:
-            yield fold(f"{id_}: {words}", width, "dim")
+        yield fold(f"{id_}: {', '.join(words)}", width, "dim")
     yield Text("")

@@ -15,10 +15,10 @@ from handmade_run import run_with
 from subjects import Changed, load_subject
 
 from contactverif import Case, End, Placing, Rectangle, Subject, named_case, two_blocks
-from contactverif.cli import replay
 from contactverif.cli.listing import MEANINGS
 from contactverif.contract.result import NotLoaded
 from contactverif.mechanics.scene import has_bodies, scene_of
+from contactverif.plugins import registry
 from contactverif.problems.catalogue import OPTIONS, SCENES, NamedBlocks, load_scene
 from contactverif.run import judge as judging
 from contactverif_reports.netcdf.differences import same_data
@@ -131,12 +131,12 @@ def test_draw_writes_for_paraview(ask: Ask, tmp_path: Path) -> None:
 def test_a_formulation_that_cannot_be_asked_is_a_line(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = replay.load_formulation
+    real = registry.load_formulation
 
     def load(name: str, limits: Any) -> Any:
         return NotLoaded(name, "no licence") if name == "nts" else real(name, limits)
 
-    monkeypatch.setattr(replay, "load_formulation", load)
+    monkeypatch.setattr(registry, "load_formulation", load)
     answer = ask("draw --scene c -f nts -f vts-ppt --out", tmp_path / "c.png")
     assert (answer.status, answer.err) == (1, "")
     assert "\nnts: not loaded: no licence\n" in answer.out
@@ -154,7 +154,7 @@ def test_draw_says_what_to_try_where_newtons_method_diverges(
     plugin = load_subject("vts-ppt").with_penalty(1e4).plugin
     plugin = Changed(plugin, tangent=lambda *state: -1e4 * np.eye(state[-1].size))
     diverging = Subject("mine", lambda *, penalty: plugin)
-    monkeypatch.setattr(replay, "load_formulation", lambda name, limits: diverging)
+    monkeypatch.setattr(registry, "load_formulation", lambda name, limits: diverging)
     answer = ask("draw --scene c -f mine --out", tmp_path / "c.svg", columns=80)
     assert answer.status == 0
     assert "diverged" in answer.out
