@@ -50,9 +50,9 @@ def penalty_blocks(upper: Any, lower: Any, penalty: float) -> list[list[Any]]:
     )
     common, of_1, of_2 = intersect(trace_1, trace_2)
     bases = []
-    for mesh, trace, facets, own in ((upper, trace_1, facets_1, of_1), (lower, trace_2, facets_2, of_2)):
-        quadrature = elementwise_quadrature(trace, common, own, intorder=2)
-        bases.append(skfem.FacetBasis(mesh, ELEMENT, facets=facets[own], quadrature=quadrature))
+    for mesh, trace, facets, numbers in ((upper, trace_1, facets_1, of_1), (lower, trace_2, facets_2, of_2)):
+        quadrature = elementwise_quadrature(trace, common, numbers, intorder=2)
+        bases.append(skfem.FacetBasis(mesh, ELEMENT, facets=facets[numbers], quadrature=quadrature))
     form = skfem.BilinearForm(squared_gap)
     return [[form.assemble(bases[j], bases[i], idx=(j, i), penalty=penalty) for j in range(2)] for i in range(2)]
 

@@ -1,4 +1,4 @@
-"""What a run of `verify` prints and leaves behind: few lines or the table, pictures, a run that is killed."""
+"""The command `verify`: its few lines or its table, pictures, what a run that is killed leaves, and the memory."""
 
 import os
 import pty
@@ -364,11 +364,11 @@ def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask,
     """Without cells nobody knows on which side the base lies; --flip says that it is the other one."""
     mesh = meshio.read(PUNCH)
     number = int(mesh.field_data["base"][0])
-    kept = [index for index, block in enumerate(mesh.cells) if block.type in ("line", "triangle")]
-    tags = [mesh.cell_data["gmsh:physical"][index] for index in kept]
+    indices = [index for index, block in enumerate(mesh.cells) if block.type in ("line", "triangle")]
+    tags = [mesh.cell_data["gmsh:physical"][index] for index in indices]
     for name in ("as.msh", "turned.msh"):
         blocks = []
-        for index, tag in zip(kept, tags, strict=True):
+        for index, tag in zip(indices, tags, strict=True):
             block = mesh.cells[index]
             turns = name == "turned.msh" and block.type == "line" and (tag == number).all()
             blocks.append((block.type, block.data[:, ::-1] if turns else block.data))
@@ -439,14 +439,14 @@ def test_the_bar_is_for_a_terminal_and_leaves_a_pipe_alone() -> None:
     """Standard error is a terminal, standard output a pipe: the bar is there, and the table has no trace of it."""
     arguments = command("verify nts -p purity --examples 40 --seed 1")
     ours, theirs = pty.openpty()
-    shown = bytearray()
+    screen = bytearray()
     try:
         variables = environment(TERM="xterm")
         with subprocess.Popen(arguments, env=variables, stdout=subprocess.PIPE, stderr=theirs, text=True) as running:
             os.close(theirs)
             try:
                 while piece := os.read(ours, 4096):
-                    shown += piece
+                    screen += piece
             except OSError:  # the other end is closed
                 pass
             assert running.stdout is not None
@@ -454,7 +454,7 @@ def test_the_bar_is_for_a_terminal_and_leaves_a_pipe_alone() -> None:
     finally:
         os.close(ours)
     alone = subprocess.run(arguments, env=environment(), capture_output=True, text=True, check=True)
-    assert b"nts purity: judging" in shown
+    assert b"nts purity: judging" in screen
     assert out == alone.stdout
     assert "\x1b" not in out
     assert "\r" not in out

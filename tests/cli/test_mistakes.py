@@ -1,4 +1,4 @@
-"""What a user's mistake looks like: one line that says what is needed, and nothing is judged, solved or written."""
+"""The mistakes of a user: each is one line that says what is needed, and nothing is judged, solved or written."""
 
 from pathlib import Path
 from typing import Any
