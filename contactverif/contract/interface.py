@@ -111,9 +111,9 @@ class Surface:
 
     def measures(self, nodes: FloatArray) -> FloatArray:
         """Return the lengths of segments, or the areas of faces (n_faces,); a quadrilateral is bilinear."""
-        corners = nodes[self.faces]
         if self.faces.shape[1] == SEGMENT:
             return self.lengths(nodes)
+        corners = nodes[self.faces]
         if self.faces.shape[1] == TRIANGLE:
             triangles: FloatArray = np.linalg.norm(turns_of(corners)[:, 0], axis=1) / 2
             return triangles
@@ -373,9 +373,8 @@ def _check_chains(segments: IntArray) -> None:
         loop = f"segment {loops[0]} that begins and ends at node {segments[loops[0], 0]}"
         raise MisuseError("segments", loop, "two nodes")
     for end, verb in ((0, "begin"), (1, "end")):
-        numbers = np.sort(segments[:, end])
-        if (numbers[1:] == numbers[:-1]).any():
-            numbers, counts = np.unique(numbers, return_counts=True)
+        numbers, counts = np.unique(segments[:, end], return_counts=True)
+        if counts.max() > 1:
             node = numbers[np.argmax(counts)]
             meeting = ", ".join(map(str, np.flatnonzero(segments[:, end] == node)[:4]))
             needed = "chains: a node begins at most one segment and ends at most one (body on the left throughout)"

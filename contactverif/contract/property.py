@@ -454,7 +454,6 @@ def _in_space(question: Property, faces: tuple[int, ...]) -> Property:
 
 
 def _find_defined(module: str, name: str, changes: Mapping[str, Any]) -> Property:
-    """Return the property that a module defines under a name, with changes."""
     question: Property = getattr(import_module(module), name)
     return replace(question, **changes) if changes else question
 

@@ -519,7 +519,6 @@ def _has_bit(values: NDArray[Any], mask: int, number: int) -> bool:
 
 
 def _reader_of(column: ReportColumn, values: NDArray[Any], axes: Axes) -> Callable[[int], Any]:
-    """Return the function that makes the value of a record by its number."""
     if column.kind == "words":
         return lambda number: str(values[number])
     if column.kind == "place":
@@ -609,7 +608,6 @@ def _constant(check: Callable[[Any], Any], plain: Callable[[Any], Any] = lambda 
 
 @cache
 def _codec_of(hint: Any) -> _Codec:
-    """Return the codec of an annotation."""
     if hint in _LEAVES:
         return _LEAVES[hint]
     if is_dataclass(hint):
@@ -628,15 +626,10 @@ def _record_codec(kind: Any) -> _Codec:
             attribute, hint = hint.__metadata__
         parts.append((name, attrgetter(attribute), _codec_of(hint)))
     names = [name for name, _, codec in parts if codec.has_form]
-    writers = [(getter, codec.write, codec.has_form) for _, getter, codec in parts]
 
     def write(record: Any, numbers: list[float]) -> Form:
-        form = []
-        for getter, write_part, has_form in writers:
-            part = write_part(getter(record), numbers)
-            if has_form:
-                form.append(part)
-        return tuple(form)
+        forms = [(codec.has_form, codec.write(getter(record), numbers)) for _, getter, codec in parts]
+        return tuple(form for has_form, form in forms if has_form)
 
     def bind(form: Any) -> _Reader:
         of_part = dict(zip(names, form, strict=True))
@@ -646,8 +639,7 @@ def _record_codec(kind: Any) -> _Codec:
         if not readers:
             record = kind(**words)
             return lambda _: record
-        pairs = list(readers.items())
-        return lambda rest: kind(**words, **{name: reader(rest) for name, reader in pairs})
+        return lambda rest: kind(**words, **{name: reader(rest) for name, reader in readers.items()})
 
     return _Codec(write, bind, has_numbers=any(codec.has_numbers for _, _, codec in parts))
 
@@ -691,7 +683,7 @@ def _mapping_codec(_: Any, value_hint: Any) -> _Codec:
 
     def write(values: Any, numbers: list[float]) -> Form:
         parts = [codec.write(value, numbers) for value in values.values()]
-        names = tuple(map(_plain, values))
+        names = tuple(map(str.__str__, values))  # A plugin's words may be of a type of its own.
         return (names, tuple(parts)) if codec.has_form else names
 
     def bind(form: Any) -> _Reader:
@@ -718,10 +710,6 @@ def _sequence_codec(hint: Any, *_: Any, kind: type = tuple) -> _Codec:
         return lambda rest: kind([reader(rest) for reader in readers])
 
     return _Codec(write, bind, has_numbers=codec.has_numbers)
-
-
-def _plain(word: str) -> str:
-    return word if type(word) is str else str.__str__(word)  # A plugin's may be of a type of its own.
 
 
 def _check(form: Any, fits: bool) -> Any:
@@ -751,7 +739,7 @@ _LEAVES: dict[Any, _Codec] = {
     float: _number(next),
     int: _number(_read_int),
     bool: _constant(lambda form: _check(form, type(form) is bool), bool),
-    str: _constant(_check_word, _plain),
+    str: _constant(_check_word, str.__str__),
 }
 _OF_ORIGINS: dict[Any, Callable[..., _Codec]] = {
     Literal: lambda *words: _constant(lambda form: _check(form, form in words)),

@@ -343,7 +343,6 @@ class CheckedFormulation:
             return [getattr(self, verb)(*arguments) for verb, *arguments in paired]
 
     def _check_tangent(self, verb: str, tangent: Any, size: int) -> Any:
-        """Return a copy of the tangent (size, size), dense or sparse; an error begins with the verb."""
         if not (isinstance(tangent, np.ndarray) or sparse_of_scipy().issparse(tangent)):
             raise ContractError(f"{verb}: returned a {type(tangent).__name__}; needed an array or scipy.sparse")
         if tangent.shape != (size, size):
@@ -355,7 +354,6 @@ class CheckedFormulation:
         return tangent
 
     def _check_size(self, interface: Interface, z: Array) -> None:
-        """Check that z has the positions and the multipliers of the formulation, no more and no less."""
         count = self.n_multipliers(interface)
         if z.shape[-1:] != (interface.n_unknowns + count,):
             needed = f"{interface.n_unknowns} positions and {count} multipliers"
@@ -502,7 +500,14 @@ class EngineSubject(Subject):
             needed = "contactverif.contract.engine.EngineTraits"
             raise ContractError(f"traits: found a {type(traits).__name__}; needed {needed}")
         self.engine_traits = traits
-        self.traits = _as_traits(traits)
+        promises = Promises(
+            patch=PatchPromises(flat=traits.passes_flat_patch),
+            converges=traits.converges,
+            independent_multipliers=True if traits.enforcement == "multiplier" else None,
+        )
+        # A stiffness of its own is near to none that gives way.
+        enforcement = "multiplier" if traits.enforcement == "own" else traits.enforcement
+        self.traits = Traits(promises, Rules(enforcement, "distributed", "current"))
         self.provides = frozenset({SOLVE})
         self.counts_multipliers = False
 
@@ -530,15 +535,3 @@ class EngineSubject(Subject):
         if answer.converged and not np.isfinite(answer.displacements).all():
             raise NonFiniteError("solve: converged, with displacements that are not finite")
         return answer
-
-
-def _as_traits(traits: EngineTraits) -> Traits:
-    """Return the statements of an engine as those of a formulation that is distributed over the current length."""
-    promises = Promises(
-        patch=PatchPromises(flat=traits.passes_flat_patch),
-        converges=traits.converges,
-        independent_multipliers=True if traits.enforcement == "multiplier" else None,
-    )
-    # A stiffness of its own is near to none that gives way.
-    enforcement = "multiplier" if traits.enforcement == "own" else traits.enforcement
-    return Traits(promises, Rules(enforcement, "distributed", "current"))

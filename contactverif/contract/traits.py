@@ -359,7 +359,6 @@ def traits_behind(statement: Callable[[Traits], object], traits: Traits) -> dict
 
 
 def _flatten(group: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the names and values of the traits of a group."""
     for entry in fields(group):
         value = getattr(group, entry.name)
         yield from _flatten(value) if is_dataclass(value) else [(entry.name, value)]
@@ -378,7 +377,6 @@ def _listed_values(kind: type) -> dict[str, tuple[object, ...]]:
 
 
 def _check_values(group: Any, path: str) -> None:
-    """Check that each trait of a group has one of the values that its annotation lists."""
     for name, values in _VALUES[type(group)].items():
         if getattr(group, name) not in values:
             needed = ", ".join(map(repr, values))

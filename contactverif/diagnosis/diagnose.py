@@ -47,7 +47,6 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
 
 
 def _diagnose_scale(subject: Subject) -> str:
-    """Return at which size of the mesh forces over size are others than before; empty if they never are."""
     if subject.traits.rules.enforcement != "penalty":
         return ""
     reference = _scaled_forces(subject, 1.0)
@@ -69,7 +68,6 @@ def _scaled_forces(subject: Subject, factor: float) -> FloatArray:
 
 
 def _diagnose_memory(subject: Subject) -> str:
-    """Return which call lets a later one answer otherwise; empty if none of these does."""
     state = flat_state()
     interface, z = state.case.interface, state.case.z
     slid = z.copy()

@@ -88,7 +88,6 @@ def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
 
 
 def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> Iterator[str]:
-    """Yield the patterns of the forces of a uniform penetration; none if they are right."""
     pushes, n = forces[:, 1], state.n_slave_nodes
     if not forces.any():
         yield "there is no force at all where the surfaces penetrate"
@@ -237,7 +236,6 @@ def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
 
 
 def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
-    """Return on which side the forces are wrong, and whether their sum is."""
     slave, master = ((pushes[nodes], state.exact[nodes], state.along[nodes]) for nodes in state.sides)
     if same(*slave[:2]):
         return "the forces on the slave are right, those on the master are not" + _total(*master[:2])
@@ -308,7 +306,6 @@ def _find_lost_places(subject: Subject) -> str:
 
 
 def _diagnose_turned(subject: Subject) -> str:
-    """Return by how many quarters the flat state must be turned until its forces do not turn with it."""
     state = flat_state()
     interface, positions = state.case.interface, state.case.positions
     expected = None
@@ -340,7 +337,6 @@ def _diagnose_digits(subject: Subject) -> str:
 
 
 def _diagnose_balance(subject: Subject) -> str:
-    """Return how the forces on a tilted slave do not balance: by their directions, or by their moments."""
     state = flat_state(slope=_TILT, depth=1.0)
     n, pushes = state.n_slave_nodes, pushes_of(subject, state)
     on_slave, on_master = pushes[:n].sum(axis=0), pushes[n:].sum(axis=0)
@@ -367,7 +363,6 @@ def _name_direction(force: FloatArray) -> str:
 
 
 def _diagnose_law(subject: Subject) -> str:
-    """Return how the force depends on a uniform penetration, where it is not proportional to it."""
     depths = np.array([2.0**-power for power in _POWERS])
     states = [flat_state(depth=depth) for depth in depths]
     shares = np.array([pushes_of(subject, state)[:, 1].sum() / state.exact.sum() for state in states])

@@ -83,10 +83,8 @@ def test_what_is_not_finite_fails_before_anything_is_compared(value: float) -> N
 @pytest.mark.parametrize("tolerance", [nan, inf, -inf, np.float64(nan)])
 @pytest.mark.parametrize("value", [-1.0, 0.0, 1.0, 1e300])
 def test_a_tolerance_that_is_not_finite_passes_nothing_and_accuses_nobody(value: float, tolerance: float) -> None:
-    of_defect, of_slope = (
-        measurement(value, tolerances=(tolerance, 1.9)),
-        measurement(slope=value, tolerances=(1.0, tolerance)),
-    )
+    of_defect = measurement(value, tolerances=(tolerance, 1.9))
+    of_slope = measurement(slope=value, tolerances=(1.0, tolerance))
     assert judge(QUESTION, of_defect) == (Verdict.UNDECIDED, f"the tolerance of defect is {tolerance}")
     assert judge(QUESTION, of_slope) == (Verdict.UNDECIDED, f"the tolerance of slope is {tolerance}")
     assert MOST.check(value, tolerance).ratio == inf
