@@ -19,14 +19,7 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 from contactverif.contract.subject import ENGINE
-from contactverif.plugins.registry import (
-    ENGINE_PROPERTIES,
-    ENGINES,
-    FORMULATIONS,
-    PROPERTIES,
-    files_within,
-    names_within,
-)
+from contactverif.plugins import registry
 
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
 _CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
@@ -110,16 +103,16 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     A version says too little while an author works on a plugin: a run goes on only with the same code.
     """
     named = {
-        FORMULATIONS: {name for text in formulations for name in names_within(text)},
-        ENGINES: {text.removeprefix(ENGINE).partition(":")[0] for text in formulations},
-        PROPERTIES: set(properties),
-        ENGINE_PROPERTIES: set(properties),
+        registry.FORMULATIONS: {name for text in formulations for name in registry.names_within(text)},
+        registry.ENGINES: {text.removeprefix(ENGINE).partition(":")[0] for text in formulations},
+        registry.PROPERTIES: set(properties),
+        registry.ENGINE_PROPERTIES: set(properties),
     }
     modules = {"contactverif"}
     for group, names in named.items():
         modules |= {entry.module for entry in metadata.entry_points(group=group) if entry.name in names}
     packages = sorted({module.partition(".")[0] for module in modules})
-    files = sorted({path for text in formulations for path in files_within(text)})  # Those that formulations load.
+    files = sorted({path for text in formulations for path in registry.files_within(text)})  # They load these.
     digests = {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}
     return digests | {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
 

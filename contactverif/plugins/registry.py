@@ -18,7 +18,7 @@ import re
 import subprocess
 import sys
 import typing
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
@@ -41,17 +41,11 @@ from contactverif.contract.errors import (
 from contactverif.contract.property import Property
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import ENGINE, EngineSubject, Subject
+from contactverif.isolation import remote
 from contactverif.isolation.box import kernel_folder
 from contactverif.isolation.host import host_of
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.remote import (
-    Wrapper,
-    engine_program,
-    load_remote,
-    load_remote_engine,
-    python_program,
-    survey,
-)
+from contactverif.isolation.remote import Wrapper
 
 if TYPE_CHECKING:
     from contactverif.problems.problem import Problem
@@ -157,7 +151,7 @@ def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
     installed = entries_by_name(FORMULATIONS)
     if limits is None:
         return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
-    items = survey(_worker(), tuple(installed), limits)
+    items = remote.survey(_worker(), tuple(installed), limits)
     return tuple(name for name, item in zip(installed, items, strict=True) if not isinstance(item, Wrapper))
 
 
@@ -220,7 +214,7 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
     if limits is None:
         make = _load_factory(text)
         return make if isinstance(make, NotLoaded) else subject_of(text, make)
-    return load_remote(_worker(), text, _with_store(limits, text))
+    return remote.load_remote(_worker(), text, _with_store(limits, text))
 
 
 def start_loading(text: str, limits: Limits) -> None:
@@ -267,7 +261,7 @@ def _compile_once(packages: frozenset[str]) -> None:
 
 
 def _worker() -> tuple[str, ...]:
-    return python_program(str(Path(__file__).with_name("plugin_worker.py")))
+    return remote.python_program(str(Path(__file__).with_name("plugin_worker.py")))
 
 
 def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
@@ -287,7 +281,7 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
 def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper | NotLoaded, ...]:
     """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
     names = formulation_names()
-    return tuple(map(load_with_defaults, names) if limits is None else survey(_worker(), names, limits))
+    return tuple(map(load_with_defaults, names) if limits is None else remote.survey(_worker(), names, limits))
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
@@ -326,10 +320,10 @@ def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotL
         make = _callable_of(text, installed[name], "**options")
         if isinstance(make, NotLoaded):
             return make
-        _check_options(text, make, _parameters_of(make), options)
+        _check_options(text, make, options)
     if limits is not None:  # The modules of another interpreter need not import here, so its options are not checked.
-        program = engine_program(installed[name][0].value, options, None if python is None else str(python))
-        return load_remote_engine(program, text, limits)
+        program = remote.engine_program(installed[name][0].value, options, None if python is None else str(python))
+        return remote.load_remote_engine(program, text, limits)
     try:
         return EngineSubject(text, make(**options))
     except ContractError as error:
@@ -355,15 +349,14 @@ def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     if outermost not in installed:
         raise unknown_name_error("formulation", outermost, installed)
     make = _callable_of(text, installed[outermost], "*, penalty, …")
-    parameters = {} if isinstance(make, NotLoaded) else _parameters_of(make)
-    wraps = "inner" in parameters
+    wraps = not isinstance(make, NotLoaded) and "inner" in _parameters_of(make)
     outer, slash, inner_text = text.partition("/")
     if ":" in outer and not wraps:  # A "/" behind the options of a name that wraps nothing belongs to a value.
         outer, slash = text, ""
     name, options = parse_name("formulation", outer, _FORM)
     if isinstance(make, NotLoaded):
         return make
-    _check_options(text, make, parameters, options)
+    _check_options(text, make, options)
     if not slash:
         if wraps:
             raise MisuseError("formulation", repr(text), f"a formulation that {name} wraps: {name}/NAME")
@@ -400,10 +393,9 @@ def _required_among(parameters: Mapping[str, inspect.Parameter]) -> list[str]:
     return [name for name, parameter in parameters.items() if parameter.default is parameter.empty]
 
 
-def _check_options(
-    text: str, make: Callable[..., Any], parameters: Mapping[str, inspect.Parameter], options: Mapping[str, Any]
-) -> None:
+def _check_options(text: str, make: Callable[..., Any], options: Mapping[str, Any]) -> None:
     """Refuse unknown and missing options, and values that do not fit their annotation, without calling the factory."""
+    parameters = _parameters_of(make)
     by_name = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
     known = {name: entry for name, entry in parameters.items() if name not in _RESERVED and entry.kind in by_name}
     names = f"it has {', '.join(known)}" if known else "it has none"
@@ -456,14 +448,11 @@ def property_ids(*, engines: bool = False) -> tuple[str, ...]:
 
 def matching_ids(globs: Sequence[str], *, engines: bool = False) -> tuple[str, ...]:
     """Return the ids of the properties that `load_properties` loads; it imports none of them."""
-    return _matches(globs, property_ids(engines=engines))
-
-
-def _matches(globs: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
+    ids = property_ids(engines=engines)
     for glob in globs:
-        if not any(fnmatchcase(name, glob) for name in names):
-            raise unknown_property_error("property", glob, names)
-    return tuple(name for name in names if not globs or any(fnmatchcase(name, glob) for glob in globs))
+        if not any(fnmatchcase(name, glob) for name in ids):
+            raise unknown_property_error("property", glob, ids)
+    return tuple(name for name in ids if not globs or any(fnmatchcase(name, glob) for glob in globs))
 
 
 def unknown_property_error(argument: str, name: str, ids: Iterable[str]) -> MisuseError:
@@ -494,7 +483,7 @@ def load_properties(globs: Sequence[str] = ("*",), *, engines: bool = False) -> 
         If a pattern matches nothing.
     """
     installed = installed_properties(engines=engines)
-    return tuple(load_property(name, installed) for name in _matches(globs, installed))
+    return tuple(load_property(name, installed) for name in matching_ids(globs, engines=engines))
 
 
 def load_property(name: str, installed: Mapping[str, Sequence[EntryPoint]]) -> Property | NotLoaded:

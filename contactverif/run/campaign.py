@@ -58,9 +58,7 @@ class Shard:
         return msgspec.structs.replace(plan, shard=self.text)
 
 
-class EndMark(msgspec.Struct, frozen=True):
-    """The record of a shard that is done: how many outcomes its store has."""
-
+class _EndMark(msgspec.Struct, frozen=True):
     n_outcomes: int
 
 
@@ -78,8 +76,7 @@ def open_shard(folder: Path, plan: Plan) -> Iterator[bool]:
     check_versions(earlier.versions, plan.versions, "--out")
     if difference := _difference(earlier, plan, shard_too=True):
         raise MisuseError("--out", f"{folder.name} of another plan ({difference})", "the same plan, or another folder")
-    mark = _read_mark(folder)
-    if mark is not None and mark.n_outcomes == Store(plan, None, [folder]).n_outcomes:
+    if _outcomes_at_end(folder) == Store(plan, None, [folder]).n_outcomes:
         yield True
         return
     with hold_journal(folder, "--out"):
@@ -89,7 +86,7 @@ def open_shard(folder: Path, plan: Plan) -> Iterator[bool]:
 def mark_done(folder: Path, plan: Plan) -> int:
     """Mark a shard as done, and return how many outcomes its store has."""
     n_outcomes = Store(plan, None, [folder]).n_outcomes
-    write_record(folder / _MARK, EndMark(n_outcomes))
+    write_record(folder / _MARK, _EndMark(n_outcomes))
     return n_outcomes
 
 
@@ -107,11 +104,11 @@ def read_shards(folder: Path, argument: str) -> tuple[Plan, tuple[Path, ...]]:
             raise MisuseError(argument, f"{shard.folder} with another plan than {others}", "shards of one campaign")
     for shard, store, plan in zip(shards, stores, plans, strict=True):
         needed = f"its end: the same campaign with --shard {shard.text} goes on"
-        mark = _read_mark(store)
-        if mark is None:
+        n_outcomes = _outcomes_at_end(store)
+        if n_outcomes is None:
             raise MisuseError(argument, f"{shard.folder}, which is not finished", needed)
-        if (n_readable := Store(plan, None, [store]).n_outcomes) < mark.n_outcomes:
-            flaw = f"{shard.folder}, damaged: {n_readable} of {mark.n_outcomes} outcomes can be read"
+        if (n_readable := Store(plan, None, [store]).n_outcomes) < n_outcomes:
+            flaw = f"{shard.folder}, damaged: {n_readable} of {n_outcomes} outcomes can be read"
             raise MisuseError(argument, flaw, needed)
     return plans[0], stores
 
@@ -131,11 +128,13 @@ def _list_shards(folder: Path, argument: str) -> list[Shard]:
     return shards
 
 
-def _read_mark(folder: Path) -> EndMark | None:
+def _outcomes_at_end(folder: Path) -> int | None:
+    """Return how many outcomes a shard had at its end; None if it is not finished."""
     try:
-        return read_record(folder / _MARK, EndMark)
+        mark = read_record(folder / _MARK, _EndMark)
     except OSError:
         return None
+    return None if mark is None else mark.n_outcomes
 
 
 def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:

@@ -153,9 +153,7 @@ def journal_folder(output: Path, argument: str = "--out") -> Path:
 
 
 @contextmanager
-def new_journal(
-    folder: Path, plan: msgspec.Struct, outputs: Sequence[Path] = (), argument: str = "--out"
-) -> Iterator[str]:
+def new_journal(folder: Path, plan: msgspec.Struct, outputs: Sequence[Path] = ()) -> Iterator[str]:
     """Open a block with a new journal, which no other process may use, and into which earlier output files are moved.
 
     Yield the name of the folder to which the journal of an earlier run went; empty if there was none. If a
@@ -166,39 +164,33 @@ def new_journal(
     with ExitStack() as locks:
         try:
             if had_one:
-                with hold_journal(folder, argument):
+                with hold_journal(folder, "--out"):
                     shutil.rmtree(aside, ignore_errors=True)
                     folder.replace(aside)
             _remove_stale(folder)
             part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
             part.mkdir()
             write_record(part / _HEADER, plan)
-            locks.enter_context(hold_journal(part, argument))
+            locks.enter_context(hold_journal(part, "--out"))
             part.replace(folder)
             for path in aside.glob(f"{_EARLIER}.*"):
                 path.replace(folder / path.name)
             keep_earlier(folder, outputs)
         except OSError as error:
             needed = "a folder that may be written to, and a disk that is not full"
-            raise MisuseError(argument, f"{folder.name}: {error.strerror}", needed) from error
+            raise MisuseError("--out", f"{folder.name}: {error.strerror}", needed) from error
         try:
             yield aside.name if had_one else ""
         except MisuseError:
             if not any(path.stat().st_size for path in record_files(folder)):
-                _withdraw(folder, outputs)
+                for target in (output.resolve() for output in outputs):
+                    earlier = folder / f"{_EARLIER}{target.suffix}"
+                    if earlier.exists() and not target.exists():
+                        earlier.replace(target)
+                shutil.rmtree(folder, ignore_errors=True)
+                if aside.exists():
+                    aside.replace(folder)
             raise
-
-
-def _withdraw(folder: Path, outputs: Iterable[Path]) -> None:
-    """Take back what `new_journal` did: the command line was wrong, as it turned out."""
-    for output in outputs:
-        target = output.resolve()
-        earlier = folder / f"{_EARLIER}{target.suffix}"
-        if earlier.exists() and not target.exists():
-            earlier.replace(target)
-    shutil.rmtree(folder, ignore_errors=True)
-    if _aside(folder).exists():
-        _aside(folder).replace(folder)
 
 
 def _remove_stale(folder: Path) -> None:
@@ -212,8 +204,7 @@ def _remove_stale(folder: Path) -> None:
 
 def keep_earlier(folder: Path, outputs: Iterable[Path]) -> None:
     """Move the output files of an earlier run into the journal, so that they are not taken for those of this run."""
-    for output in outputs:
-        target = output.resolve()
+    for target in (output.resolve() for output in outputs):
         if target.exists():
             target.replace(folder / f"{_EARLIER}{target.suffix}")
 

@@ -110,7 +110,12 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         name = worst.case_or_summary.name  # A finite list has named its cases.
         return worst.verdict, f"{name}: {worst.reason}" if name and worst is not row.witness else worst.reason
-    if row.judged < _fewest_judged(row):
+    planned = max(row.planned - row.tally.reasons.get(CLOSED_CHAIN, 0), 1)
+    fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * planned
+    if not any(outcome.case_or_summary.name for outcome in row.outcomes[:1]):
+        # Not a list. Of a few random cases, the one that cannot be judged comes by chance.
+        fewest = min(fewest, max(planned - 1, 1))
+    if row.judged < fewest:
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
         return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
     counts, least = row.tally.counts, row.info.least_contact
@@ -122,14 +127,6 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
         words = f"{counts.judged - counts.idle} of {counts.judged} judged cases in contact, needed {least:.0%}"
         return Verdict.NOT_JUDGED, words
     return Verdict.PASS, ""
-
-
-def _fewest_judged(row: Row) -> float:
-    """Return the least number of judged cases. Of a few random ones, the one that cannot be judged comes by chance."""
-    planned = max(row.planned - row.tally.reasons.get(CLOSED_CHAIN, 0), 1)
-    fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * planned
-    is_list = any(outcome.case_or_summary.name for outcome in row.outcomes[:1])
-    return fewest if is_list else min(fewest, max(planned - 1, 1))
 
 
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:
@@ -147,9 +144,8 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
 def forces_to_draw(question: Property, case: Case, subject: Subject) -> NodalForces | None:
     """Return the forces of a formulation on a case, beside the exact ones where the property knows them."""
     forces = forces_on(case, subject)
-    if forces is None:
-        return None
-    return NodalForces(forces, None if question.exact is None else question.exact(case))
+    exact = None if question.exact is None or forces is None else question.exact(case)
+    return None if forces is None else NodalForces(forces, exact)
 
 
 @dataclass(frozen=True, slots=True)

@@ -227,14 +227,10 @@ def open_row(
     is reported.
     """
     promise = question.promise(subject.traits)
-    row = Row(
-        formulation=subject.name,
-        info=question.info,
-        verdict=Verdict.PASS,
-        promise=promise,
-        promised_by=_words_of_promise(question, subject) if promise else "",
-        known=known,
-    )
+    traits = traits_behind(question.promise, subject.traits) if promise else {}
+    stated = {name: value for name, value in traits.items() if value is not False}  # Of a table, its name says enough.
+    words = (name if isinstance(value, Mapping) else f"{name}={value!r}" for name, value in stated.items())
+    row = Row(subject.name, question.info, Verdict.PASS, promise=promise, promised_by=", ".join(words), known=known)
     if reason := question.refusal_of(subject):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:
@@ -265,23 +261,10 @@ def lacks_witness(subject: Subject, question: Property, sampling: Sampling) -> b
     return stated and subject.traits.witness(question.id) is None
 
 
-def _words_of_promise(question: Property, subject: Subject) -> str:
-    """Return the traits from which a promise to pass follows, in words; of a table, as published forces, its name."""
-    traits = traits_behind(question.promise, subject.traits)
-    stated = {name: value for name, value in traits.items() if value is not False}
-    return ", ".join(name if isinstance(value, Mapping) else f"{name}={value!r}" for name, value in stated.items())
-
-
 def row_of_case(question: Property, subject: Subject, outcome: Outcome) -> Row:
     """Return the row of a case that failed in an earlier run, alone."""
-    return Row(
-        formulation=subject.name,
-        info=question.info,
-        verdict=outcome.verdict,
-        promise=question.promise(subject.traits),
-        reason=outcome.reason,
-        witness=outcome,
-    )
+    promise = question.promise(subject.traits)
+    return Row(subject.name, question.info, outcome.verdict, promise, reason=outcome.reason, witness=outcome)
 
 
 def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -> Case:

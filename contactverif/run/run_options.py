@@ -219,7 +219,7 @@ class RunOptions:
         ids = property_ids(engines=True)
         for unknown in settings.known.keys() - {*ids}:
             raise unknown_property_error("known failure", unknown, ids)
-        matching = {*matching_ids(options.properties or ("*",), engines=has_engine(self.names))} - self.known.keys()
+        matching = {*matching_ids(options.properties, engines=has_engine(self.names))} - self.known.keys()
         known = {name: reason for name, reason in settings.known.items() if name in matching}
         return replace(options, known=self.known | known)
 
@@ -238,7 +238,7 @@ class RunOptions:
             every=False,
             memory=True,
             last_failed=False,
-            properties=matching_ids(self.properties or ("*",), engines=has_engine(self.names)),
+            properties=matching_ids(self.properties, engines=has_engine(self.names)),
             profile=size.name,
             examples=size.examples,
             seed=size.seed,

@@ -291,9 +291,7 @@ def encode(item: Any) -> bytes:
     return buffer.getvalue()
 
 
-def decode(data: bytes) -> Any:
-    """Return what `encode` made bytes of, or raise any error if this process cannot import what it refers to."""
-    return pickle.loads(data)
+decode = pickle.loads  # It raises any error if this process cannot import what the bytes refer to.
 
 
 class _Pickler(pickle.Pickler):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from contactverif import Interface
+from contactverif import Interface, Surface
 
 DEPTH = 1 / 8
 
@@ -21,9 +21,7 @@ def make_bent(seed: int) -> tuple[Interface, Any]:
     slave, master = chains[0], chains[1][::-1] + [random.uniform(-1, 1), 0]
     interface = Interface.from_chains(slave, master)
     x = interface.nodes + random.normal(scale=0.08, size=interface.nodes.shape)
-    angle = random.uniform(-0.4, 0.4)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    x[: len(slave)] = x[: len(slave)] @ turn.T - [0, 0.3]
+    x[: len(slave)] = turn(x[: len(slave)], random.uniform(-0.4, 0.4)) - [0, 0.3]
     return interface, x.ravel()
 
 
@@ -57,11 +55,9 @@ def make_on_grid(kind: str, seed: int, depth: float) -> tuple[Interface, Any]:
     reference, on_slave = x, slice(0, len(slave))
     x = reference - [0, depth] * (np.arange(len(x)) < len(slave))[:, None]
     if kind == "tilted":
-        x[on_slave] = _turn(x[on_slave] - x[on_slave].mean(axis=0), random.uniform(0.05, 0.4)) + x[on_slave].mean(
-            axis=0
-        )
+        x[on_slave] = turn(x[on_slave] - x[on_slave].mean(axis=0), random.uniform(0.05, 0.4)) + x[on_slave].mean(axis=0)
     angle = 0.0 if kind == "flat" else random.uniform(0, 2 * np.pi)
-    reference, x = (np.round(_turn(each, angle) * 2.0**32) / 2.0**32 for each in (reference, x))
+    reference, x = (np.round(turn(each, angle) * 2.0**32) / 2.0**32 for each in (reference, x))
     return Interface.from_chains(reference[on_slave], reference[len(slave) :]), x
 
 
@@ -78,13 +74,26 @@ def make_far(seed: int, ratio: float) -> tuple[Interface, Any]:
     x = reference.copy()
     x[: n_slave + 1, 1] -= 1e-6
     angle, offset = random.uniform(0, 2 * np.pi), random.uniform(0.5, 1.5, 2) * 1e6
-    reference, x = (_turn(each, angle) + offset for each in (reference, x))
+    reference, x = (turn(each, angle) + offset for each in (reference, x))
     return Interface.from_chains(reference[: n_slave + 1], reference[n_slave + 1 :]), x
 
 
-def _turn(x: Any, angle: float) -> Any:
+def make_closed(slave: Any, master: Any) -> Interface:
+    """Return an interface of two closed chains."""
+    rings = (np.column_stack([places := np.arange(len(chain)), np.roll(places, -1)]) for chain in (slave, master))
+    slave_ring, master_ring = rings
+    return Interface(np.vstack([slave, master]), Surface(slave_ring), Surface(master_ring + len(slave)))
+
+
+def turn(x: Any, angle: float) -> Any:
     """Turn positions (n_nodes, 2) about the origin."""
     return x @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+
+def complex_step(formulation: Any, interface: Interface, pairing: Any, z: Any) -> Any:
+    """Return the derivative of the residual on a frozen pairing (n_unknowns, n_unknowns)."""
+    h = 2.0**-100
+    return formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size)).imag.T / h
 
 
 def contact_forces(formulation: Any, interface: Interface, z: Any) -> Any:

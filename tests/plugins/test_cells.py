@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from surfaces import DEPTH, contact_forces, make_bent, make_flat
+from surfaces import DEPTH, contact_forces, make_bent, make_closed, make_flat, turn
 
 from contactverif import Interface, Surface
 from contactverif_mortar import sts
@@ -77,9 +77,7 @@ def test_the_far_side_of_a_ring_is_not_touched() -> None:
     angle = np.linspace(0, 2 * np.pi, 25)[:-1]
     inner = 1.05 * np.column_stack([np.cos(angle), np.sin(angle)])  # a disc, pressed into the hole
     hole = np.column_stack([np.cos(angle + 0.1), np.sin(angle + 0.1)])[::-1]
-    numbers = np.arange(24)
-    ring = np.column_stack([numbers, np.roll(numbers, -1)])
-    interface = Interface(np.vstack([inner, hole]), Surface(ring), Surface(ring + 24))
+    interface = make_closed(inner, hole)
     for here in (interface, interface.swap_roles()):
         _, points = cells_at(here, here.nodes)
         assert len(points) >= 24
@@ -148,7 +146,6 @@ def test_where_averaged_directions_have_crossed_nothing_is_seen_however_all_is_t
     expected, _ = cells_at(interface, interface.nodes, averaged=True)
     assert 1 not in expected.slave
     for angle in np.linspace(0.1, 6.2, 20):
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        cells, _ = cells_at(interface, interface.nodes @ turn.T + [30, -70], averaged=True)
+        cells, _ = cells_at(interface, turn(interface.nodes, angle) + [30, -70], averaged=True)
         assert cells.slave.tolist() == expected.slave.tolist()
         assert cells.master.tolist() == expected.master.tolist()

@@ -1,12 +1,13 @@
 """All formulations answer alike on random bent surfaces: exact tangents, declared balance, batches, plain kernels."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from every_formulation import FORMULATIONS, bent_state, load
+from surfaces import complex_step
 
 import contactverif_mortar
 import contactverif_nts
@@ -31,9 +32,9 @@ UNCOMPILED = NAMES[len(FORMULATIONS) * (np.finfo(np.longdouble).nmant > np.finfo
 KERNELS = ("contactverif.geometry.", "contactverif_nts.", "contactverif_mortar.")
 
 
-def states(formulation: Any, count: int) -> Iterator[tuple[Interface, Any]]:
-    """Yield bent scenes; half of the multipliers are negative, so that some points let go."""
-    yield from (bent_state(formulation, seed) for seed in range(count))
+def states(formulation: Any, count: int) -> list[tuple[Interface, Any]]:
+    """Return bent scenes; half of the multipliers are negative, so that some points let go."""
+    return [bent_state(formulation, seed) for seed in range(count)]
 
 
 @EACH
@@ -43,10 +44,8 @@ def test_the_tangent_is_the_complex_step(name: str) -> None:
     for interface, z in states(formulation, 70):
         pairing = formulation.pair(interface, z)
         tangent = formulation.tangent(interface, pairing, z).toarray()
-        h = 2.0**-100
-        moved = formulation.residual(interface, pairing, z + 1j * h * np.eye(z.size))
         if formulation.traits.promises.tangent == "exact":
-            error = np.abs(moved.imag.T / h - tangent).max()
+            error = np.abs(complex_step(formulation, interface, pairing, z) - tangent).max()
             assert error <= (1e-14 if name.startswith(POINTS_WITH_MULTIPLIERS) else 1e-13) * np.abs(tangent).max()
         active = pairing["active" if "active" in pairing else "pass_1.active"]
         n_active, n_idle = n_active + int(active.sum()), n_idle + int((~active).sum())
@@ -105,7 +104,7 @@ def test_uncompiled_kernels_agree(name: str, monkeypatch: pytest.MonkeyPatch) ->
 @EACH
 def test_a_batch_is_a_loop_bitwise(name: str) -> None:
     formulation = load(name)
-    interface, z = list(states(formulation, 4))[3]
+    interface, z = bent_state(formulation, 3)
     pairing = formulation.pair(interface, z)
     batch = z + 1e-3 * np.random.default_rng(0).normal(size=(3, 2, z.size))
     answers = formulation.residual(interface, pairing, batch)

@@ -6,9 +6,7 @@ The tables of the paper are asked by `patch.flat.published`, with tables by hand
 import numpy as np
 import pytest
 from every_formulation import load
-from surfaces import DEPTH, contact_forces, make_bent, make_flat
-
-from contactverif import Interface, Surface
+from surfaces import DEPTH, contact_forces, make_bent, make_closed, make_flat, turn
 
 PENALTY = 8.0  # p = ε̂ |g| = 1
 EVERY = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
@@ -71,10 +69,8 @@ def test_wholly_past_the_master_open_or_exactly_closed_there_is_no_force(name: s
 @pytest.mark.parametrize("name", EVERY)
 def test_a_node_that_faces_a_free_end_is_not_lost_to_roundoff(name: str, angle: float) -> None:
     interface, z = make_flat([2, 2, 4, 4], [3, 3, 3, 3])
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    formulation = load(name)
-    turned = contact_forces(formulation, interface, (z.reshape(-1, 2) @ turn.T).ravel())
-    assert turned @ turn == pytest.approx(contact_forces(formulation, interface, z), abs=1e-13)
+    turned = contact_forces(load(name), interface, turn(z.reshape(-1, 2), angle).ravel())
+    assert turn(turned, -angle) == pytest.approx(contact_forces(load(name), interface, z), abs=1e-13)
 
 
 @pytest.mark.parametrize("n_master", [1, 2, 7, 100])
@@ -91,9 +87,7 @@ def test_several_and_closed_chains() -> None:
     """A closed square master inside a closed square slave that presses on all four of its sides."""
     inner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)  # body on the left: counter-clockwise
     outer = 0.95 * inner[::-1] * [1, 1]  # a hole: clockwise, a little too small
-    numbers = np.arange(4)
-    ring = np.column_stack([numbers, np.roll(numbers, -1)])
-    interface = Interface(np.vstack([outer, inner]), Surface(ring), Surface(ring + 4))
+    interface = make_closed(outer, inner)
     assert (interface.master.neighbours >= 0).all()
     for name in ("nts-ar", "vts-me", "vts-ppt", "vts-ppt-balanced"):
         forces = contact_forces(load(name), interface, interface.nodes.ravel())
