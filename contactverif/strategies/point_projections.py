@@ -103,9 +103,10 @@ class Projection:
         if segment not in range(len(self.segments)):
             return f"segment {segment} of {len(self.segments)}"
         near = next((near for near in self._exact.segments if near.segment == segment), None)
-        room, gaps = self._room(segment), [self._exact.signed_squared_gap_at(each) for each in self._exact.segments]
+        gaps = [self._exact.signed_squared_gap_at(each) for each in self._exact.segments]
+        length, room = self._length_and_room(segment)
         if near is None:
-            room += self._room(self.tied[0])
+            room += self._length_and_room(self.tied[0])[1]
             there = nearest_segments(self.nodes, self.segments[segment : segment + 1], self.point).squared_distance
             farther = _root_difference(there, self.squared_distance)
             if farther > room:
@@ -113,22 +114,23 @@ class Projection:
         else:
             gaps = [self._exact.signed_squared_gap_at(near)]
             error = 0.0 if xi is None else abs(float(Fraction(xi) - near.xi)) if math.isfinite(xi) else math.inf
-            if not self._length(segment) * error <= room:
+            if not length * error <= room:
                 return f"ξ = {xi!r}, which is {float(near.xi)!r} but for roundoff"
-            if distance is not None and not _root_error(distance, self.squared_distance) <= room:
-                return f"distance {distance!r}, which is {math.sqrt(self.squared_distance)!r} but for roundoff"
+            if distance is not None:
+                error = math.inf
+                if math.isfinite(distance) and distance >= 0:
+                    error = abs(_root_difference(Fraction(distance) ** 2, self.squared_distance))
+                if error > room:
+                    return f"distance {distance!r}, which is {math.sqrt(self.squared_distance)!r} but for roundoff"
         if side is not None and all(side != _sign(gap) and abs(gap) > Fraction(room) ** 2 for gap in gaps):
             return f"side {side}, where the gap is {math.copysign(math.sqrt(abs(gaps[0])), gaps[0]):.3g}"
         return ""
 
-    def _room(self, segment: int) -> float:
-        """Return the length that roundoff explains at a segment."""
-        reach = math.hypot(*(np.array(self.point) - self.nodes[self.segments[segment, 0]]).tolist())
-        return _TOLERANCE * UNIT_ROUNDOFF * (self._length(segment) + reach)
-
-    def _length(self, segment: int) -> float:
+    def _length_and_room(self, segment: int) -> tuple[float, float]:
+        """Return the length of a segment, and the length that roundoff explains there."""
         first, second = self.nodes[self.segments[segment]]
-        return math.hypot(*(second - first).tolist())
+        length, reach = (math.hypot(*arm.tolist()) for arm in (second - first, np.array(self.point) - first))
+        return length, _TOLERANCE * UNIT_ROUNDOFF * (length + reach)
 
 
 def projections(*, kinds: Collection[str] | None = None) -> SearchStrategy[Projection]:
@@ -276,10 +278,10 @@ def _moved_exactly(draw: DrawFn, scene: _Scene) -> _Scene:
     return scene.move(lambda place: (place * turn + way) * scale)
 
 
-def _moved_anyhow(draw: DrawFn, scene: _Scene, reach: float = 8.0, scale: float = 1.0) -> _Scene:
+def _moved_anyhow(draw: DrawFn, scene: _Scene) -> _Scene:
     """Turn a scene by any angle and move it; each coordinate fills its mantissa."""
-    turn, way = _direction(draw), complex(_real(draw, -reach, reach), _real(draw, -reach, reach))
-    return scene.move(lambda place: (place * turn + way) * scale)
+    turn, way = _direction(draw), complex(_real(draw, -8, 8), _real(draw, -8, 8))
+    return scene.move(lambda place: place * turn + way)
 
 
 def _moved_chain(draw: DrawFn, least: int, most: int, steepest: float = 0.3) -> Chain:
@@ -536,8 +538,3 @@ def _sign(value: Fraction) -> int:
 def _root_difference(a: Fraction, b: Fraction) -> float:
     """Return √a − √b without cancellation."""
     return float(a - b) / (math.sqrt(a) + math.sqrt(b)) if a != b else 0.0
-
-
-def _root_error(value: float, square: Fraction) -> float:
-    """Return |value − √square| without cancellation, infinite for a value that is not finite."""
-    return abs(_root_difference(Fraction(value) ** 2, square)) if math.isfinite(value) and value >= 0 else math.inf

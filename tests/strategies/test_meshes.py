@@ -37,6 +37,7 @@ def test_a_state_is_one_of_the_interface(data: st.DataObject, smooth: bool) -> N
 def test_faces_may_have_either_number_of_corners() -> None:
     for corners in (3, 4):
         find(faces(corners=(4, 3)), lambda case, corners=corners: case.slave.faces.shape[1] == corners)  # type: ignore[misc]
+    assert find(states(dim=3, corners=[4]), lambda _: True).interface.slave.faces.shape[1] == 4
 
 
 @pytest.mark.parametrize(
