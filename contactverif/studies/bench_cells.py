@@ -48,14 +48,16 @@ _COUNTS_OF_VERB = {
 }
 
 
+@dataclass(slots=True)
 class Meter:
     """The counts of one solution by name, and the seconds, or the methods that run, of all calls where wanted."""
 
-    def __init__(self, *, timed: bool = False, counted: bool = False) -> None:
-        self.timed, self.counted = timed, counted
-        self.seconds, self.calls = 0.0, 0
-        self.counts = dict.fromkeys(tuple(COUNTS)[1:], 0)  # All but the iterations
-        self.differencing = False
+    timed: bool = False
+    counted: bool = False
+    seconds: float = 0.0
+    calls: int = 0
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(tuple(COUNTS)[1:], 0))  # Not the iterations
+    differencing: bool = False
 
     def call(self, verb: str, plugin: Any, method: Callable[..., Any], *arguments: Any) -> Any:
         """Call a method of the plugin, and count its states and its seconds."""
@@ -167,7 +169,7 @@ def run_cell(
     whole = WholeScene.of_scene(instances[0].scene) if solve else None
     runs = [RunRecord(_NOT_RUN[:] if subject.name in dead else []) for subject in subjects]
     for subject, instance, run in zip(subjects, instances, runs, strict=True):
-        if whole is not None:
+        if whole is not None and not run.is_lost:
             _solve_variants(cell, subject, instance, seed, whole, run)
     forget_bodies()
     running = [number for number, run in enumerate(runs) if not run.is_lost]
@@ -183,20 +185,17 @@ def run_cell(
     finally:
         if was_enabled:
             gc.enable()
-    names = (subject.name for subject in subjects)
-    size = 0 if whole is None else whole.n_free
-    best = 0.0 if whole is None else instances[0].best_pressure
-    return CellRecord(len(instances[0].scene.interface.slave), size, dict(zip(names, runs, strict=True)), best)
+    by_name = {subject.name: run for subject, run in zip(subjects, runs, strict=True)}
+    size, best = (0, 0.0) if whole is None else (whole.n_free, instances[0].best_pressure)
+    return CellRecord(len(instances[0].scene.interface.slave), size, by_name, best)
 
 
 def _solve_variants(
     cell: Cell, subject: Subject, instance: ProblemInstance, seed: int, whole: WholeScene, run: RunRecord
 ) -> None:
-    if run.is_lost:
-        return
     for variant in VARIANTS:
-        other = variant.penalty != RULE.penalty
-        varied = pose(cell, variant.penalty, subject.traits, seed) if other else instance
+        is_rule = variant.penalty == RULE.penalty
+        varied = instance if is_rule else pose(cell, variant.penalty, subject.traits, seed)
         record = SolutionRecord()
         run.solutions.append(record)
         try:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, isnan, nan
+from operator import attrgetter
 
 import numpy as np
 
@@ -148,13 +149,12 @@ def costs_at(results: BenchResults, scene: str, target: float) -> dict[str, Cost
     return {name: cost_of(results, name, scene, target) for name in results.formulations}
 
 
-def cost_ratio(cost: Cost, reference: Cost, number: str) -> Ratio:
-    """Return the ratio of a number to that of the reference."""
-    return _ratio(cost, reference, lambda each: getattr(each, number))
+def cost_ratio(cost: Cost, reference: Cost, number: str | Callable[[Cost], FloatArray]) -> Ratio:
+    """Return the ratio of a number, or of a function of costs, to that of the reference.
 
-
-def _ratio(cost: Cost, reference: Cost, value: Callable[[Cost], FloatArray]) -> Ratio:
-    """Return a ratio; infinite if the formulation does not bring half of the instances there, NaN if the reference."""
+    It is infinite if the formulation does not bring half of the instances there, and NaN if the reference does not.
+    """
+    value = attrgetter(number) if isinstance(number, str) else number
     if not reference.is_usual:
         return Ratio(nan)
     return ratio_of(value(cost), value(reference)) if cost.is_usual else Ratio(inf)
@@ -174,7 +174,7 @@ def total_ratio(cost: Cost, reference: Cost, share: float) -> Ratio:
     A solution is linear systems × (evaluation + system). Systems cost as much as their factorisations do here.
     """
     unit = share * reference.evaluation.mean(axis=1, keepdims=True) / reference.factorisation
-    return _ratio(cost, reference, lambda each: each.systems * (each.evaluation + unit * each.factorisation))
+    return cost_ratio(cost, reference, lambda each: each.systems * (each.evaluation + unit * each.factorisation))
 
 
 def runtimes(results: BenchResults, formulation: str, scene: str, number: str) -> FloatArray:
@@ -310,12 +310,10 @@ def starts_table(results: BenchResults, scene: str) -> Table:
 
 def split_targets(results: BenchResults, scene: str) -> tuple[list[float], str]:
     """Return the errors that a formulation reaches, at the fixed penalty or the best, and a sentence of the rest."""
-    reached: list[float] = []
-    others: list[float] = []
     ways = [(name, variants) for name in results.formulations for variants in ((0,), BEST)]
-    for target in results.targets[scene]:
-        usual = any(cost_of(results, name, scene, target, variants).is_usual for name, variants in ways)
-        (reached if usual else others).append(target)
+    targets = results.targets[scene]
+    reached = [each for each in targets if any(cost_of(results, name, scene, each, at).is_usual for name, at in ways)]
+    others = [target for target in targets if target not in reached]
     words = f"No formulation comes to an error of {' or '.join(map(format_share, others))} on the meshes of {scene}."
     return reached, words if others else ""
 
@@ -333,16 +331,18 @@ def cost_sentences(results: BenchResults, scene: str, target: float) -> list[str
 
 def _put_in_words(ratios: dict[str, Ratio]) -> str:
     """Return who is faster and slower by how much, who is as fast, who is not told apart, and who never gets there."""
-    groups: dict[str, list[str]] = {"faster": [], "slower": [], "as fast": [], "not told apart": [], "never": []}
-    for name, ratio in sorted(ratios.items(), key=lambda pair: pair[1].middle):
-        word = "not told apart" if isnan(ratio.middle) else ratio.word
-        groups[word].append(f"{name} {ratio.text}" if word in ("faster", "slower") else name)
-    titles = {"faster": "less", "slower": "more", "as fast": "alike within 5 %", "never": "never there"}
-    texts = []
-    for word, names in groups.items():
+    order, texts = sorted(ratios.items(), key=lambda pair: pair[1].middle), []
+    for title, word in (
+        ("less", "faster"), ("more", "slower"), ("alike within 5 %", "as fast"),
+        ("not told apart", "not told apart"), ("never there", "never"),
+    ):  # fmt: skip
+        names = [
+            f"{name} {ratio.text}" if word in ("faster", "slower") else name
+            for name, ratio in order
+            if (ratio.word or "not told apart") == word
+        ]
         more = [f"{len(names) - _MOST_NAMES} more"] if len(names) > _MOST_NAMES else []
-        if names:
-            texts.append(f"{titles.get(word, word)}: {', '.join([*names[:_MOST_NAMES], *more])}")
+        texts += [f"{title}: {', '.join([*names[:_MOST_NAMES], *more])}"] if names else []
     return "; ".join(texts)
 
 
@@ -394,20 +394,18 @@ def compare_benches(new: BenchResults, old: BenchResults) -> tuple[BenchChange, 
         speeds.append(float(np.median(finite)) if len(finite) else 1.0)
     changes = []
     for name in names:
-        evaluations, counts = [], []
-        for results, cells in benches:
-            row = results.formulations.index(name)
-            evaluations.append(results.evaluation[row, cells])
-            table = {kind: results.counts[row, cells, :, place] for place, kind in enumerate(COUNTS)}
-            work = {kind.replace("_", " "): results.work[row, cells, place] for place, kind in enumerate(WORK)}
-            counts.append(table | work)
-        differing = {
-            kind: (int(here.sum()), int(counts[1][kind].sum()))
-            for kind, here in counts[0].items()
-            if (here != counts[1][kind]).any()
+        places = [(results, (results.formulations.index(name), cells)) for results, cells in benches]
+        counts = {
+            kind: [results.counts[*at, :, place] for results, at in places] for place, kind in enumerate(COUNTS)
+        } | {
+            kind.replace("_", " "): [results.work[*at, place] for results, at in places]
+            for place, kind in enumerate(WORK)
         }
-        n_processes = min(values.shape[1] for values in evaluations)
-        here, there = (values[:, :n_processes] for values in evaluations)
+        differing = {
+            kind: (int(here.sum()), int(there.sum())) for kind, (here, there) in counts.items() if (here != there).any()
+        }
+        n_processes = min(results.evaluation.shape[-1] for results, _ in benches)
+        here, there = (results.evaluation[at][:, :n_processes] for results, at in places)
         changes.append(BenchChange(name, len(common), differing, ratio_of(here / (speeds[0] / speeds[1]), there)))
     return tuple(changes)
 
@@ -456,11 +454,8 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
     for scene in results.scenes:
         parts += _scene_markdown(results, scene, with_pictures)
     if with_pictures:
-        parts += [
-            "## A thousand times as deep",
-            DEEPEST_START,
-            f"![Who fails from a thousand times the depth of the guess]({STARTS_PICTURE})",
-        ]
+        parts += ["## A thousand times as deep", DEEPEST_START]
+        parts += [f"![Who fails from a thousand times the depth of the guess]({STARTS_PICTURE})"]
         parts += ["## Runtimes", f"![Share of targets that are reached within a time]({RUNTIME_PICTURE})"]
     if report:
         parts.append(

@@ -48,10 +48,7 @@ ALPHA = 1e-6  # The rate of false alarms per row on different cases.
 # 1100 pairs.
 INDEPENDENT_SHARE = 0.5
 REASON_LENGTH = 100  # The number of characters of a reason that are printed.
-FACTOR, ROUNDOFFS = (
-    2.0,
-    2.0,
-)  # A number beyond its tolerance that grows by no more than FACTOR · m + ROUNDOFFS is no news.
+FACTOR, ROUNDOFFS = 2.0, 2.0  # A number m beyond its tolerance that becomes FACTOR · m + ROUNDOFFS at most is no news.
 LEAP = 100.0  # The factor by which a margin within the tolerance must grow to be worth a look.
 LEAST_MARGIN = 0.1  # A margin that stays below this is roundoff.
 

@@ -17,7 +17,7 @@ from contactverif.isolation.limits import Limits
 from contactverif_reports.netcdf import bench_file, file_groups
 from contactverif_reports.netcdf.bench_file import read_bench
 from contactverif_reports.netcdf.read import read_run
-from contactverif_reports.netcdf.stored_cases import check_bodies
+from contactverif_reports.netcdf.stored_outcomes import check_bodies
 
 BENCH = Path(__file__).parents[2] / "reports" / "bench" / "bench.nc"
 N_CHANGED, N_WRITTEN = 15, 5  # Files of each kind of damage, to the bytes and to the contents.

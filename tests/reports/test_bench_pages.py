@@ -61,8 +61,7 @@ def test_a_formulation_that_brings_half_of_the_instances_there_is_compared_on_th
     errors = results.errors.copy()
     errors[0, [6, 7]] = 0.5  # Two of six instances on the finer mesh.
     reference = cost_of(replace(results, errors=errors), "vts-ppt", "wavy", 1e-2)
-    assert reference.reached.sum() == 4
-    assert reference.is_usual
+    assert (reference.reached.sum(), reference.is_usual) == (4, True)
     errors[0, [8, 9]] = 0.5
     assert not cost_of(replace(results, errors=errors), "vts-ppt", "wavy", 1e-2).is_usual
 
@@ -73,9 +72,8 @@ def test_the_best_penalty_afterwards_is_told_from_that_of_the_rule() -> None:
     errors[0, :6, len(VARIANTS) - 1] = 1e-3  # At the stiffest penalty the coarse mesh is enough.
     errors[0, :6, VARIANTS.index(DEEP)] = 1e-9  # Another start is no other penalty.
     changed = replace(results, errors=errors)
-    assert cost_of(changed, "vts-ppt", "wavy", 1e-2).middle("segments") == 16
-    assert cost_of(changed, "vts-ppt", "wavy", 1e-2, BEST).middle("segments") == 8
-    assert cost_of(changed, "vts-ppt", "wavy", 1e-4, BEST).middle("segments") == inf
+    for target, variants, segments in ((1e-2, (0,), 16), (1e-2, BEST, 8), (1e-4, BEST, inf)):
+        assert cost_of(changed, "vts-ppt", "wavy", target, variants).middle("segments") == segments
     table = cost_table(changed, "wavy", 1e-2)
     assert [column.head for column in table.columns[:4]] == ["formulation", "reached", "segments", "best"]
     assert table.groups[""][0][:4] == ("vts-ppt", "6/6", "16", "8")
@@ -134,10 +132,8 @@ def test_few_instances_and_numbers_that_are_missing_give_no_interval() -> None:
 def test_a_sentence_has_ratios_whose_interval_excludes_1_alone() -> None:
     runs = {"vts-ppt": RUNS["vts-ppt"], "alike": RUNS["vts-ppt"], **RUNS}
     first, second = cost_sentences(make_results(make_cells(), runs, noise=0.02), "wavy", 1e-2)
-    words = (
-        "On wavy, at an error of 1 % in the forces, seconds of one evaluation over those of vts-ppt: more: exact 1.5"
-    )
-    assert first.startswith(words)
+    start = "On wavy, at an error of 1 % in the forces, seconds of one evaluation"
+    assert first.startswith(f"{start} over those of vts-ppt: more: exact 1.5")
     assert first.endswith("; alike within 5 %: alike; never there: poor.")
     assert "more: exact 1.33 [1.33, 1.33]; alike within 5 %: alike" in second
     noisy = cost_sentences(make_results(make_cells(), runs, noise=0.5), "wavy", 1e-2)[0]
@@ -180,9 +176,9 @@ def test_the_table_of_starts_tells_failures_and_ranges() -> None:
     results.counts[0, 0, 0, 0] = 7
     table = starts_table(results, "wavy")
     assert [column.head for column in table.columns] == ["formulation", "8", "16"]
-    rows = table.groups[""]
-    assert rows[:2] == [("vts-ppt, near", "2–7", "3"), ("vts-ppt, deep", "2", "3")]
-    assert rows[-1] == ("poor, deepest", "2", "6 fail")
+    first, second, *_, last = table.groups[""]
+    assert (first, second) == (("vts-ppt, near", "2–7", "3"), ("vts-ppt, deep", "2", "3"))
+    assert last == ("poor, deepest", "2", "6 fail")
 
 
 def test_counts_are_compared_exactly_and_seconds_in_factorisations() -> None:
@@ -209,19 +205,14 @@ def test_the_file_holds_everything(tmp_path: Path) -> None:
     write_bench(RESULTS, tmp_path / "a.nc")
     again = read_bench(tmp_path / "a.nc")
     for name in RESULTS.__slots__:
-        old, new = getattr(RESULTS, name), getattr(again, name)
-        if isinstance(old, np.ndarray):
-            np.testing.assert_array_equal(new, old, name)
-        else:
-            assert new == old, name
+        np.testing.assert_equal(getattr(again, name), getattr(RESULTS, name), name)
 
 
 def test_another_file_is_no_bench(tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match="which does not exist"):
-        read_bench(tmp_path / "a.nc")
-    (tmp_path / "a.nc").write_text("no netCDF")
-    with pytest.raises(MisuseError, match="a file that `contactverif bench"):
-        read_bench(tmp_path / "a.nc")
+    (tmp_path / "b.nc").write_text("no netCDF")
+    for name, words in (("a.nc", "which does not exist"), ("b.nc", "a file that `contactverif bench")):
+        with pytest.raises(MisuseError, match=words):
+            read_bench(tmp_path / name)
 
 
 def test_every_picture_is_drawn_and_the_pages_need_nothing_else(tmp_path: Path) -> None:
@@ -242,13 +233,8 @@ def test_many_formulations_have_a_picture_with_a_panel_each_and_one_mesh_has_no_
     many = {f"f{n}": RUNS["exact"] for n in range(7)}
     cells = (*make_cells(), *make_cells("kinked", meshes=(8,)))
     plot_bench(make_results(cells, many), tmp_path)
-    assert {file.name for file in tmp_path.iterdir()} == {
-        "wavy.svg",
-        "wavy-each.svg",
-        "cost.svg",
-        "runtimes.svg",
-        "starts.svg",
-    }
+    names = {"wavy.svg", "wavy-each.svg", "cost.svg", "runtimes.svg", "starts.svg"}
+    assert {file.name for file in tmp_path.iterdir()} == names
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from contactverif.strategies.surfaces import flat_surface_cases
 from contactverif_reports.exchange.run_document import document_of
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
-from contactverif_reports.netcdf.stored_cases import counterexample_groups, read_forces
+from contactverif_reports.netcdf.stored_outcomes import counterexample_groups, read_forces
 from contactverif_reports.netcdf.write import write
 from contactverif_reports.plot.case_figures import plot_case, view_from_above, widen
 from contactverif_reports.plot.text import as_text

@@ -20,63 +20,50 @@ _SKIPPED = (Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, 
 
 def write_junit(run: Run, path: str | os.PathLike[str]) -> None:
     """Write a run as the XML that JUnit has made common."""
-    tree = ElementTree(suites_of(run))
-    indent(tree)
-    with whole(path) as part:
-        tree.write(part, encoding="utf-8", xml_declaration=True)
-
-
-def suites_of(run: Run) -> Element:
-    """Return the element `testsuites` of a run."""
     examples = {(each.formulation, each.property_id): each for each in counterexamples(run).values()}
     suites = Element("testsuites", name="contactverif")
     for formulation in run.formulations:
         suite = SubElement(suites, "testsuite", name=formulation)
         for row in run.rows_of(formulation):
-            _add_row(suite, row, examples.get((formulation, row.property_id)))
+            end = _end_of(row, examples.get((formulation, row.property_id)))
+            _add_case(suite, formulation, row.property_id, row.seconds, *end)
         if formulation in run.opposite_signs:
             _add_case(suite, formulation, "sign", 0.0, "failure", OPPOSITE_SIGN, "opposite sign")
-        _count(suite)
     for item in run.not_loaded:
         suite = SubElement(suites, "testsuite", name=item.formulation)
         _add_case(suite, item.formulation, "import", 0.0, "error", item.reason, str(Result.NOT_LOADED))
-        _count(suite)
-    return suites
+    for suite in suites:
+        suite.set("tests", str(len(suite)))
+        for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            suite.set(name, str(len(suite.findall(f"testcase/{tag}"))))
+        suite.set("time", f"{sum(float(case.attrib['time']) for case in suite):.3f}")
+    tree = ElementTree(suites)
+    indent(tree)
+    with whole(path) as part:
+        tree.write(part, encoding="utf-8", xml_declaration=True)
 
 
-def _add_row(suite: Element, row: Row, example: Counterexample | None) -> None:
-    seconds, words = row.seconds, row.reason or str(row.result)
+def _end_of(row: Row, example: Counterexample | None) -> tuple[str, ...]:
+    """Return tag, message, type and words of the element that says how a row ended; nothing if it passed."""
     if row.unexpected:
         drawing = [] if example is None else [example.label, as_text(example.case)]
         tag = "error" if row.verdict is Verdict.CRASHED else "failure"
-        element = _add_case(suite, row.formulation, row.property_id, seconds, tag, words, str(row.result))
-        element.text = _printable("\n".join([f"{row.unexpected}: {row.reason}", *drawing]))
-    elif row.result in _SKIPPED:
-        reason = f"{row.result}: {row.known or row.reason}".removesuffix(": ")
-        _add_case(suite, row.formulation, row.property_id, seconds, "skipped", reason)
-    elif row.verdict is Verdict.FAIL:
-        element = _add_case(suite, row.formulation, row.property_id, seconds, "system-out")
-        element.text = _printable(f"fails, and promises nothing here: {row.reason}")
-    else:
-        _add_case(suite, row.formulation, row.property_id, seconds)
+        words = "\n".join([f"{row.unexpected}: {row.reason}", *drawing])
+        return tag, row.reason or str(row.result), str(row.result), words
+    if row.result in _SKIPPED:
+        return "skipped", f"{row.result}: {row.known or row.reason}".removesuffix(": ")
+    if row.verdict is Verdict.FAIL:
+        return "system-out", "", "", f"fails, and promises nothing here: {row.reason}"
+    return ()
 
 
-def _add_case(
-    suite: Element, formulation: str, name: str, seconds: float, tag: str = "", message: str = "", kind: str = ""
-) -> Element:
-    """Add a test case; return what says how it ended, or the case itself if it passed."""
+def _add_case(suite: Element, formulation: str, name: str, seconds: float, *end: str) -> None:
     case = SubElement(suite, "testcase", classname=_printable(formulation), name=name, time=f"{seconds:.3f}")
-    if not tag:
-        return case
-    attributes = {"message": _printable(message), "type": kind}
-    return SubElement(case, tag, {key: text for key, text in attributes.items() if text})
-
-
-def _count(suite: Element) -> None:
-    suite.set("tests", str(len(suite)))
-    for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
-        suite.set(name, str(len(suite.findall(f"testcase/{tag}"))))
-    suite.set("time", f"{sum(float(case.attrib['time']) for case in suite):.3f}")
+    if end:
+        tag, message, kind, words = (*end, "", "")[:4]
+        attributes = {"message": _printable(message), "type": kind}
+        element = SubElement(case, tag, {key: text for key, text in attributes.items() if text})
+        element.text = _printable(words) or None
 
 
 def _printable(text: str) -> str:

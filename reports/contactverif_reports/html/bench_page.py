@@ -5,21 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from contactverif_reports.bench_costs import (
-    DEEPEST_START,
-    HOW_TO_READ,
-    MOST_CURVES,
-    STARTS,
-    THREE_NUMBERS,
-    TOTALS,
-    BenchChange,
-    cost_sentences,
-    cost_table,
-    format_share,
-    split_targets,
-    starts_table,
-    totals_table,
-)
+from contactverif_reports import bench_costs as costs
 from contactverif_reports.bench_results import VARIANTS, BenchResults
 from contactverif_reports.html.pages import origin, render, svg_inline
 from contactverif_reports.tables import Column, Table
@@ -27,7 +13,7 @@ from contactverif_reports.tables import Column, Table
 _FACTS = ("command", "created", "commit", "contactverif_version", "numpy_version", "blas", "platform", "isolation")
 
 
-def bench_page(results: BenchResults, changes: Sequence[BenchChange] = ()) -> str:
+def bench_page(results: BenchResults, changes: Sequence[costs.BenchChange] = ()) -> str:
     """Return the page of a bench."""
     from contactverif_reports.plot import bench_figures as plots  # Importing it is slow.
 
@@ -36,26 +22,25 @@ def bench_page(results: BenchResults, changes: Sequence[BenchChange] = ()) -> st
         figures = []
         if len(results.meshes_of(scene)) > 1:
             figures.append(svg_inline(plots.make_scene_figure(results, scene), f"errors, {scene}"))
-            if len(results.formulations) > MOST_CURVES:
+            if len(results.formulations) > costs.MOST_CURVES:
                 figures.append(svg_inline(plots.make_each_figure(results, scene), f"each formulation, {scene}"))
-        reached, words = split_targets(results, scene)
-        targets = [
-            {
-                "title": f"an error of {format_share(target)} in the forces",
-                "sentences": cost_sentences(results, scene, target),
-                "table": cost_table(results, scene, target),
-            }
-            for target in reached
-        ]
+        reached, words = costs.split_targets(results, scene)
         scenes.append(
             {
                 "name": scene,
                 "label": results.label(scene),
                 "figures": figures,
-                "targets": targets,
+                "targets": [
+                    {
+                        "title": f"an error of {costs.format_share(target)} in the forces",
+                        "sentences": costs.cost_sentences(results, scene, target),
+                        "table": costs.cost_table(results, scene, target),
+                    }
+                    for target in reached
+                ],
                 "out_of_reach": words,
-                "totals": totals_table(results, scene),
-                "starts": starts_table(results, scene),
+                "totals": costs.totals_table(results, scene),
+                "starts": costs.starts_table(results, scene),
             }
         )
     since = Table([Column("formulation"), Column("evaluation", number=True), Column(""), Column("counts", wrap=True)])
@@ -64,13 +49,7 @@ def bench_page(results: BenchResults, changes: Sequence[BenchChange] = ()) -> st
     return render(
         "bench.html.j2",
         results=results,
-        texts={
-            "numbers": THREE_NUMBERS,
-            "reading": HOW_TO_READ,
-            "totals": TOTALS,
-            "starts": STARTS,
-            "deepest": DEEPEST_START,
-        },
+        texts=costs,
         cost=svg_inline(plots.make_cost_figure(results), "what an error costs"),
         runtimes=svg_inline(plots.make_runtime_figure(results), "runtimes"),
         deepest=svg_inline(plots.make_starts_figure(results), "who fails from the deepest start"),

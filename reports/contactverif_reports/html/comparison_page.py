@@ -23,8 +23,7 @@ from contactverif_reports.comparisons import (
     measured_cells,
     results_table,
 )
-from contactverif_reports.html.margin_strips import Axis, strip, ticks
-from contactverif_reports.html.pages import origin, render, svg_inline
+from contactverif_reports.html.pages import Axis, origin, render, strip, svg_inline, ticks
 from contactverif_reports.plot.solved_scene import SolvedScene
 from contactverif_reports.regressions import Changes, changed_iterations_table, changes_table
 from contactverif_reports.tables import Column

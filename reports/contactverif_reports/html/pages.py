@@ -1,7 +1,8 @@
 """HTML pages that need nothing but themselves: templates filled in, figures inlined as SVG, files written whole.
 
 `templates/base.html.j2` has the looks of every page (screen, phone, dark, print); `templates/parts.html.j2` has what
-pages share: verdicts, figures, boxes that scroll.
+pages share: verdicts, figures, boxes that scroll. A page may have thousands of strips of margins: they are written
+without matplotlib, which would take a thousand times the bytes and the time.
 """
 
 from __future__ import annotations
@@ -11,13 +12,17 @@ import io
 import os
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
+from math import ceil, inf
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
+import numpy as np
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.errors import MisuseError, printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Result, percent
@@ -45,6 +50,12 @@ _SVG = "{http://www.w3.org/2000/svg}"
 _HREF = "{http://www.w3.org/1999/xlink}href"
 _LEAST_SCALE = 0.6  # a figure is drawn no smaller than this; then its box scrolls, or labels of 9 pt cannot be read
 _PX_PER_PT = 96 / 72
+# The strips of margins.
+LEAST = -4  # Decades below the tolerance: smaller margins are drawn at the left end.
+_MOST = 16  # Decades beyond the tolerance: larger margins, and failures without a number, are drawn at the right end.
+_FEWEST = 2  # Decades beyond the tolerance that every axis has.
+_WIDTH, _HEIGHT, _TOP = 200, 26, 7  # User units of the SVG; the mark of the worst margin is above the bars.
+_BINS_A_DECADE = 2
 _INLINED = re.compile(r'<svg data-figure="(\w+)".*?</svg>', re.S)
 
 
@@ -188,3 +199,79 @@ def _with_distinct_ids(html: str) -> str:
         return match[0] if counts[name] == 1 else match[0].replace(name, f"{name}-{counts[name]}")
 
     return _INLINED.sub(with_own_ids, html)
+
+
+# Strips: a histogram of the margins of the cases of a row, as a small SVG that fits into a table.
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A logarithmic axis of value/tolerance, the same for all strips of a page: from 10^LEAST to 10^most."""
+
+    most: int
+
+    @classmethod
+    def from_margins(cls, margins: Iterable[FloatArray]) -> Axis:
+        """Return the shortest axis that holds every finite margin, up to 10^16."""
+        tops = [float(finite.max()) for sample in margins if len(finite := sample[np.isfinite(sample)])]
+        top = max(tops, default=1.0)
+        return cls(int(np.clip(ceil(np.log10(top)) if top > 0 else 0, _FEWEST, _MOST)))
+
+    @property
+    def n_bins(self) -> int:
+        """The number of bins, half a decade each; the last one is for failures without a number."""
+        return (self.most - LEAST) * _BINS_A_DECADE + 1
+
+    def bins(self, margins: FloatArray) -> FloatArray:
+        """Return the bin numbers (n,) of margins; a margin of exactly 1 is on the left of the tolerance."""
+        with np.errstate(divide="ignore"):
+            places = np.ceil((np.log10(margins) - LEAST) * _BINS_A_DECADE) - 1
+        last = self.n_bins - 1
+        return np.where(np.isinf(margins), last, np.clip(places, 0, last - 1)).astype(np.int64)
+
+    def x(self, decade: float) -> float:
+        """Return the position of a power of ten on the axis, in user units."""
+        return _WIDTH * (decade - LEAST) * _BINS_A_DECADE / self.n_bins
+
+
+def strip(margins: FloatArray, axis: Axis) -> Markup:
+    """Draw the histogram of margins (n,), with a line at the tolerance and a mark at the worst; empty for none.
+
+    Heights are the square roots of the shares, so that one case of thousands is visible.
+    """
+    known = margins[~np.isnan(margins)]
+    if not len(known):
+        return Markup("")
+    numbers, counts = np.unique(axis.bins(known), return_counts=True)
+    width, room = _WIDTH / axis.n_bins, _HEIGHT - _TOP
+    tolerance = -LEAST * _BINS_A_DECADE  # The first bin beyond the tolerance.
+    bars = []
+    for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
+        height = max(2.0, room * (count / len(known)) ** 0.5)
+        kind = "within" if number < tolerance else "beyond"
+        bars.append(
+            f'<rect class="{kind}" x="{number * width + 0.5:.1f}" y="{_HEIGHT - height:.1f}" '
+            f'width="{width - 1:.1f}" height="{height:.1f}"/>'
+        )
+    at = (numbers[-1] + 0.5) * width
+    line = axis.x(0)
+    median, worst = (
+        "infinitely" if margin == inf else f"{margin:.2g} times" for margin in (np.median(known), known.max())
+    )
+    label = f"{len(known)} case{'s' * (len(known) > 1)}, median {median}, worst {worst} the tolerance"
+    return Markup(
+        f'<svg class="strip" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{label}">'
+        f'<path class="base" d="M0 {_HEIGHT}H{_WIDTH}"/>{"".join(bars)}'
+        f'<path class="tolerance" d="M{line:.1f} 0V{_HEIGHT}"/>'
+        f'<path class="worst" d="M{at - 3:.1f} 0H{at + 3:.1f}L{at:.1f} 5z"/></svg>'
+    )
+
+
+def ticks(axis: Axis) -> Markup:
+    """Draw the labels of the axis, for the head of the column."""
+    step, labels = 4 if axis.most <= 8 else 8, []
+    for decade in (LEAST, 0, *range(step, axis.most + 1, step)):
+        anchor = "start" if decade == LEAST else "middle" if axis.x(decade) < 0.93 * _WIDTH else "end"
+        power = "1" if decade == 0 else f'10<tspan dy="-4" font-size="8">{str(decade).replace("-", "−")}</tspan>'
+        labels.append(f'<text x="{axis.x(decade):.1f}" y="13" text-anchor="{anchor}">{power}</text>')
+    return Markup(f'<svg class="strip ticks" viewBox="0 0 {_WIDTH} 16" aria-hidden="true">{"".join(labels)}</svg>')

@@ -14,8 +14,7 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.property import CheckedNumber, checked_numbers
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
 from contactverif_reports.comparisons import RowNumbers, count_iterations
-from contactverif_reports.html.margin_strips import Axis, strip, ticks
-from contactverif_reports.html.pages import render, svg_inline
+from contactverif_reports.html.pages import Axis, render, strip, svg_inline, ticks
 from contactverif_reports.plot.text import as_text
 from contactverif_reports.tables import WRONG_RESULTS
 
@@ -46,9 +45,7 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
     axis = Axis.from_margins(cell.margins for cell in cells.values())
     examples = _examples(run, os.fspath(path))
     names, ids = run.formulations, list(run.properties)
-    subject = (
-        "contact formulations" if not names else f"{len(names)} formulations" if len(names) > 3 else ", ".join(names)
-    )
+    subject = f"{len(names)} formulations" if len(names) > 3 else ", ".join(names) or "contact formulations"
     applicable = {row.property_id for row in run.rows if row.result is not Result.NOT_APPLICABLE}
     # Tables that are about equally wide.
     n_columns = max(1, -(-len(ids) // max(1, -(-len(ids) // _COLUMNS))))
@@ -81,11 +78,10 @@ def headline(run: Run) -> str:
         return f"{run.praise} {run.promises}"
     n_signs, counts = len(run.opposite_signs), Counter(row.result for row in run.unexpected if not row.omitted)
     counts[Result.NOT_LOADED] = len(run.not_loaded)
-    words = [f"{n_signs} formulation{'s' * (n_signs > 1)} with the opposite sign"] if n_signs else []
-    words += [
-        f"{counts[result]} {text[counts[result] > 1]}" for result, text in WRONG_RESULTS.items() if counts[result]
-    ]
-    return f"{', '.join(words)}." if words else "Nothing was checked."
+    signs = ("formulation with the opposite sign", "formulations with the opposite sign")
+    kinds = [(n_signs, signs), *((counts[result], text) for result, text in WRONG_RESULTS.items())]
+    words = ", ".join(f"{count} {text[count > 1]}" for count, text in kinds if count)
+    return f"{words}." if words else "Nothing was checked."
 
 
 def _section(
@@ -94,20 +90,11 @@ def _section(
     rows = list(run.rows_of(name))
     examples = [example for example in every if example.counterexample.formulation == name]
     example_of = {example.counterexample.property_id: example.counterexample.id for example in examples}
-    lines, inapplicable = [], dict[str, list[str]]()  # {reason: properties that do not apply}
+    inapplicable: dict[str, list[str]] = {}  # {reason: properties that do not apply}
     for row in rows:
         if row.result is Result.NOT_APPLICABLE:
             inapplicable.setdefault(row.reason, []).append(row.property_id)
-            continue
-        cell = cells[name, row.property_id]
-        lines.append(
-            {
-                "cell": cell,
-                "promise": _PROMISES[row.promise],
-                "strip": strip(cell.margins, axis),
-                "example": example_of.get(row.property_id, ""),
-            }
-        )
+    its_cells = [cells[name, row.property_id] for row in rows]
     counts = Counter(row.result for row in rows)
     return {
         "formulation": name,
@@ -115,10 +102,19 @@ def _section(
         "open": len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in rows),
         "counts": ", ".join(f"{counts[result]} {result}" for result in Result if counts[result]),
         "missing": [part for part, provided in run.provided.get(name, {}).items() if not provided],
-        "lines": lines,
+        "lines": [
+            {
+                "cell": cell,
+                "promise": _PROMISES[cell.row.promise],
+                "strip": strip(cell.margins, axis),
+                "example": example_of.get(cell.row.property_id, ""),
+            }
+            for cell in its_cells
+            if cell.row.result is not Result.NOT_APPLICABLE
+        ],
         "inapplicable": list(inapplicable.items()),
         "examples": examples,
-        "iterations": [line for row in rows for line in count_iterations([cells[name, row.property_id]])],
+        "iterations": [line for cell in its_cells for line in count_iterations([cell])],
     }
 
 
@@ -129,25 +125,18 @@ def _examples(run: Run, path: str) -> list[Example]:
         from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
 
         case, forces = by_id[id_].case, by_id[id_].row.forces
-        of_formulation, exact = (None, None) if forces is None else (forces.of_formulation, forces.exact)
-        figure = make_mesh_figure(case, _WIDTH, forces=of_formulation, exact=exact)
-        figures[id_] = svg_inline(figure, as_text(case).splitlines()[0])
+        arrows = {} if forces is None else {"forces": forces.of_formulation, "exact": forces.exact}
+        figures[id_] = svg_inline(make_mesh_figure(case, _WIDTH, **arrows), as_text(case).splitlines()[0])
     examples = []
     for id_, counterexample in by_id.items():
         measurement = counterexample.outcome.measurement
         numbers = checked_numbers(counterexample.row.info, measurement)
         finding = measurement.finding if measurement is not None else None
         numbers_say_it = any(number.value == number.value and number.ratio > 1 for number in numbers)
-        examples.append(
-            Example(
-                counterexample=counterexample,
-                figure=figures.get(id_, Markup("")),
-                text="" if id_ in figures else as_text(counterexample.case),
-                numbers=numbers,
-                reason=str(finding or "") if numbers_say_it else counterexample.reason,
-                replay=counterexample.replay_command(path),
-            )
-        )
+        reason = str(finding or "") if numbers_say_it else counterexample.reason
+        text = "" if id_ in figures else as_text(counterexample.case)
+        replay = counterexample.replay_command(path)
+        examples.append(Example(counterexample, figures.get(id_, Markup("")), text, numbers, reason, replay))
     return examples
 
 

@@ -7,23 +7,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from contactverif.contract import schema
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.schema import (
-    NONE,
-    RATIO,
-    SECONDS,
-    Group,
-    ReportColumn,
-    Variable,
-    codes,
-    numbers,
-    text,
-    words,
-)
+from contactverif.contract.schema import NONE, RATIO, Group, ReportColumn, Variable, codes, numbers, text, words
 from contactverif_reports.bench_results import COUNTS, ERRORS, VARIANTS, WORK, BenchResults, Cell, Outcome
 from contactverif_reports.files import check_writable, whole
 from contactverif_reports.netcdf.file_groups import read_groups, write_tree
@@ -52,11 +43,11 @@ _ARRAYS = (
 _TIMES = (
     ReportColumn(
         "evaluation_seconds", "evaluation", "real", "least time of one evaluation: search, forces and tangent",
-        "by the clock of the plugin's process; NaN where it crashed", SECONDS, (*_RUN, "process"),
+        "by the clock of the plugin's process; NaN where it crashed", schema.SECONDS, (*_RUN, "process"),
     ),
     ReportColumn(
         "factorisation_seconds", "factorisation", "real", "least time of one factorisation of the whole system",
-        "NaN without one", SECONDS, _RUN,
+        "NaN without one", schema.SECONDS, _RUN,
     ),
 )  # fmt: skip
 
@@ -74,20 +65,13 @@ def bench_tree(results: BenchResults) -> dict[str, Group]:
     attributes |= {"title": TITLE, "bench_schema": BENCH_SCHEMA, "Conventions": "CF-1.11"}
     not_loaded = [f"{name}: {text(reason)}" for name, reason in results.not_loaded.items()]
     attributes["not_loaded"] = "\n".join(not_loaded) or NONE
-    remarks = [
-        [
-            [results.remarks.get((name, cell, run), "") for run in range(len(VARIANTS))]
-            for cell in range(len(results.cells))
-        ]
-        for name in results.formulations
-    ]
+    runs = product(results.formulations, range(len(results.cells)), range(len(VARIANTS)))
+    remarks = np.array([results.remarks.get(run, "") for run in runs], dtype=object).reshape(results.outcomes.shape)
     table = _labels(results) | {column.name: _variable(column, results) for column in _ARRAYS}
-    table["remark"] = words(_SOLUTION, remarks, "how the run ended, where it gave no solution")
+    table["remark"] = words(_SOLUTION, remarks.tolist(), "how the run ended, where it gave no solution")
     times = {column.name: _variable(column, results) for column in _TIMES}
-    return {
-        "/": Group(table, attributes),
-        "/timing": Group(times, {"comment": "the only numbers that depend on a clock"}),
-    }
+    comment = {"comment": "the only numbers that depend on a clock"}
+    return {"/": Group(table, attributes), "/timing": Group(times, comment)}
 
 
 def _variable(column: ReportColumn, results: BenchResults) -> Variable:
@@ -102,8 +86,11 @@ def _labels(results: BenchResults) -> dict[str, Variable]:
     n_targets = max(map(len, results.targets.values()))
     targets = [[*results.targets[scene], *[np.nan] * (n_targets - len(results.targets[scene]))] for scene in scenes]
     instance = "number of the variation, the same on all meshes"
-    kinds = {"error": (ERRORS, "kind of error"), "count": (COUNTS, "what is counted")}
-    kinds["work"] = WORK, "work of one evaluation and of one linear system"
+    kinds = (
+        ("error_kind", ERRORS, "kind of error"),
+        ("count_kind", COUNTS, "what is counted"),
+        ("work_kind", WORK, "work of one evaluation and of one linear system"),
+    )
     return {
         "formulation": words(["formulation"], list(results.formulations), "formulation, as on the command line"),
         "scene": codes(["cell"], [scenes[cell.scene] for cell in cells], scenes, "scene of the cell"),
@@ -114,8 +101,8 @@ def _labels(results: BenchResults) -> dict[str, Variable]:
         "scene_label": words(["scene_name"], [results.label(scene) for scene in scenes], "what a scene is"),
         "target": numbers(["scene_name", "target_number"], targets, "errors that cost is measured at", RATIO),
         **{
-            f"{kind}_kind": words([f"{kind}_kind"], list(table), meaning, "; ".join(map(": ".join, table.items())))
-            for kind, (table, meaning) in kinds.items()
+            name: words([name], list(table), meaning, "; ".join(map(": ".join, table.items())))
+            for name, table, meaning in kinds
         },
     }
 
@@ -138,11 +125,7 @@ def read_bench(path: str | os.PathLike[str]) -> BenchResults:
 def _results(root: Group, timing: Group) -> BenchResults:
     formulations = tuple(map(str, root["formulation"].values))
     scenes = str(root["scene"].attrs["flag_meanings"]).split()
-    arrays = {
-        column.path: group[column.name].values
-        for group, table in ((root, _ARRAYS), (timing, _TIMES))
-        for column in table
-    }
+    arrays = {column.path: (timing if column in _TIMES else root)[column.name].values for column in (*_ARRAYS, *_TIMES)}
     arrays |= {column.path: arrays[column.path].astype(np.int64) for column in _ARRAYS if column.kind != "real"}
     remarks = root["remark"].values
     unsolved = np.argwhere(arrays["outcomes"] != Outcome.SOLVED).tolist()
@@ -150,9 +133,15 @@ def _results(root: Group, timing: Group) -> BenchResults:
     not_loaded = attributes["not_loaded"]
     targets = [tuple(row[np.isfinite(row)].tolist()) for row in root["target"].values]
     split = (line.partition(": ") for line in not_loaded.splitlines())
+    if (root["scene"].values < 0).any():
+        raise ValueError("scene holds a code without a meaning")
+    variants = list(zip(root["penalty"].values.tolist(), map(str, root["start"].values), strict=True))
+    if variants != [(variant.penalty, variant.start) for variant in VARIANTS]:
+        raise ValueError("its penalties and starts are others")
+    columns = (root[name].values.tolist() for name in ("scene", "mesh", "instance"))
     return BenchResults(
         formulations=formulations,
-        cells=_cells(root, scenes),
+        cells=tuple(Cell(scenes[scene], mesh, instance) for scene, mesh, instance in zip(*columns, strict=True)),
         labels=dict(zip(scenes, map(str, root["scene_label"].values), strict=True)),
         targets=dict(zip(scenes, targets, strict=True)),
         **arrays,
@@ -160,17 +149,6 @@ def _results(root: Group, timing: Group) -> BenchResults:
         not_loaded={} if not_loaded == NONE else {plugin: reason for plugin, _, reason in split},
         provenance={name: value for name, value in attributes.items() if name not in _STRUCTURE},
     )
-
-
-def _cells(root: Group, scenes: list[str]) -> tuple[Cell, ...]:
-    """Return the cells of a file, whose variants must be those of this version."""
-    if (root["scene"].values < 0).any():
-        raise ValueError("scene holds a code without a meaning")
-    variants = list(zip(root["penalty"].values.tolist(), map(str, root["start"].values), strict=True))
-    if variants != [(variant.penalty, variant.start) for variant in VARIANTS]:
-        raise ValueError("its penalties and starts are others")
-    columns = (root[name].values.tolist() for name in ("scene", "mesh", "instance"))
-    return tuple(Cell(scenes[scene], mesh, instance) for scene, mesh, instance in zip(*columns, strict=True))
 
 
 def _check(results: BenchResults) -> None:

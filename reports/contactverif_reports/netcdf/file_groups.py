@@ -90,11 +90,8 @@ class _PackedVariable(msgspec.Struct, array_like=True):
         values, dims = self.values.unpack(), self.dims
         if decode and values.dtype.kind == "S":  # Characters (..., width) become words (...,).
             *shape, width = values.shape
-            if values.size:
-                characters = values.view(f"S{width * values.itemsize}").reshape(shape)
-                values, dims = np.strings.decode(characters, "utf-8"), dims[:-1]
-            else:
-                values, dims = np.zeros(shape, dtype=np.str_), dims[:-1]
+            joined = values.view(f"S{width * values.itemsize}").reshape(shape) if values.size else np.zeros(shape, "S1")
+            values, dims = np.strings.decode(joined, "utf-8"), dims[:-1]
         if len(dims) != values.ndim:
             raise ValueError(f"{len(dims)} dimensions of an array of shape {values.shape}")
         return Variable(dims, values, _unpack_attributes(self.attrs))

@@ -29,9 +29,8 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif.contract.schema import Group, StoredColumns
+from contactverif_reports.netcdf import stored_outcomes as stored
 from contactverif_reports.netcdf.file_groups import read_groups
-from contactverif_reports.netcdf.stored_cases import case_of_group, read_forces, read_named_cases
-from contactverif_reports.netcdf.stored_outcomes import OutcomeArrays, StoredOutcomes, read_info
 from contactverif_reports.netcdf.write import root_attributes
 
 Groups = Mapping[str, Group]
@@ -88,13 +87,11 @@ def open_report(path: str | os.PathLike[str], *, decode: bool = True) -> Iterato
 def _check_schema(root: Group, path: str) -> None:
     if str(root.attrs.get("title", "")) != schema.TITLE or "schema" not in root.attrs:
         raise MisuseError(_ARGUMENT, f"{path}, a netCDF file of something else", _NEEDED)
-    version = str(root.attrs["schema"])
+    version, writer, advice = str(root.attrs["schema"]), "", "install a newer contactverif"
     if version.isdecimal() and int(version) < int(schema.SCHEMA):
-        needed = f"schema {schema.SCHEMA}; run the same command again to write the report anew"
-        raise MisuseError(_ARGUMENT, f"{path} of schema {version}, which an older contactverif wrote", needed)
+        writer, advice = ", which an older contactverif wrote", "run the same command again to write the report anew"
     if version != schema.SCHEMA:
-        needed = f"schema {schema.SCHEMA}; install a newer contactverif"
-        raise MisuseError(_ARGUMENT, f"{path} of schema {version}", needed)
+        raise MisuseError(_ARGUMENT, f"{path} of schema {version}{writer}", f"schema {schema.SCHEMA}; {advice}")
 
 
 def _read(groups: Groups, *, consistent: bool) -> Run:
@@ -107,7 +104,7 @@ def _read(groups: Groups, *, consistent: bool) -> Run:
     # {(formulation, property): counterexample with its case}
     examples = {
         (str(group.attrs["formulation"]), str(group.attrs["property_id"])): (
-            group, case_of_group(groups[f"{name}/{schema.CASE}"]),
+            group, stored.case_of_group(groups[f"{name}/{schema.CASE}"]),
         )
         for name, group in groups.items()
         if name.startswith(folder) and not name.endswith(f"/{schema.CASE}")
@@ -117,23 +114,22 @@ def _read(groups: Groups, *, consistent: bool) -> Run:
         for name, group in groups.items()
         if "property_id" in group.attrs and not name.startswith(folder)
     }
-    named = read_named_cases(groups)
+    named = stored.read_named_cases(groups)
     formulations, ids = summary.labels("formulation"), summary.labels("property")
-    rows: list[dict[int, Row]] = [{} for _ in formulations]
+    rows: dict[tuple[int, int], Row] = {}
     if "property" in summary:
         columns = StoredColumns(_ROW, summary, ("formulation", "property"), {})
         for j, property_id in enumerate(ids):
-            group, timing = properties[property_id], groups[f"/{schema.TIMING}"]
-            its_rows = _Rows(group, j, summary, timing, consistent=consistent)
+            its_rows = _Rows(properties[property_id], j, summary, groups[f"/{schema.TIMING}"], consistent=consistent)
             cases = {name: case for (id_, name), case in named.items() if id_ == property_id}
             for i, formulation in enumerate(formulations):
                 if columns.present[i * len(ids) + j]:
                     values = columns.at(i * len(ids) + j)
                     values |= {"formulation": formulation, "verdict": Verdict(values["verdict"])}
-                    rows[i][j] = its_rows.row(i, values, examples.get((formulation, property_id)), cases)
+                    rows[i, j] = its_rows.row(i, values, examples.get((formulation, property_id)), cases)
     not_loaded = zip(summary.words("not_loaded"), summary.words("not_loaded_reason"), strict=True)
     run = Run(
-        rows=tuple(row for its_rows in rows for row in its_rows.values()),
+        rows=tuple(rows[place] for place in sorted(rows)),
         not_loaded=tuple(NotLoaded(*entry) for entry in not_loaded),
         **_facts_of(summary, formulations),
     )
@@ -152,12 +148,14 @@ class _Rows:
     """The rows of one property: its group, and the number of the property in the summary and the times."""
 
     def __init__(self, group: Group, number: int, summary: Group, timing: Group, *, consistent: bool) -> None:
-        self._info, self._timing = read_info(group), timing
+        self._info, self._timing = stored.read_info(group), timing
         self._number, self._consistent, self._counts = number, consistent, summary["count"].values
-        self._outcomes = OutcomeArrays(group, self._info, ("formulation", "case"))
+        self._outcomes = stored.OutcomeArrays(group, self._info, ("formulation", "case"))
         self._codes = self._outcomes.verdicts.reshape(summary.sizes["formulation"], group.sizes["case"])
         has_witnesses = "witness_verdict" in group
-        self._witnesses = OutcomeArrays(group, self._info, ("formulation",), "witness_") if has_witnesses else None
+        self._witnesses = (
+            stored.OutcomeArrays(group, self._info, ("formulation",), "witness_") if has_witnesses else None
+        )
 
     def row(
         self, i: int, values: Mapping[str, Any], example: tuple[Group, Case] | None, named: Mapping[str, Case]
@@ -168,46 +166,42 @@ class _Rows:
             dataset, case = example
             origin = Origin(str(dataset.attrs["origin"]))
             if origin not in (Origin.WITNESS, Origin.EARLIER):
-                outcome = OutcomeArrays(dataset, self._info, ()).outcome(0, case)
+                outcome = stored.OutcomeArrays(dataset, self._info, ()).outcome(0, case)
                 shrunk, first = (outcome, None) if origin is Origin.SHRUNK else (None, outcome)
-        length = self._n_outcomes(i)
-        seconds: FloatArray = self._timing["case_seconds"].values[i, self._number, :length]
-        if len(seconds) != length:
-            raise ValueError("case_seconds is too short")
-        return Row(
-            info=self._info,
-            outcomes=StoredOutcomes(self._outcomes, i * self._codes.shape[1], length, seconds, named),
-            witness=None if self._witnesses is None else self._witnesses.outcome(i, None if shrunk or first else case),
-            shrunk=shrunk,
-            first=first,
-            seconds=float(self._timing["row_seconds"].values[i, self._number]),
-            forces=None if example is None else read_forces(*example),
-            **values,
-        )
-
-    def _n_outcomes(self, i: int) -> int:
-        """Return the number of outcomes of a row, checked against what the summary counts."""
         codes = self._codes[i]
         length = int((codes != schema.NOT_PLANNED).sum())
         counts = np.bincount(codes[:length].clip(0), minlength=len(schema.VERDICTS))
         wrong = self._consistent and (counts != self._counts[i, self._number]).any()
         if wrong or (codes[:length] == schema.NOT_PLANNED).any():
             raise ValueError(f"the verdicts of {self._info.id} are not those that the summary counts")
-        return length
+        seconds: FloatArray = self._timing["case_seconds"].values[i, self._number, :length]
+        if len(seconds) != length:
+            raise ValueError("case_seconds is too short")
+        return Row(
+            info=self._info,
+            outcomes=stored.StoredOutcomes(self._outcomes, i * self._codes.shape[1], length, seconds, named),
+            witness=None if self._witnesses is None else self._witnesses.outcome(i, None if shrunk or first else case),
+            shrunk=shrunk,
+            first=first,
+            seconds=float(self._timing["row_seconds"].values[i, self._number]),
+            forces=None if example is None else stored.read_forces(*example),
+            **values,
+        )
 
 
 def _facts_of(summary: Group, formulations: list[str]) -> dict[str, Any]:
     """Return what is known of whole formulations: parts that they provide, opposite signs, diagnoses."""
     if not formulations:
         return {}
-    parts, codes = summary.words("part"), summary["provided"].values.tolist()
-    opposite = (summary["sign"].values == schema.SIGNS["opposite"]).tolist()
+    parts, codes, signs = summary.words("part"), summary["provided"].values.tolist(), summary["sign"].values.tolist()
     diagnoses = zip(formulations, summary.words("diagnosis"), strict=True)
     return {
         "provided": {
             name: {part: bool(code) for part, code in zip(parts, line, strict=True) if code != schema.UNSAID}
             for name, line in zip(formulations, codes, strict=True)
         },
-        "opposite_signs": tuple(name for name, turned in zip(formulations, opposite, strict=True) if turned),
+        "opposite_signs": tuple(
+            name for name, sign in zip(formulations, signs, strict=True) if sign == schema.SIGNS["opposite"]
+        ),
         "diagnoses": {name: words for name, words in diagnoses if words},
     }

@@ -20,8 +20,7 @@ from contactverif.contract.property import Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import Result, Row, Run
 from contactverif.contract.schema import Group, Variable, codes, join, numbers, to_variables, words
 from contactverif_reports.files import check_writable, whole
-from contactverif_reports.netcdf.stored_cases import counterexample_groups, named_case_groups
-from contactverif_reports.netcdf.stored_outcomes import common_unit, coordinates, outcome_axes, outcome_variables
+from contactverif_reports.netcdf import stored_outcomes as stored
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +29,6 @@ CASES_OF_A_BLOCK = 10_000
 PARTS = ("pair", "tangent", "contact_points")
 _RESERVED = frozenset({schema.SUMMARY, schema.COUNTEREXAMPLES, schema.TIMING, schema.NAMED_CASES})
 _COUNTED = ("planned", "judged", "failed", "undecided", "idle")
-Table = dict[str, Variable]
 
 
 def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = False) -> None:
@@ -66,9 +64,9 @@ def tree_of(run: Run, *, with_named_cases: bool = False) -> dict[str, Group]:
             comment = {"comment": f"properties whose ids begin with {'.'.join(folders[:depth])}"}
             groups.setdefault(f"/{'/'.join(folders[:depth])}", Group(attrs=comment))
         groups[name] = _property_group(info, {name: rows.get((name, id_)) for name in run.formulations})
-    groups |= counterexample_groups(run)
+    groups |= stored.counterexample_groups(run)
     if with_named_cases:
-        groups |= named_case_groups(run)
+        groups |= stored.named_case_groups(run)
     groups[f"/{schema.TIMING}"] = _timing(run)
     return groups
 
@@ -117,16 +115,31 @@ def root_attributes(run: Run) -> dict[str, Any]:
 def _summary(run: Run) -> Group:
     table, attributes = dict[str, Variable](), dict[str, Any]()
     if run.not_loaded:
-        plugins = [(entry.formulation, entry.reason) for entry in run.not_loaded]
-        table["not_loaded"] = words(["plugin"], [name for name, _ in plugins], "plugin that did not load")
-        table["not_loaded_reason"] = words(["plugin"], [reason for _, reason in plugins], "why it did not load")
-        attributes["not_loaded"] = "\n".join(schema.text(f"{name}: not loaded: {reason}") for name, reason in plugins)
+        plugins, reasons = zip(*((entry.formulation, entry.reason) for entry in run.not_loaded), strict=True)
+        table["not_loaded"] = words(["plugin"], plugins, "plugin that did not load")
+        table["not_loaded_reason"] = words(["plugin"], reasons, "why it did not load")
+        lines = (f"{name}: not loaded: {reason}" for name, reason in zip(plugins, reasons, strict=True))
+        attributes["not_loaded"] = "\n".join(map(schema.text, lines))
     attributes["comment"] = (
         "one row for each formulation and property; closest_value is the measured number nearest to its tolerance or "
         "furthest beyond it, among all decided cases"
     )
-    if run.formulations:
-        table |= _labels(run) | _formulation_columns(run)
+    if names := run.formulations:
+        provided = [[run.provided.get(name, {}).get(part, schema.UNSAID) for part in PARTS] for name in names]
+        table |= _labels(run)
+        table["part"] = words(["part"], PARTS, "part of the contract that a plugin may leave out")
+        table["provided"] = codes(
+            ["formulation", "part"], provided, schema.PROVIDED, "whether the formulation has that part",
+            "see also parts", fill=schema.UNSAID,
+        )  # fmt: skip
+        table["sign"] = codes(
+            ["formulation"], [int(name in run.opposite_signs) for name in names], schema.SIGNS, "sign of the forces",
+            "opposite: the slave is pulled towards the master, and the run fails",
+        )  # fmt: skip
+        table["diagnosis"] = words(
+            ["formulation"], [run.diagnoses.get(name, "") for name in names],
+            "kind of mistake that a formulation makes which fails", "empty where no rule knows it",
+        )  # fmt: skip
         attributes["parts"] = "\n".join(
             schema.text(f"{name}: ")
             + ", ".join(f"{part}: {'' if has else 'not '}provided" for part, has in parts.items())
@@ -135,10 +148,9 @@ def _summary(run: Run) -> Group:
     if run.rows:
         infos, rows = run.properties.values(), _grid(run)
         table["property_summary"] = words(["property"], [info.summary for info in infos], "the property in one line")
-        names = list(schema.VERDICTS)
-        table["verdict"] = words(["verdict"], names, "verdict, as in flag_meanings of row_verdict")
+        table["verdict"] = words(["verdict"], list(schema.VERDICTS), "verdict, as in flag_meanings of row_verdict")
         closest = [row.closest.number.quantity.unit for row in rows if row is not None and row.closest is not None]
-        unit = common_unit(closest, "see closest_units") if closest else schema.RATIO
+        unit = stored.common_unit(closest, "see closest_units") if closest else schema.RATIO
         units = {"closest_value": unit, "closest_tolerance": unit}
         table |= to_variables(schema.ROW, rows, _dims(run), {"verdict": tuple(Verdict)}, units=units)
     return Group(table, attributes)
@@ -148,7 +160,7 @@ def _dims(run: Run) -> dict[str, int]:
     return {"formulation": len(run.formulations), "property": len(run.properties)}
 
 
-def _labels(run: Run) -> Table:
+def _labels(run: Run) -> stored.Table:
     return {
         "formulation": words(["formulation"], run.formulations, "formulation, as typed on the command line"),
         "property": words(["property"], list(run.properties), "property, as typed with --property"),
@@ -161,60 +173,35 @@ def _grid(run: Run) -> list[Row | None]:
     return [rows.get((name, id_)) for name in run.formulations for id_ in run.properties]
 
 
-def _formulation_columns(run: Run) -> Table:
-    names, axis = run.formulations, ["formulation"]
-    parts = [[run.provided.get(name, {}).get(part, schema.UNSAID) for part in PARTS] for name in names]
-    signs = [int(name in run.opposite_signs) for name in names]
-    comment = "opposite: the slave is pulled towards the master, and the run fails"
-    long_name = "kind of mistake that a formulation makes which fails"
-    return {
-        "part": words(["part"], PARTS, "part of the contract that a plugin may leave out"),
-        "provided": codes(
-            ["formulation", "part"],
-            parts,
-            schema.PROVIDED,
-            "whether the formulation has that part",
-            "see also parts",
-            fill=schema.UNSAID,
-        ),
-        "sign": codes(axis, signs, schema.SIGNS, "sign of the forces", comment),
-        "diagnosis": words(
-            axis, [run.diagnoses.get(name, "") for name in names], long_name, "empty where no rule knows it"
-        ),
-    }
-
-
 def _timing(run: Run) -> Group:
     """Return the seconds of every row and case, the only numbers that depend on a clock."""
-    attributes = {"comment": "wall clock; all that two runs with the same seed may differ in"}
-    if not run.rows:
-        return Group(attrs=attributes)
-    dims, rows = _dims(run), _grid(run)
-    seconds = np.full((len(rows), max(len(row.outcomes) for row in run.rows)), np.nan)
-    for line, row in zip(seconds, rows, strict=True):
-        if row is not None:
-            line[: len(row.outcomes)] = [outcome.seconds for outcome in row.outcomes]
-    of_rows = np.array([np.nan if row is None else row.seconds for row in rows]).reshape(*dims.values())
-    of_cases = seconds.reshape(*dims.values(), -1) if seconds.size else np.zeros((*dims.values(), 0))
-    table = _labels(run)
-    table["row_seconds"] = numbers(
-        list(dims), of_rows, "time spent judging, shrinking excluded", schema.SECONDS, fill=np.nan
-    )
-    table["case_seconds"] = numbers(
-        [*dims, "case"], of_cases, "time spent judging each case", schema.SECONDS, fill=np.nan
-    )
-    return Group(table, attributes)
+    table: stored.Table = {}
+    if run.rows:
+        dims, rows = _dims(run), _grid(run)
+        of_rows = np.array([np.nan if row is None else row.seconds for row in rows]).reshape(*dims.values())
+        of_cases = np.full((len(rows), max(len(row.outcomes) for row in run.rows)), np.nan)
+        for line, row in zip(of_cases, rows, strict=True):
+            if row is not None:
+                line[: len(row.outcomes)] = [outcome.seconds for outcome in row.outcomes]
+        of_cases = of_cases.reshape(*dims.values(), of_cases.shape[1])
+        table = _labels(run)
+        for name, axes, values, meaning in (
+            ("row_seconds", [*dims], of_rows, "time spent judging, shrinking excluded"),
+            ("case_seconds", [*dims, "case"], of_cases, "time spent judging each case"),
+        ):
+            table[name] = numbers(axes, values, meaning, schema.SECONDS, fill=np.nan)
+    return Group(table, {"comment": "wall clock; all that two runs with the same seed may differ in"})
 
 
 def _property_group(info: PropertyInfo, rows: Mapping[str, Row | None]) -> Group:
     outcomes = [() if row is None else row.outcomes for row in rows.values()]
     witnesses = [None if row is None else row.witness for row in rows.values()]
     n_cases = max(map(len, outcomes))
-    axes = outcome_axes(info, (item for item in chain(*outcomes, witnesses) if item is not None))
+    axes = stored.outcome_axes(info, (item for item in chain(*outcomes, witnesses) if item is not None))
     table = {
         "formulation": words(["formulation"], list(rows), "formulation, as typed on the command line"),
         "case": numbers(["case"], np.arange(n_cases, dtype=np.int32), "number of the case, in order of judging", "1"),
-        **coordinates(info, axes),
+        **stored.coordinates(info, axes),
     }
     blocks = []
     for first in range(0, max(n_cases, 1), CASES_OF_A_BLOCK):  # The outcomes of a block are in memory at a time.
@@ -223,10 +210,10 @@ def _property_group(info: PropertyInfo, rows: Mapping[str, Row | None]) -> Group
         for row in outcomes:
             block = row[first:end]
             padded += [*block, *[None] * (end - first - len(block))]
-        blocks.append(outcome_variables(info, padded, {"formulation": len(rows), "case": end - first}, axes))
+        blocks.append(stored.outcome_variables(info, padded, {"formulation": len(rows), "case": end - first}, axes))
     table |= blocks[0] if len(blocks) == 1 else join(blocks, "case")
     if any(witness is not None for witness in witnesses):
-        table |= outcome_variables(info, witnesses, {"formulation": len(rows)}, axes, "witness_")
+        table |= stored.outcome_variables(info, witnesses, {"formulation": len(rows)}, axes, "witness_")
     if axes["kind"]:
         table |= _kind_counts(axes["kind"], list(rows.values()))
     attributes = {
@@ -244,17 +231,15 @@ def _property_group(info: PropertyInfo, rows: Mapping[str, Row | None]) -> Group
     return Group(table, attributes)
 
 
-def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> Table:
+def _kind_counts(kinds: Sequence[str], rows: Sequence[Row | None]) -> stored.Table:
     counts = np.zeros((len(rows), len(kinds), len(_COUNTED)), dtype=np.int32)
     for i, row in enumerate(rows):
         for kind, cases in (row.tally.kinds if row is not None else {}).items():
             if kind:
                 counts[i, kinds.index(kind)] = cases.cases, cases.judged, cases.failed, cases.undecided, cases.idle
-    dims, comment = (
-        ["formulation", "kind", "counted"],
-        "failed and idle ones are among those judged; idle: nothing was in contact",
-    )
+    comment = "failed and idle ones are among those judged; idle: nothing was in contact"
+    meaning = "number of random cases of each kind"
     return {
         "counted": words(["counted"], _COUNTED, "what kind_count counts"),
-        "kind_count": numbers(dims, counts, "number of random cases of each kind", "1", comment),
+        "kind_count": numbers(["formulation", "kind", "counted"], counts, meaning, "1", comment),
     }

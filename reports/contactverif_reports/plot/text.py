@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -56,15 +56,9 @@ def as_text(case: Case, width: int = 72) -> str:
     table = [] if course.flat else _list_positions(case, gaps, unit, course.roundoff, width)
     if not table:
         notes.append(_describe_gaps(gaps, course, unit))
-    penalty_and_parameters = [
-        f"penalty {format_number(case.penalty)}",
-        *(
-            f"{name} {format_number(values.item())}"
-            for name, values in case.parameters.items()
-            if values.size == 1 and name != "penetration"
-        ),
-    ]
-    notes.append("   ".join([*penalty_and_parameters, f"seed {case.seed}"]))
+    parameters = [(name, each) for name, each in case.parameters.items() if each.size == 1 and name != "penetration"]
+    numbers = [("penalty", case.penalty), *((name, each.item()) for name, each in parameters)]
+    notes.append("   ".join([*(f"{name} {format_number(number)}" for name, number in numbers), f"seed {case.seed}"]))
     n_slave, n_master = len(case.interface.slave), len(case.interface.master)
     shape = "flat" if course.flat else "nearly flat" if course.nearly_flat else "not flat"
     is_rotated = course.nearly_flat and abs(course.angle) > 1e-9
@@ -76,6 +70,13 @@ def as_text(case: Case, width: int = 72) -> str:
 
 def _name(case: Case) -> str:
     return f"{case.name}: " if case.name else ""
+
+
+def _position_rows(case: Case, nodes: Iterable[int], unit: float) -> list[list[str]]:
+    return [
+        [str(node), *(format_number(value, 0.0, 6) for value in (case.positions[node] / unit).tolist())]
+        for node in nodes
+    ]
 
 
 def _wrap(notes: Sequence[str], width: int) -> list[str]:
@@ -105,20 +106,14 @@ def _list_positions(case: Case, gaps: Gaps, unit: float, roundoff: float, width:
     n_slave = case.interface.n_slave_nodes
     if max(n_slave, case.interface.n_nodes - n_slave) > _LISTED:
         return []
-    rows = [
-        [str(node), *(format_number(value, 0.0, 6) for value in (position / unit).tolist())]
-        for node, position in enumerate(case.positions)
-    ]
+    rows = _position_rows(case, range(case.interface.n_nodes), unit)
     for row, gap, facing in zip(rows, gaps.gap.tolist(), gaps.facing.tolist(), strict=False):
         row.append(format_number(gap / unit, roundoff / unit) if facing else "beyond")
     left = _align([[_SLAVE, "x", "y", "gap"], *rows[:n_slave]])
     right = _align([[_MASTER, "x", "y"], *rows[n_slave:]])
     if len(left[0]) + len(right[0]) + 8 > width:
         return [f"  {row}" for row in [*left, *right]]
-    height, indent = max(len(left), len(right)), len(left[0])
-    left += [" " * indent] * (height - len(left))
-    right += [""] * (height - len(right))
-    return [f"  {slave}      {master}" for slave, master in zip(left, right, strict=True)]
+    return [f"  {slave:{len(left[0])}}      {master}" for slave, master in zip_longest(left, right, fillvalue="")]
 
 
 # Tables of a case in space.
@@ -142,11 +137,10 @@ def _surfaces(case: Case, width: int) -> str:
         if max(len(side), len(surface)) > _LISTED_FACES:
             lines.append(f"  {name}: {len(side)} nodes, too many to be listed")
             continue
-        places = [[format_number(value, 0.0, 6) for value in (case.positions[node] / unit).tolist()] for node in side]
-        rows = [[str(node), *place] for node, place in zip(side, places, strict=True)]
         corners = [f"{number}: {' '.join(map(str, face))}" for number, face in enumerate(surface.faces.tolist())]
         faces = textwrap.wrap(f"faces   {'   '.join(corners)}", 68, subsequent_indent="        ")
-        lines += [f"  {line}" for line in [*_align([[name, "x", "y", "z"], *rows]), *faces]]
+        table = _align([[name, "x", "y", "z"], *_position_rows(case, side, unit)])
+        lines += [f"  {line}" for line in [*table, *faces]]
     notes = [f"lengths and positions in units of {unit_name}"] if unit_name else []
     notes += [f"seen from outside its body, a {_FACES[interface.slave.faces.shape[1]]}'s corners run counter-clockwise"]
     if "penetration" in case.parameters:
@@ -176,9 +170,9 @@ def _draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[l
         links = []
         for surface in surfaces:
             lengths = (surface.lengths(case.positions) / unit).tolist()
-            ends = [sorted((number[first], number[second])) for first, second in surface.segments.tolist()]
             labels = [format_number(length, course.roundoff / unit, digits) for length in lengths]
-            its_links = (_Link(start, end, label) for (start, end), label in zip(ends, labels, strict=True))
+            ends = [(number[first], number[second]) for first, second in surface.segments.tolist()]
+            its_links = (_Link(min(pair), max(pair), label) for pair, label in zip(ends, labels, strict=True))
             links.append(sorted(its_links, key=lambda link: link.start))
         columns, note = _columns(places, [*links[0], *links[1]], width)
         if columns is not None:
