@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -42,26 +42,18 @@ _ENCODER = msgspec.msgpack.Encoder(enc_hook=float)  # Numbers of numpy are numbe
 _DECODER = msgspec.msgpack.Decoder(FinishedCell)
 
 
+@dataclass(frozen=True, slots=True)
 class FinishedCells:
     """The records of the cells that are finished, by number, and the file for the others."""
 
-    def __init__(self, folder: Path, names: Sequence[str]) -> None:
-        messages = (message for path in journal.record_files(folder) for _, message in journal.read_messages(path))
-        cells = (journal.decode(message, _DECODER) for message in messages)
-        self.records = {
-            cell.number: cell.record for cell in cells if cell is not None and cell.record.runs.keys() == {*names}
-        }
-        self._file = journal.RecordFile(folder)
+    records: dict[int, CellRecord]
+    file: journal.RecordFile
 
     def add(self, number: int, record: CellRecord) -> None:
         """Append the record of a cell that is finished."""
-        self._file.append(_ENCODER.encode(FinishedCell(number, record)))
-        self._file.sync()
+        self.file.append(_ENCODER.encode(FinishedCell(number, record)))
+        self.file.sync()
         self.records[number] = record
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 @contextmanager
@@ -78,8 +70,13 @@ def open_journal(output: Path, header: Header) -> Iterator[FinishedCells]:
     else:
         needed = "the same command and version, or another name, or no such folder"
         raise MisuseError("--out", f"{folder}, the journal of another bench", needed)
-    with block, closing(FinishedCells(folder, header.formulations)) as cells:
-        yield cells
+    with block:
+        messages = (message for path in journal.record_files(folder) for _, message in journal.read_messages(path))
+        cells = [cell for message in messages if (cell := journal.decode(message, _DECODER)) is not None]
+        names = {*header.formulations}
+        records = {cell.number: cell.record for cell in cells if cell.record.runs.keys() == names}
+        with closing(journal.RecordFile(folder)) as file:
+            yield FinishedCells(records, file)
 
 
 Progress = Callable[[str, int, int], None]  # The next cell in words, the number of finished cells, the number of all
@@ -135,7 +132,7 @@ def _run_cells(
             if progress is not None:
                 words = f"{cell.scene}, mesh {cell.mesh}, instance {cell.instance}, process {process + 1}"
                 progress(words, number, n_all)
-            record = finished.records.get(number) if finished is not None else None
+            record = None if finished is None else finished.records.get(number)
             if record is None:
                 of_scene = [record for other, record in records[0].items() if other.scene == cell.scene]
                 dead = {name for record in of_scene for name, run in record.runs.items() if run.is_lost}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contactverif import Case, Interface, Measurement, Outcome, Property, Quantity, Verdict
+from contactverif import Case, Interface, Measurement, Outcome, Property, Quantity, Surface, Verdict
 from contactverif.contract.result import NotLoaded, Row, Run
 
 ERROR = Quantity("force error", "u(8X/|g| + 4N)", "rounding of the gap, and of N sums")
@@ -46,8 +46,6 @@ def outcome(case: Case, value: float, verdict: Verdict | None = None, reason: st
 
 def awkward() -> Case:
     """Everything that is hard to store: two chains, one closed; −0.0, the smallest number, parameters of all shapes."""
-    from contactverif.contract.interface import Surface
-
     slave = [[0.0, 0.0], [1.0, -0.0], [3.0, 0.1], [4.0, 1 / 3]]
     ring = [[0.0, -1.0], [1.0, -2.0], [-1.0, -3.0]]
     interface = Interface(
@@ -75,15 +73,13 @@ def run_with_kinds() -> Run:
     assert idle.measurement is not None
     idle = replace(idle, measurement=replace(idle.measurement, idle=True))
     ties = [outcome(inside, 0.5, Verdict.UNDECIDED, f"a tie of {n} segments") for n in (2, 3)]
-    strange = outcome(replace(flat([1], [2]), kind="of another strategy"), 1e-15)
+    strange, failed = outcome(replace(flat([1], [2]), kind="of another strategy"), 1e-15), outcome(inside, 0.5)
     outcomes = (passed, *ties, idle, idle, strange, outcome(flat([1], [2]), 1e-15))
     rows = [
         Row("mine", info, Verdict.PASS, True, planned=7, outcomes=outcomes, seconds=1.0),
         Row("mine", plain, Verdict.PASS, True, planned=2, outcomes=(passed, idle)),
         Row("mine", other, Verdict.PASS, True, planned=1, outcomes=(outcome(flat([1], [2]), 0.0),)),
-        Row(
-            "yours", info, Verdict.FAIL, None, planned=1, outcomes=(outcome(inside, 0.5),), shrunk=outcome(inside, 0.5)
-        ),
+        Row("yours", info, Verdict.FAIL, None, planned=1, outcomes=(failed,), shrunk=failed),
     ]
     parts = {"pair": True, "tangent": True, "contact_points": True}
     return Run(tuple(rows), (), {"mine": parts, "yours": parts}, {"seed": "1", "examples": "7"})
@@ -102,33 +98,18 @@ def small_run(*, passing: bool = False) -> Run:
     rows += [Row("vts-ppt", slopes, Verdict.NOT_PROVIDED, None, reason="tangent: not provided")]
     rows += [Row("vts-ppt", nothing, Verdict.PASS, None, planned=1, outcomes=(Outcome(good, Verdict.PASS),))]
     if not passing:
+        witness = outcome(awkward(), 0.1)
         rows += [
-            Row(
-                "vts-me:n=4",
-                patch,
-                Verdict.FAIL,
-                False,
-                reason="force error 0.25, at most 1e-12",
-                planned=4,
-                outcomes=failed[:3],
-                witness=outcome(awkward(), 0.1),
-                shrunk=outcome(bad, 0.25),
-                seconds=2.0,
-            ),
-            Row("vts-me:n=4", slopes, Verdict.FAIL, False, planned=4, outcomes=passed, witness=outcome(awkward(), 0.1)),
+            Row("vts-me:n=4", patch, Verdict.FAIL, False, reason="force error 0.25, at most 1e-12", planned=4,
+                outcomes=failed[:3], witness=witness, shrunk=outcome(bad, 0.25), seconds=2.0),
+            Row("vts-me:n=4", slopes, Verdict.FAIL, False, planned=4, outcomes=passed, witness=witness),
             Row("vts-me:n=4", nothing, Verdict.CRASHED, None, planned=1, outcomes=(crashed,), shrunk=crashed),
-        ]
+        ]  # fmt: skip
     parts = {"pair": True, "tangent": False, "contact_points": True}
     return Run(
         tuple(rows),
         () if passing else (NotLoaded("mine", "ModuleNotFoundError: No module named 'mine'"),),
         {"vts-ppt": parts} if passing else {"vts-ppt": parts, "vts-me:n=4": parts | {"tangent": True}},
-        {
-            "created": "2025-01-01T00:00:00",
-            "command": "verify",
-            "platform": "Linux",
-            "seed": "7",
-            "examples": "4",
-            "empty": "",
-        },
-    )
+        {"created": "2025-01-01T00:00:00", "command": "verify", "platform": "Linux", "seed": "7", "examples": "4",
+         "empty": ""},
+    )  # fmt: skip

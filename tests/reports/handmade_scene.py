@@ -19,16 +19,10 @@ def bodies(*, wide: float = 0.0, angle: float = 0.0, rigid_master: bool = False)
     if rigid_master:
         turned = np.column_stack([places[::-1], 0 * places]) @ upper.frame.T
         return upper, rigid_surface(turned, axis=axis, name="master")
-    over = (0.0, 6.0)
     lower = block(
-        Rectangle(places, [-3, 0]),
-        contact="top",
-        approach=0.0,
-        pressure=PRESSURE,
-        name="master",
-        contact_range=over,
-        placing=Placing(axis=axis),
-    )
+        Rectangle(places, [-3, 0]), contact="top", approach=0.0, pressure=PRESSURE, name="master",
+        contact_range=(0.0, 6.0), placing=Placing(axis=axis),
+    )  # fmt: skip
     return upper, lower
 
 

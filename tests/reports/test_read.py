@@ -1,6 +1,7 @@
 """A stored case comes back bit by bit; what is no report is named as what it is."""
 
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import netCDF4
@@ -49,38 +50,35 @@ def test_a_counterexample_comes_back_with_its_numbers(report: Path) -> None:
     example = read_case(report, "vts-me_n_4.patch.flat.transmission")
     assert (example.formulation, example.property_id) == ("vts-me:n=4", "patch.flat.transmission")
     assert (example.verdict, example.reason) == (Verdict.FAIL, "force error 0.25, at most 1e-12")
-    assert example.outcome.measurement is not None
-    assert example.outcome.measurement.values == {ERROR.name: 0.25}
-    assert example.outcome.measurement.tolerances == {ERROR.name: 1e-12}
+    measured = attrgetter("outcome.measurement.values", "outcome.measurement.tolerances")
+    assert measured(example) == ({ERROR.name: 0.25}, {ERROR.name: 1e-12})
     crashed = read_case(report, "vts-me_n_4.objectivity")
     assert (crashed.verdict, crashed.outcome.measurement) == (Verdict.CRASHED, None)
     partly = read_case(report, "vts-me_n_4.tangent.directional.witness")
     assert partly.origin is Origin.WITNESS
-    assert partly.outcome.measurement is not None
-    assert list(partly.outcome.measurement.values) == [ERROR.name], "the slope was not measured"
+    assert list(measured(partly)[0]) == [ERROR.name], "the slope was not measured"
 
 
 def test_an_unknown_id_suggests_the_nearest(report: Path, tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match=r"an id like vts-me_n_4\.patch\.flat\.transmission"):
-        read_case(report, "vts-me.patch.flat.transmision")
-    with pytest.raises(MisuseError, match=re.escape("one of vts-me_n_4.patch")):
-        read_case(report, "§")
-    write(small_run(passing=True), tmp_path / "passing.nc")
-    assert case_ids(tmp_path / "passing.nc") == []
-    with pytest.raises(MisuseError, match="this one has none"):
-        read_case(tmp_path / "passing.nc", "x")
+    passing = tmp_path / "passing.nc"
+    write(small_run(passing=True), passing)
+    assert case_ids(passing) == []
+    for path, id_, words in (
+        (report, "vts-me.patch.flat.transmision", "an id like vts-me_n_4.patch.flat.transmission"),
+        (report, "§", "one of vts-me_n_4.patch"),
+        (passing, "x", "this one has none"),
+    ):
+        with pytest.raises(MisuseError, match=re.escape(words)):
+            read_case(path, id_)
 
 
 def test_what_is_no_report(report: Path, tmp_path: Path) -> None:
     (tmp_path / "text.nc").write_text("not a report")
     (tmp_path / "cut.nc").write_bytes(report.read_bytes()[:5000])
     netCDF4.Dataset(tmp_path / "other.nc", "w").close()
-    with netCDF4.Dataset(tmp_path / "newer.nc", "w") as newer:
-        newer.title, newer.schema = schema.TITLE, "99"
-    with netCDF4.Dataset(tmp_path / "older.nc", "w") as older:
-        older.title, older.schema = schema.TITLE, "1"
-    with netCDF4.Dataset(tmp_path / "empty.nc", "w") as empty:
-        empty.title, empty.schema = schema.TITLE, schema.SCHEMA
+    for name, version in (("newer", "99"), ("older", "1"), ("empty", schema.SCHEMA)):
+        with netCDF4.Dataset(tmp_path / f"{name}.nc", "w") as file:
+            file.title, file.schema = schema.TITLE, version
     for name, words in {
         "missing.nc": "does not exist",
         ".": "is a folder",

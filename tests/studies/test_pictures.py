@@ -20,8 +20,8 @@ FIG_30 = "c:penalty=1e4,sides=free,lowered=0,ratio=0.5"
 class Springs:
     """Nodal springs against the plane y = 0 on both sides, of the given sign."""
 
-    def __init__(self, stiffness: float) -> None:
-        self.stiffness = stiffness
+    def __init__(self, *, penalty: float) -> None:
+        self.stiffness = penalty
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
         forces = np.zeros_like(z)
@@ -29,28 +29,19 @@ class Springs:
         return forces
 
 
-def raising(*, penalty: float) -> Any:
-    class Raising(Springs):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            raise RuntimeError("no licence\nleft")
-
-    return Raising(penalty)
+class Raising(Springs):
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        raise RuntimeError("no licence\nleft")
 
 
-def without_points(*, penalty: float) -> Any:
-    class Bad(Springs):
-        def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return "none"
-
-    return Bad(penalty)
+class WithoutPoints(Springs):
+    def contact_points(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return "none"
 
 
-def to_infinity(*, penalty: float) -> Any:
-    class Wrong(Springs):
-        def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return -1e4 * np.eye(z.size)
-
-    return Wrong(penalty)
+class ToInfinity(Springs):
+    def tangent(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return -1e4 * np.eye(z.size)
 
 
 @pytest.mark.parametrize("text", ["c", "b:degrees=30", "a2-graded", "example-1", "example-1bis:degrees=90,refine=2"])
@@ -140,8 +131,8 @@ def test_a_body_out_of_reach_is_there_and_on_no_side() -> None:
 @pytest.mark.parametrize(
     ("make", "end", "remark"),
     [
-        (without_points, "", "contact_points: returned a str; needed ContactPoints"),
-        (to_infinity, "diverged", "drawn is iterate "),
+        (WithoutPoints, "", "contact_points: returned a str; needed ContactPoints"),
+        (ToInfinity, "diverged", "drawn is iterate "),
     ],
 )
 def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., Any], end: str, remark: str) -> None:
@@ -155,9 +146,8 @@ def test_what_does_not_come_out_well_is_drawn_with_a_remark(make: Callable[..., 
 
 
 def test_failures_are_a_line_each_and_the_others_are_solved() -> None:
-    bad = Subject("raising", raising)
-    absent = NotLoaded("absent", "ModuleNotFoundError")
-    solved = solve_scene(load_scene("c").case(), [bad, absent, load_subject("vts-ppt")])
+    subjects = [Subject("raising", Raising), NotLoaded("absent", "ModuleNotFoundError"), load_subject("vts-ppt")]
+    solved = solve_scene(load_scene("c").case(), subjects)
     assert [solution.formulation for solution in solved.solutions] == ["vts-ppt"]
     assert solved.failures.keys() == {"raising", "absent"}
     assert solved.failures["raising"].startswith("residual: RuntimeError: no licence left (test_pictures.py, line ")

@@ -68,15 +68,10 @@ def render(template_name: str, *, package: str = "contactverif_reports.html", **
     return _with_distinct_ids(_environment(package).get_template(template_name).render(context))
 
 
-def check_page(path: str | os.PathLike[str], argument: str = "--out") -> None:
-    """Check before a long computation that its page can be written afterwards."""
-    checked_name(path, SUFFIXES, argument)
-    check_writable(path, argument, "FILE.html")
-
-
 def write_page(path: str | os.PathLike[str], html: str, argument: str = "--out") -> None:
     """Write a page, whole or not at all, as UTF-8."""
-    check_page(path, argument)
+    checked_name(path, SUFFIXES, argument)
+    check_writable(path, argument, "FILE.html")
     try:
         with whole(path) as part:
             part.write_text(html, encoding="utf-8", newline="\n")

@@ -105,13 +105,11 @@ def make_case_figure(
     axes.margins(0.05)
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
     facing = gaps.gap[gaps.facing]
-    if not len(facing):
-        notes = [f"no slave node faces the master{change}"]
-    elif gaps.uniform(course.roundoff):
-        notes = [f"gap {format_number(float(facing.mean()), course.roundoff)}{change}"]
-    else:
-        ends = (format_number(end, course.roundoff) for end in (facing.min(), facing.max()))
-        notes = [f"gap {' to '.join(ends)}{change}"]
+    ends = (
+        () if not len(facing) else (facing.mean(),) if gaps.uniform(course.roundoff) else (facing.min(), facing.max())
+    )
+    gap = " to ".join(format_number(float(end), course.roundoff) for end in ends)
+    notes = [f"gap {gap}{change}" if gap else f"no slave node faces the master{change}"]
     shortest = min(float(its_lengths.min()) for its_lengths in lengths) / unit
     if shortest < _SHORT * size:
         notes.append(f"shortest segment {format_number(shortest, course.roundoff / unit)}")
@@ -213,18 +211,16 @@ def _plot_surface(
 def hatch(axes: Axes, ends: FloatArray, inside: FloatArray, color: str, pattern: str) -> FloatArray:
     """Hatch strips (n, 4, 2) between segments and their copies inside a body, (n, 2, 2) each; return the strips."""
     strips = np.concatenate([ends, inside[:, ::-1]], axis=1)
-    axes.add_collection(
-        PolyCollection(list(strips), facecolor="none", edgecolor=color, linewidth=0, hatch=pattern, zorder=1)
-    )
+    look: dict[str, Any] = {"facecolor": "none", "edgecolor": color, "linewidth": 0, "hatch": pattern, "zorder": 1}
+    axes.add_collection(PolyCollection(list(strips), **look))
     return strips
 
 
 def _plot_side(axes: Axes, edges: IntArray, nodes: FloatArray, pen: Pen, size: float, label: str) -> None:
     """Draw segments (n, 2) with their nodes, whose markers are `size` points wide, and an entry of the legend."""
     look: dict[str, Any] = {"color": pen.color, "marker": pen.marker, "markerfacecolor": pen.fill, "markersize": size}
-    axes.add_collection(
-        LineCollection(list(nodes[edges]), colors=pen.color, linewidths=1.6, linestyles=pen.style, zorder=3)
-    )
+    lines: dict[str, Any] = {"colors": pen.color, "linewidths": 1.6, "linestyles": pen.style, "zorder": 3}
+    axes.add_collection(LineCollection(list(nodes[edges]), **lines))
     axes.plot(*nodes[np.unique(edges)].T, linestyle="none", zorder=4, **look)
     axes.plot([], [], linestyle=pen.style, label=label, **look)
 
@@ -236,11 +232,8 @@ def _plot_arrows(
 
     `longest` is the length of the longest arrow; forces of None are not drawn.
     """
-    by_kind = {
-        kind: np.asarray(values, dtype=np.float64).reshape(-1, 2)
-        for kind, values in (("exact", exact), ("formulation", forces))
-        if values is not None
-    }
+    kinds = (("exact", exact), ("formulation", forces))
+    by_kind = {kind: np.reshape(values, (-1, 2)) for kind, values in kinds if values is not None}
     largest = max((float(np.linalg.norm(values, axis=1).max()) for values in by_kind.values()), default=0.0)
     if not (np.isfinite(largest) and largest > 0):
         return
@@ -416,11 +409,10 @@ def make_outline_figure(case: Case, width: float) -> Figure:
         label = pen.name + " (rigid)" * bool(rigid[edges].all())
         _plot_side(axes, edges, nodes, pen, 4.5 if len(edges) <= 30 else 2, label)
     fixed = (packed["fixed"] != 0) & ~rigid[:, None]
-    bars: list[FloatArray] = []  # A short one across each direction in which a node is fixed.
-    for component, across in ((0, second), (1, first)):
-        ends, at_nodes = _SUPPORT * size * across[fixed[:, component]], nodes[fixed[:, component]]
-        bars += list(np.stack([at_nodes - ends, at_nodes + ends], axis=1))
-    if bars:
+    if fixed.any():  # A short bar stands across each direction in which a node is fixed.
+        ends = _SUPPORT * size * np.vstack([second[fixed[:, 0]], first[fixed[:, 1]]])
+        at = np.vstack([nodes[fixed[:, 0]], nodes[fixed[:, 1]]])
+        bars = list(np.stack([at - ends, at + ends], axis=1))
         axes.add_collection(LineCollection(bars, colors="black", linewidths=2.2, zorder=5))
         axes.plot([], [], color="black", linewidth=2.2, label="support")
     loads = packed["load"][:, :1] * first + packed["load"][:, 1:] * second

@@ -21,7 +21,6 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif_reports.files import checked_name
 from contactverif_reports.plot.case_figures import SUFFIXES, hatch, save
@@ -163,11 +162,8 @@ def make_scene_figure(solved: SolvedScene, title: str = "") -> Figure:
     bodies, curves = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
     _plot_meshes(bodies, solved, rows, across)
     _plot_curves(curves, solved)
-    moduli = ", ".join(
-        f"{body.name} E {format_number(body.young)}, ν {format_number(body.poisson)}"
-        for body in solved.bodies
-        if not body.rigid
-    )
+    soft = (body for body in solved.bodies if not body.rigid)
+    moduli = ", ".join(f"{body.name} E {format_number(body.young)}, ν {format_number(body.poisson)}" for body in soft)
     facts = f"penalty {format_number(float(f'{solved.case.penalty:.4g}'))}; {moduli}"
     lines = [*textwrap.wrap(title, 110), *textwrap.wrap(facts, 110, max_lines=2, placeholder=" …")]
     for solution in solved.solutions:  # What happened where Newton's method did not converge.
@@ -181,7 +177,7 @@ def _plot_meshes(figure: SubFigure, solved: SolvedScene, rows: int, across: int)
     box = close_up(solved)
     panels = figure.subplots(rows, across, squeeze=False, sharex=box is None, sharey=box is None)
     if box is not None:
-        whole = panels.ravel()[0]
+        whole = panels.flat[0]
         for body in solved.bodies:
             cells = list(body.nodes[body.cells])
             whole.add_collection(PolyCollection(cells, facecolor="none", edgecolor="0.35", linewidth=0.15, zorder=2))
@@ -249,14 +245,14 @@ class Magnification:
 
         An enlarged drawing does not magnify displacements, because that would close gaps that stay open.
         """
-        moves = max(float(np.abs(u).max(initial=0.0)) for solution in solutions for u in solution.displacements)
-        gaps = max(float(np.abs(_gaps(solved, solution.z).gap).max()) for solution in solutions)
         roundoff = 64 * UNIT_ROUNDOFF * solved.case.largest_coordinate
-        if (box := close_up(solved)) is not None:
-            deep = max(-float(_gaps(solved, solution.z).gap.min()) for solution in solutions)
-            return cls(1.0, 1.0 if deep <= roundoff else one_digit(_VISIBLE_GAP * float(np.ptp(box[:, 0])) / deep))
-        move = 1.0 if moves <= roundoff else one_digit(_VISIBLE_MOVE * solved.size / moves)
-        return cls(move, 1.0 if gaps <= roundoff else one_digit(_VISIBLE_GAP * solved.size / gaps))
+        moves = max(float(np.abs(u).max(initial=0.0)) for solution in solutions for u in solution.displacements)
+        gaps = np.array([_gaps(solved, solution.z).gap for solution in solutions])
+        box, size, largest = close_up(solved), solved.size, float(np.abs(gaps).max())
+        if box is not None:
+            moves, size, largest = 0.0, float(np.ptp(box[:, 0])), -float(gaps.min())
+        sizes = ((_VISIBLE_MOVE, moves), (_VISIBLE_GAP, largest))
+        return cls(*(1.0 if value <= roundoff else one_digit(share * size / value) for share, value in sizes))
 
     @property
     def words(self) -> str:
@@ -278,13 +274,8 @@ def magnifications(solved: SolvedScene) -> dict[str, Magnification]:
 
 def colour_scale(solved: SolvedScene) -> ScalarMappable:
     """Return a scale over the pressures of all cells of all solutions; a single exact pressure is in the middle."""
-    pressures = np.concatenate(
-        [
-            pressures_across(body, s)
-            for solution in solved.solutions
-            for body, s in zip(solved.bodies, solution.stresses, strict=True)
-        ]
-    )
+    pairs = [pair for solution in solved.solutions for pair in zip(solved.bodies, solution.stresses, strict=True)]
+    pressures = np.concatenate([pressures_across(*pair) for pair in pairs])
     pressures = pressures[np.isfinite(pressures)]
     low, high = (float(pressures.min()), float(pressures.max())) if len(pressures) else (0.0, 1.0)
     if len(solved.pressures) == 1:
@@ -336,7 +327,11 @@ def plot_bodies(
             axes.plot(*strips.reshape(-1, 2).T, linestyle="none")  # The axes reach around it.
         else:
             _plot_cells(axes, nodes[body.cells], pressures_across(body, solution.stresses[index]), scale, box)
-        _plot_contact_side(axes, body, nodes, side)
+        style, marker, fill = ("solid", "o", "black") if side == "slave" else ((0, (4, 1.5)), "s", "white")
+        edges, at = list(nodes[body.contact]), nodes[body.contact_nodes]
+        axes.add_collection(LineCollection(edges, colors="black", linewidths=1.3, linestyles=[style], zorder=5))
+        look: dict[str, Any] = {"marker": marker, "mfc": fill, "ms": 3.6 if len(at) <= _MANY_NODES else 1.5}
+        axes.plot(*at.T, ls="none", mec="black", mew=0.8, zorder=6, **look)
     _plot_penetration(axes, solved, surface[: len(shifts)] + shifts, large.gap * gaps.gap, magnified.normal)
     axes.set_aspect("equal", adjustable="box")
     axes.margins(0.04)
@@ -352,22 +347,10 @@ def _plot_cells(
         low, high = corners.min(axis=1), corners.max(axis=1)
         visible = (high >= box[0]).all(axis=1) & (low <= box[1]).all(axis=1)
         corners, pressures = corners[visible], pressures[visible]
-    thickness = 0.4 if len(corners) <= _MANY_CELLS else 0.2
-    faces = axes.add_collection(
-        PolyCollection(list(corners), edgecolor="0.25", linewidth=thickness, zorder=2, alpha=None)
-    )
+    look: dict[str, Any] = {"edgecolor": "0.25", "linewidth": 0.4 if len(corners) <= _MANY_CELLS else 0.2, "zorder": 2}
+    faces = axes.add_collection(PolyCollection(list(corners), **look))
     faces.set_array(pressures)
     faces.set(cmap=scale.cmap, norm=scale.norm)
-
-
-def _plot_contact_side(axes: Axes, body: Body, nodes: FloatArray, side: str) -> None:
-    style: Any = "solid" if side == "slave" else (0, (4, 1.5))
-    edges = list(nodes[body.contact])
-    axes.add_collection(LineCollection(edges, colors="black", linewidths=1.3, linestyles=[style], zorder=5))
-    at = nodes[body.contact_nodes]
-    look: dict[str, Any] = {"marker": "o", "mfc": "black"} if side == "slave" else {"marker": "s", "mfc": "white"}
-    size = 3.6 if len(at) <= _MANY_NODES else 1.5
-    axes.plot(*at.T, ls="none", ms=size, mec="black", mew=0.8, zorder=6, **look)
 
 
 def _gaps(solved: SolvedScene, z: FloatArray) -> Gaps:
