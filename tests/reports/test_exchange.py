@@ -23,8 +23,8 @@ def run() -> Run:
     result = verify([load_formulation("nts"), load_formulation("vts-ppt")], load_properties(IDS), examples=3, seed=1)
     rows = result.row_of
     rows["nts", "patch.flat.single"] = replace(rows["nts", "patch.flat.single"], promise=True)
-    gone = NotLoaded("gone", "no \x1b[31mmodule")
-    return replace(result, rows=tuple(rows.values()), not_loaded=(gone,), opposite_signs=("vts-ppt",))
+    absent = NotLoaded("gone", "no \x1b[31mmodule")
+    return replace(result, rows=tuple(rows.values()), not_loaded=(absent,), opposite_signs=("vts-ppt",))
 
 
 def test_the_document_says_what_the_run_says(run: Run, tmp_path: Path) -> None:
