@@ -9,24 +9,22 @@ Rule for the next editor: names and numbers are for good. A stored report refers
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif.problems.flat_states import grid, rotation
+from contactverif.problems.flat_states import grid, listed, rotation
 
-FINEST = 1e-3  # The shortest over the longest segment of the graded state.
+_FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0
 _DEPTH = 1 / 16  # The mean penetration over the shortest segment.
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class _Part(NamedTuple):
     """A slave chain over a master chain, at rest: the slave on top, and left of the way that it is walked."""
 
     slave: FloatArray  # (n, 2) The points in walking order, the body on the left.
@@ -35,11 +33,12 @@ class Part:
     closed: bool = False  # The last point of each chain is joined to its first.
 
 
-@cache
-def long_face_states() -> tuple[Case, ...]:
+@listed
+def long_face_states() -> Iterator[Case]:
     """Return the states in space: triangles on a wave, few on many, many on few, and nearly flat and hardly in touch.
 
-    In the last one the tangent is nearly symmetric, as it is in everyday use.
+    In the last one the tangent is nearly symmetric, as it is in everyday use. A slave grid lies over the middle of a
+    wider master grid.
     """
     sizes = {
         "wavy-faces-128": (8, 5, 1 / 16, _DEPTH),
@@ -47,31 +46,26 @@ def long_face_states() -> tuple[Case, ...]:
         "many-faces-on-few-128": (8, 2, 0.0, _DEPTH),
         "shallow-faces-128": (4, 8, 0.0, _DEPTH / 64),
     }
-    return tuple(_case_of_faces(name, number, *size) for number, (name, size) in enumerate(sizes.items()))
+    for number, (name, (*cells, amplitude, depth)) in enumerate(sizes.items()):
+        slave, master = (
+            grid(_places(2 * number + side, count).tolist(), _places(2 * number + side + 20, count).tolist())
+            for side, count in enumerate(map(int, cells))
+        )
+        upper, lower = np.array(slave.points), 1.1 * np.array(master.points) - [0.05, 0.05, 0.0]
+        for points in (upper, lower):
+            points[:, 2] = amplitude * np.cos(7 * points[:, 0]) * np.cos(5 * points[:, 1])
+        interface = Interface.from_faces(upper, [face[::-1] for face in slave.faces], lower, master.faces)
+        least = min(surface.heights(interface.nodes).min() for surface in (interface.slave, interface.master))
+        upper[:, 2] -= amplitude / 8 + least * np.random.default_rng(number).uniform(0.5, 1.5, len(upper)) * depth
+        matrix, size = rotation((3, 1, 2, 1 + number))
+        current = np.vstack([upper, lower]) @ (np.array(matrix).T / size)
+        yield Case(interface, current.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
 
 
-def _case_of_faces(name: str, number: int, slave_cells: int, master_cells: int, amplitude: float, depth: float) -> Case:
-    """Return a slave grid over the middle of a wider master grid, both on a wave and turned."""
-    slave, master = (
-        grid(_places(2 * number + side, cells).tolist(), _places(2 * number + side + 20, cells).tolist())
-        for side, cells in enumerate((slave_cells, master_cells))
-    )
-    upper, lower = np.array(slave.points), 1.1 * np.array(master.points) - [0.05, 0.05, 0.0]
-    upper[:, 2], lower[:, 2] = (
-        amplitude * np.cos(7 * points[:, 0]) * np.cos(5 * points[:, 1]) for points in (upper, lower)
-    )
-    interface = Interface.from_faces(upper, [face[::-1] for face in slave.faces], lower, master.faces)
-    least = min(surface.heights(interface.nodes).min() for surface in (interface.slave, interface.master))
-    upper[:, 2] -= amplitude / 8 + least * np.random.default_rng(number).uniform(0.5, 1.5, len(upper)) * depth
-    matrix, size = rotation((3, 1, 2, 1 + number))
-    current = np.vstack([upper, lower]) @ (np.array(matrix).T / size)
-    return Case(interface, current.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
-
-
-@cache
-def long_states() -> tuple[Case, ...]:
-    """Return the states."""
-    parts = {
+@listed
+def long_states() -> Iterator[Case]:
+    """Return the states of chains, each turned by an angle; slave nodes penetrate by different depths."""
+    groups = {
         "wave-110": [_open(_places(2, 80), _places(13, 110), wavy=True)],
         "graded-110": [_open(_places(4, 110, graded=True), _places(5, 60))],
         "many-on-few-104": [_open(_places(1, 104), _places(3, 4))],
@@ -79,7 +73,26 @@ def long_states() -> tuple[Case, ...]:
         "three-chains-108": [_open(_places(6 + k, 36), _places(9 + k, 12), along=1.5 * k) for k in range(3)],
         "ring-104": [_ring(_places(12, 30), _places(13, 104))],
     }
-    return tuple(_case(name, group, turn=0.5 + number) for number, (name, group) in enumerate(parts.items()))
+    for number, (name, parts) in enumerate(groups.items()):
+        nodes, surfaces, count = [], [], 0
+        for side in ("slave", "master"):
+            segments = []
+            for part in parts:
+                points = getattr(part, side)
+                numbers = np.arange(count, count + len(points))
+                pairs = np.column_stack([numbers, np.roll(numbers, -1)])
+                segments.append(pairs if part.closed else pairs[:-1])
+                nodes.append(points)
+                count += len(points)
+            surfaces.append(Surface(np.vstack(segments)))
+        current, inward = np.vstack(nodes), np.vstack([part.inward for part in parts])
+        interface, n_slave = Interface(current, *surfaces), len(inward)
+        shortest = min(surface.lengths(current).min() for surface in surfaces)
+        depths = shortest * np.random.default_rng(n_slave).uniform(0.5, 1.5, n_slave) * _DEPTH
+        current[:n_slave] += depths[:, None] * inward
+        cos, sin = np.cos(0.5 + number), np.sin(0.5 + number)
+        turned = current @ np.array([[cos, sin], [-sin, cos]])
+        yield Case(interface, turned.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
 
 
 def _places(seed: int, count: int, *, graded: bool = False) -> FloatArray:
@@ -87,49 +100,25 @@ def _places(seed: int, count: int, *, graded: bool = False) -> FloatArray:
 
     Graded segments, an even number, are the shorter the nearer to 1/2.
     """
-    random, half = np.random.default_rng(seed), np.geomspace(1.0, FINEST, count // 2)
-    steps = random.uniform(0.7, 1.4, count)
+    random = np.random.default_rng(seed)
     if graded:
-        steps = np.concatenate([half, half[::-1]]) * np.random.default_rng(seed).uniform(0.9, 1.1, count)
+        half = np.geomspace(1.0, _FINEST, count // 2)
+        steps = np.concatenate([half, half[::-1]]) * random.uniform(0.9, 1.1, count)
+    else:
+        steps = random.uniform(0.7, 1.4, count)
     places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
     return places
 
 
-def _open(slave: FloatArray, master: FloatArray, *, along: float = 0.0, wavy: bool = False) -> Part:
+def _open(slave: FloatArray, master: FloatArray, *, along: float = 0.0, wavy: bool = False) -> _Part:
     """Return a slave over the middle of a wider master; both lie on a line or a wave and begin at `along`, a length."""
     lines = [(x + along, np.cos(7 * x) / 16 if wavy else 0 * x) for x in (slave, (1.1 * master - 0.05)[::-1])]
     upper, lower = map(np.column_stack, lines)
-    return Part(upper, lower, np.tile([0.0, -1.0], (len(slave), 1)))
+    return _Part(upper, lower, np.tile([0.0, -1.0], (len(slave), 1)))
 
 
-def _ring(slave: FloatArray, master: FloatArray) -> Part:
+def _ring(slave: FloatArray, master: FloatArray) -> _Part:
     """Return a slave ring around a master ring; places from 0 to 1 go once around."""
     angles = (-2 * np.pi * slave[:-1], 2 * np.pi * master[:-1])
     outer, inner = (np.column_stack([np.cos(angle), np.sin(angle)]) for angle in angles)
-    return Part(outer, inner, -outer, closed=True)
-
-
-def _case(name: str, parts: Sequence[Part], turn: float) -> Case:
-    """Return the state of some parts, turned by an angle; slave nodes penetrate by different depths."""
-    slaves, masters = ([getattr(part, side) for part in parts] for side in ("slave", "master"))
-    closed = [part.closed for part in parts]
-    n_slave = sum(map(len, slaves))
-    slave, master = Surface(_segments(slaves, closed, 0)), Surface(_segments(masters, closed, n_slave))
-    interface = Interface(np.vstack([*slaves, *masters]), slave, master)
-    shortest = min(surface.lengths(interface.nodes).min() for surface in (slave, master))
-    depths = shortest * np.random.default_rng(n_slave).uniform(0.5, 1.5, n_slave) * _DEPTH
-    current = np.vstack([np.vstack(slaves) + depths[:, None] * np.vstack([part.inward for part in parts]), *masters])
-    cos, sin = np.cos(turn), np.sin(turn)
-    turned = current @ np.array([[cos, sin], [-sin, cos]])
-    return Case(interface, turned.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
-
-
-def _segments(chains: Sequence[FloatArray], closed: Sequence[bool], start: int) -> IntArray:
-    """Return the segments (n, 2) of chains whose nodes are numbered one after the other from `start`."""
-    segments = []
-    for points, is_closed in zip(chains, closed, strict=True):
-        numbers = np.arange(start, start + len(points))
-        pairs = np.column_stack([numbers, np.roll(numbers, -1)])
-        segments.append(pairs if is_closed else pairs[:-1])
-        start += len(points)
-    return np.vstack(segments)
+    return _Part(outer, inner, -outer, closed=True)

@@ -10,7 +10,8 @@ Rule for the next editor: names and numbers are for good. A stored report refers
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Iterator
+from dataclasses import replace
 from math import log2
 
 import numpy as np
@@ -20,6 +21,7 @@ from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
+from contactverif.problems.flat_states import listed
 
 TURN = (3.0, 4.0)  # The rotation by cos = 3/5 and sin = 4/5.
 HYPOTENUSE = 5.0
@@ -38,48 +40,47 @@ _PENALTY = 16.0
 _PRESSURE = 2.0**-10  # The pressure on the solved blocks, whose modulus E is 1.
 
 
-@cache
+@listed
 @random_source("contactverif_properties.stability_sweep.sweep_cases")
-def stability_states() -> tuple[Case, ...]:
+def stability_states() -> Iterator[Case]:
     """Return the states of an interface alone, with names (``"gap-1e-9-a"``), whose kind is one of `SWEEPS`.
 
     Their parameters are "gap" (the penetration, a length), "ratio" (of the shortest segment to an ordinary one),
     "offset" (a length), "turn" (2,) (legs of the rotation) and "shift" (2,) (a length each).
     """
-    states = []
     for mesh in _MESHES:
-        states += [_state("gap", f"gap-1e{gap}-{mesh}", mesh, gap=gap) for gap in GAP_DECADES]
-        states += [_state("ratio", f"ratio-1e{ratio}-{mesh}", mesh, ratio=ratio) for ratio in RATIO_DECADES]
-        states += [_state("offset", f"offset-1e{offset}-{mesh}", mesh, offset=offset) for offset in OFFSET_DECADES]
-        for offset in OFFSET_DECADES:
-            name = f"offset-1e{offset}-gap-1e{SMALL_GAP}-{mesh}"
-            states.append(_state("offset at a small gap", name, mesh, gap=SMALL_GAP, offset=offset))
-        states.append(_state("all of it", f"all-{mesh}", mesh, gap=SMALL_GAP, ratio=SMALL_RATIO, offset=FAR))
-    return tuple(states)
+        sweeps = [("gap", f"gap-1e{gap}", {"gap": gap}) for gap in GAP_DECADES]
+        sweeps += [("ratio", f"ratio-1e{ratio}", {"ratio": ratio}) for ratio in RATIO_DECADES]
+        sweeps += [("offset", f"offset-1e{offset}", {"offset": offset}) for offset in OFFSET_DECADES]
+        sweeps += [
+            ("offset at a small gap", f"offset-1e{offset}-gap-1e{SMALL_GAP}", {"gap": SMALL_GAP, "offset": offset})
+            for offset in OFFSET_DECADES
+        ]
+        sweeps.append(("all of it", "all", {"gap": SMALL_GAP, "ratio": SMALL_RATIO, "offset": FAR}))
+        for kind, name, decades in sweeps:
+            yield _state(kind, f"{name}-{mesh}", mesh, **decades)
 
 
-@cache
+@listed
 @random_source("contactverif_properties.stability_stiffness.stiffness_cases")
-def stability_scenes() -> tuple[Case, ...]:
+def stability_scenes() -> Iterator[Case]:
     """Return two blocks at penalties from soft springs to far beyond what doubles can carry."""
     slave_x, master_x = _places(np.random.default_rng(3), _MOST_BITS, 1.0)
     lines = np.array([0.0, 1.0, 2.0])
     master_x = np.concatenate([[slave_x[0]], master_x[1:-1], [slave_x[-1]]])  # Both blocks are equally wide.
     mean = float(np.diff(slave_x).mean())
-    cases = []
     for decade in STIFFNESS_DECADES:
         stiffness = 10.0**decade
         scene = two_blocks(
-            Rectangle(slave_x, lines, young=1.0, poisson=0.25),
-            Rectangle(master_x, lines - 2, young=1.0, poisson=0.25),
+            Rectangle(slave_x, lines, poisson=0.25),
+            Rectangle(master_x, lines - 2, poisson=0.25),
             penalty=stiffness / mean,
             pressure=_PRESSURE,
             name=f"stiffness-1e{decade}",
         )
         case = scene.case()
         parameters = {**case.parameters, **_motion(0.0), "stiffness": np.array(stiffness)}
-        cases.append(Case(case.interface, case.z, case.penalty, parameters, name=case.name, kind="stiffness"))
-    return tuple(cases)
+        yield replace(case, parameters=parameters, kind="stiffness")
 
 
 def _state(kind: str, name: str, mesh: str, *, gap: int = PLAIN_GAP, ratio: int = 0, offset: int | None = None) -> Case:
@@ -89,11 +90,10 @@ def _state(kind: str, name: str, mesh: str, *, gap: int = PLAIN_GAP, ratio: int 
     slave_x, master_x = _places(np.random.default_rng(_MESHES.index(mesh)), bits, 10.0**ratio)
     depth = float(_on_lattice(np.array(10.0**gap), bits))
     upper, lower = (np.column_stack([x, np.zeros_like(x)]) for x in (slave_x, master_x[::-1]))
-    interface = Interface.from_chains(upper, lower)
     parameters = _motion(0.0 if offset is None else 2.0**power)
     parameters |= {"gap": np.array(depth), "ratio": np.array(10.0**ratio)}
     z = np.vstack([upper - [0.0, depth], lower]).reshape(-1)
-    return Case(interface, z, _PENALTY, parameters, name=name, kind=kind)
+    return Case(Interface.from_chains(upper, lower), z, _PENALTY, parameters, name=name, kind=kind)
 
 
 def _motion(offset: float) -> dict[str, FloatArray]:
@@ -102,21 +102,18 @@ def _motion(offset: float) -> dict[str, FloatArray]:
     return {"turn": np.array(TURN), "shift": shift, "offset": np.array(offset)}
 
 
-def _places(random: np.random.Generator, bits: int, ratio: float) -> tuple[FloatArray, FloatArray]:
-    """Return the ascending x of slave (6,) and master (5,); one segment of each is `ratio` long, if that is below 1."""
-    return _line(random, 5, (0.0, 5.0), bits, ratio), _line(random, 4, (-0.5, 5.5), bits, ratio)
-
-
-def _line(random: np.random.Generator, n: int, ends: tuple[float, float], bits: int, ratio: float) -> FloatArray:
-    """Return n + 1 ascending coordinates between the ends, the middle segment `ratio` long."""
-    lengths = random.uniform(0.6, 1.4, n)
-    short = n // 2
-    if ratio < 1:
-        lengths[short] = 0.0
-    x = _on_lattice(ends[0] + np.cumsum([0.0, *lengths]) * ((ends[1] - ends[0]) / lengths.sum()), bits)
-    if ratio < 1:  # The nodes behind the short segment move on by its length, which keeps them on the lattice.
-        x[short + 1 :] = x[short + 1 :] + _on_lattice(np.array(ratio), bits)
-    return x
+def _places(random: np.random.Generator, bits: int, ratio: float) -> list[FloatArray]:
+    """Return the ascending x of slave (6,) and master (5,); the middle segment of each is `ratio` long, if below 1."""
+    sides = []
+    for n, low, high in ((5, 0.0, 5.0), (4, -0.5, 5.5)):
+        lengths, short = random.uniform(0.6, 1.4, n), n // 2
+        if ratio < 1:
+            lengths[short] = 0.0
+        x = _on_lattice(low + np.cumsum([0.0, *lengths]) * ((high - low) / lengths.sum()), bits)
+        if ratio < 1:  # The nodes behind the short segment move on by its length, which keeps them on the lattice.
+            x[short + 1 :] = x[short + 1 :] + _on_lattice(np.array(ratio), bits)
+        sides.append(x)
+    return sides
 
 
 def _on_lattice(values: FloatArray, bits: int) -> FloatArray:
