@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache, partial
+from functools import cache, cached_property, lru_cache
 from math import ceil, log2, pi, sqrt
 
 import numpy as np
@@ -67,7 +67,7 @@ class LinePressure:
     @property
     def force(self) -> float:
         """The total force F per unit of thickness."""
-        return float(self._totals[0, -1])
+        return float(self._primitives[1][0, -1])
 
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure at x from the middle, in the shape of x; 0 outside."""
@@ -75,17 +75,16 @@ class LinePressure:
         values = np.einsum("...n,...n", self.coefficients[panel], legendre.legvander(t, self._n_terms - 1))
         return np.where(np.abs(x) < self.half_width, values, 0.0)
 
-    def force_up_to(self, x: FloatArray) -> FloatArray:
-        """Return the force ∫ p ds of the strip from −a to x, in the shape of x."""
-        return self._integrate(x, 0)
-
-    def moment_up_to(self, x: FloatArray) -> FloatArray:
-        """Return the moment ∫ s p ds of the strip from −a to x, in the shape of x."""
-        return self._integrate(x, 1)
+    def integrals_up_to(self, x: FloatArray) -> FloatArray:
+        """Return the force ∫ p ds and the moment ∫ s p ds (2, …) of the strip from −a to x, each in the shape of x."""
+        panel, t = self._place(x)
+        (parts, totals), polynomials = self._primitives, legendre.legvander(t, self._n_terms + 1)
+        pairs = zip(totals, parts, strict=True)
+        return np.stack([total[panel] + np.einsum("...n,...n", part[panel], polynomials) for total, part in pairs])
 
     def nodal_forces(self, x: FloatArray) -> FloatArray:
         """Return ∫ N_i p ds (n,) at ascending nodes x (n,), exact."""
-        force, moment = np.diff(self.force_up_to(x)), np.diff(self.moment_up_to(x))
+        force, moment = np.diff(self.integrals_up_to(x))
         towards_second = (moment - x[:-1] * force) / np.diff(x)
         forces = np.zeros(len(x))
         forces[1:] += towards_second
@@ -104,7 +103,7 @@ class LinePressure:
 
     def constant_error(self, x: FloatArray) -> float:
         """Return the same error of the best function that is constant between ascending nodes x (n,)."""
-        return self._error_of_best(float((np.diff(self.force_up_to(x)) ** 2 / np.diff(x)).sum()))
+        return self._error_of_best(float((np.diff(self.integrals_up_to(x)[0]) ** 2 / np.diff(x)).sum()))
 
     def line_loads(self) -> tuple[FloatArray, FloatArray]:
         """Return places (n,) and forces (n,) of line loads that are as good as the pressure some way off.
@@ -116,9 +115,9 @@ class LinePressure:
         halves = self.half_width * self._halves[long, None]
         places = self.half_width * self._middles[long, None] + halves * points
         forces = halves * weights * (self.coefficients[long] @ legendre.legvander(points, self._n_terms - 1).T)
-        end = np.array([self.half_width * self.edges[1:][long][-1]])
-        force = self.force - self.force_up_to(end)
-        middle = (self.moment_up_to(np.array([self.half_width])) - self.moment_up_to(end)) / force
+        ends = self.integrals_up_to(self.half_width * np.array([self.edges[1:][long][-1], 1.0]))
+        force = self.force - ends[0, :1]
+        middle = np.diff(ends[1]) / force
         return np.concatenate([-middle, places.ravel(), middle]), np.concatenate([force, forces.ravel(), force])
 
     def deflection(self, x: FloatArray) -> FloatArray:
@@ -151,19 +150,18 @@ class LinePressure:
         return np.diff(self.edges) / 2
 
     @cached_property
-    def _primitives(self) -> FloatArray:
-        """Return coefficients (2, n_panels, n_terms + 2) of ∫ p ds and ∫ s p ds from the beginning of each panel."""
-        along = self._middles[:, None] * np.pad(self.coefficients, ((0, 0), (0, 1)))
-        moments = along + self._halves[:, None] * np.apply_along_axis(legendre.legmulx, 1, self.coefficients)
+    def _primitives(self) -> tuple[FloatArray, FloatArray]:
+        """Coefficients (2, n_panels, n_terms + 2) of ∫ p ds and ∫ s p ds from the beginning of each panel.
+
+        Then the sums (2, n_panels + 1) of both up to the beginning of each panel, and up to the end.
+        """
         forces = np.pad(self.coefficients, ((0, 0), (0, 1)))
+        moments = self._middles[:, None] * forces
+        moments = moments + self._halves[:, None] * np.apply_along_axis(legendre.legmulx, 1, self.coefficients)
         scale = self.half_width * self._halves[:, None]
         parts = [scale * legendre.legint(values, lbnd=-1, axis=1) for values in (forces, self.half_width * moments)]
-        return np.stack(parts)
-
-    @cached_property
-    def _totals(self) -> FloatArray:
-        """Return sums (2, n_panels + 1) of both integrals up to the beginning of each panel, and up to the end."""
-        return np.pad(np.cumsum(self._primitives.sum(axis=2), axis=1), ((0, 0), (1, 0)))
+        primitives = np.stack(parts)
+        return primitives, np.pad(np.cumsum(primitives.sum(axis=2), axis=1), ((0, 0), (1, 0)))
 
     def _place(self, x: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return panel and place on it, −1 … 1, both in the shape of x."""
@@ -171,29 +169,15 @@ class LinePressure:
         panel = np.clip(np.searchsorted(self.edges, flat, side="right") - 1, 0, len(self.edges) - 2)
         return panel, np.clip((flat - self._middles[panel]) / self._halves[panel], -1.0, 1.0)
 
-    def _integrate(self, x: FloatArray, power: int) -> FloatArray:
-        panel, t = self._place(x)
-        polynomials = legendre.legvander(t, self._n_terms + 1)
-        integrals: FloatArray = self._totals[power][panel] + np.einsum(
-            "...n,...n", self._primitives[power][panel], polynomials
-        )
-        return integrals
 
-
-def hertz_pressure(half_width: float, peak: float) -> LinePressure:
-    """Return Hertz' pressure p0 √(1 − x²/a²) (Johnson, 4.44)."""
+def hertz_contact(half_width: float, radius: float, stiffness: float) -> LinePressure:
+    """Return Hertz' pressure p0 √(1 − x²/a²) of a given half-width: p0 = E* a / 2R (Johnson, 4.43 to 4.45)."""
     points, weights = gauss_rule(TERMS)
     begin, end = 2.0 ** -np.arange(_HERTZ_LEVELS + 1.0), np.append(2.0 ** -np.arange(1.0, _HERTZ_LEVELS + 1), 0.0)
     gaps = (begin + end)[:, None] / 2 - (begin - end)[:, None] / 2 * points  # 1 − |x|/a keeps its digits at the edge.
     factors = (np.arange(TERMS) + 0.5) * weights[:, None] * legendre.legvander(points, TERMS - 1)
-    half = peak * np.sqrt(gaps * (2 - gaps)) @ factors
-    coefficients = np.concatenate([half[::-1] * (-1.0) ** np.arange(TERMS), half])
-    return LinePressure(half_width, _edges(_HERTZ_LEVELS), coefficients)
-
-
-def hertz_contact(half_width: float, radius: float, stiffness: float) -> LinePressure:
-    """Return Hertz' pressure of a given half-width: p0 = E* a / 2R (Johnson, 4.43 and 4.45)."""
-    return hertz_pressure(half_width, stiffness * half_width / (2 * radius))
+    half = stiffness * half_width / (2 * radius) * np.sqrt(gaps * (2 - gaps)) @ factors
+    return LinePressure(half_width, _edges(_HERTZ_LEVELS), _mirror(half))
 
 
 def layer_contact(
@@ -222,17 +206,19 @@ def layer_contact(
     size = len(right) * terms
     matrix = np.zeros((size + 1, size + 1))
     polynomials = legendre.legvander(points, terms - 1)
-    for panel in range(len(right)):
-        block = slice(panel * terms, (panel + 1) * terms)
-        matrix[block, block] = local * polynomials
+    matrix[:-1, :-1] = np.kron(np.eye(len(right)), local * polynomials)
     matrix[:-1, :-1] -= distant * (integrals[:, right] + mirrored).reshape(size, size)
     matrix[:-1, -1] = -1.0
     matrix[-1, -1 - terms : -1] = 1.0  # The pressure is 0 at the edge, where all polynomials are 1.
     unit = half_width**2 / (2 * radius)
     solution = np.linalg.solve(matrix, np.append(-(places**2), 0.0)) * unit
     half = solution[:-1].reshape(len(right), terms) / compliance
-    both = np.concatenate([half[::-1] * (-1.0) ** np.arange(terms), half])
-    return LinePressure(half_width, edges, both, float(solution[-1]))
+    return LinePressure(half_width, edges, _mirror(half), float(solution[-1]))
+
+
+def _mirror(half: FloatArray) -> FloatArray:
+    """Return the coefficients of all panels from those with x > 0; the pressure is even."""
+    return np.concatenate([half[::-1] * (-1.0) ** np.arange(half.shape[1]), half])
 
 
 def logarithm_integrals(x: FloatArray, edges: FloatArray, terms: int) -> FloatArray:
@@ -262,21 +248,19 @@ def _near_integrals(t: FloatArray, terms: int) -> FloatArray:
     The functions Q_n follow from a recurrence that is stable: upwards for |t| < 1, downwards for ratios Q_n/Q_{n−1}
     beyond.
     """
-    q, inside, count = np.empty((len(t), terms + 1)), np.abs(t) < 1, terms + 1
+    q, inside = np.empty((len(t), terms + 1)), np.abs(t) < 1
     s = t[inside]
     upwards = [np.arctanh(s), s * np.arctanh(s) - 1]
-    for n in range(1, count - 1):
+    for n in range(1, terms):
         upwards.append(((2 * n + 1) * s * upwards[n] - n * upwards[n - 1]) / (n + 1))
     q[inside] = np.column_stack(upwards)
     if not inside.all():
         s = t[~inside]
-        ratio, ratios = 1 / s, []
+        ratios = [1 / s]
         for n in range(_RECURRENCE, 0, -1):
-            ratio = n / ((2 * n + 1) * s - (n + 1) * ratio)
-            if n < count:
-                ratios.append(ratio)
+            ratios.append(n / ((2 * n + 1) * s - (n + 1) * ratios[-1]))
         first = np.log((s + 1) / (s - 1)) / 2
-        q[~inside] = np.multiply.accumulate(np.column_stack([first, *ratios[::-1]]), axis=1)
+        q[~inside] = np.multiply.accumulate(np.column_stack([first, *ratios[: -terms - 1 : -1]]), axis=1)
     rest = 2 * (q[:, 2:] - q[:, :-2]) / (2 * np.arange(1, terms) + 1)
     first = (t + 1) * np.log(np.abs(t + 1)) - (t - 1) * np.log(np.abs(t - 1)) - 2
     return np.column_stack([first, rest])
@@ -284,8 +268,7 @@ def _near_integrals(t: FloatArray, terms: int) -> FloatArray:
 
 def _edges(levels: int) -> FloatArray:
     """Return ends of panels from −1 to 1, each half as long as the one before towards the edges."""
-    half = 1 - 2.0 ** -np.arange(levels + 1)
-    right = np.append(half, 1.0)
+    right = np.append(1 - 2.0 ** -np.arange(levels + 1), 1.0)
     return np.concatenate([-right[:0:-1], right])
 
 
@@ -341,11 +324,11 @@ def _superpose(
     pressure: LinePressure, kernel: Callable[..., FloatArray], x: FloatArray, depth: FloatArray
 ) -> FloatArray:
     """Return the sums (n, k) of a field of line loads of 1 at x = 0; places are some way from the loaded strip."""
-    places, forces = pressure.line_loads()
-    count = max(1, -(-len(x) // _CHUNK))
+    (places, forces), count = pressure.line_loads(), max(1, -(-len(x) // _CHUNK))
     chunks = zip(np.array_split(x, count), np.array_split(depth, count), strict=True)
-    parts = [np.einsum("psk,s->pk", kernel(along[:, None] - places, down[:, None]), forces) for along, down in chunks]
-    return np.concatenate(parts)
+    return np.concatenate(
+        [np.einsum("psk,s->pk", kernel(along[:, None] - places, down[:, None]), forces) for along, down in chunks]
+    )
 
 
 def stresses(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> FloatArray:
@@ -384,7 +367,7 @@ def surface_displacements(pressure: LinePressure, x: FloatArray, young: float, p
 
     Their constants are those of `displacements`.
     """
-    beyond = pressure.force - 2 * pressure.force_up_to(x)
+    beyond = pressure.force - 2 * pressure.integrals_up_to(x)[0]
     contraction = poisson / (1 - poisson)
     along = (1 - contraction) / 2 * beyond
     into = pressure.deflection(x) - (1 + contraction) / pi * pressure.force
@@ -396,27 +379,21 @@ def side_forces(pressure: LinePressure, x: FloatArray, depth: FloatArray) -> Flo
 
     They are along x and into the body, at columns x (n,) and rows (m,).
     """
-    forces = np.zeros((len(depth), len(x), 2))
-
-    def traction_on_side(place: float, depths: FloatArray) -> FloatArray:
-        return stresses(pressure, np.full(len(depths), place), depths)[:, [0, 2]]
-
-    def traction_below(places: FloatArray) -> FloatArray:
-        return stresses(pressure, places, np.full(len(places), float(depth[-1])))[:, [2, 1]]
-
-    for column, sign in ((0, -1), (-1, 1)):
-        forces[:, column] += sign * _edge_forces(depth, partial(traction_on_side, float(x[column])))
-    forces[-1] += _edge_forces(x, traction_below)
-    return forces
-
-
-def _edge_forces(lines: FloatArray, traction: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return ∫ N_i t ds (n, 2) along a side with nodes at `lines` (n,)."""
-    points, weights = gauss_rule(_POINTS)
-    share, lengths = (points + 1) / 2, np.diff(lines)
-    places = lines[:-1, None] + share * lengths[:, None]
-    values = traction(places.reshape(-1)).reshape(*places.shape, 2) * (weights / 2 * lengths[:, None])[..., None]
-    forces = np.zeros((len(lines), 2))
-    forces[:-1] += np.einsum("p,epk->ek", 1 - share, values)
-    forces[1:] += np.einsum("p,epk->ek", share, values)
+    forces, (points, weights) = np.zeros((len(depth), len(x), 2)), gauss_rule(_POINTS)
+    share = (points + 1) / 2
+    for nodal, lines, sign, place, components in (
+        (forces[:, 0], depth, -1, x[0], [0, 2]),
+        (forces[:, -1], depth, 1, x[-1], [0, 2]),
+        (forces[-1], x, 1, depth[-1], [2, 1]),
+    ):
+        lengths = np.diff(lines)
+        along = (lines[:-1, None] + share * lengths[:, None]).reshape(-1)
+        across = np.full(len(along), place)
+        x_there, depth_there = (along, across) if lines is x else (across, along)
+        values = stresses(pressure, x_there, depth_there)[:, components].reshape(-1, _POINTS, 2)
+        values = values * (weights / 2 * lengths[:, None])[..., None]
+        side = np.zeros((len(lines), 2))  # ∫ N_i t ds
+        side[:-1] += np.einsum("p,epk->ek", 1 - share, values)
+        side[1:] += np.einsum("p,epk->ek", share, values)
+        nodal += sign * side
     return forces

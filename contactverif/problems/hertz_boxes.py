@@ -23,6 +23,7 @@ K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache, partial
 from itertools import product
@@ -30,15 +31,16 @@ from math import ceil, gcd, log1p, sqrt
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray, freeze
+from contactverif.contract.arrays import FloatArray, freeze
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals
+from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import grade
+from contactverif.problems.flat_states import listed
 from contactverif.problems.hertz import (
     LinePressure,
     displacements,
@@ -116,8 +118,9 @@ def hertz_box(
     if across < COARSEST:
         raise MisuseError("across", f"{across}", f"at least {COARSEST} segments across the contact")
     law = None if rigid_layer else penalty
-    bodies = hertz_body(box, 0, penalty=law, across=across), hertz_body(box, 1, penalty=law, across=across)
-    return Scene(bodies if parabola_is_slave else bodies[::-1], penalty=penalty, name=name)
+    numbers = (0, 1) if parabola_is_slave else (1, 0)
+    bodies = tuple(hertz_body(box, number, penalty=law, across=across) for number in numbers)
+    return Scene(bodies, penalty=penalty, name=name)
 
 
 @cache
@@ -131,31 +134,26 @@ def hertz_body(box: HertzBox, number: int, *, penalty: float | None, across: int
     grid = np.arange(len(x) * len(depth)).reshape(len(depth), len(x))
     along, down = (part.reshape(-1) for part in np.meshgrid(x, depth))
     load = side_forces(pressure, x, depth).reshape(-1, 2)
-    axis = int(np.abs(x).argmin())
-    supports = [grid[-1, axis], grid[len(depth) // 2, axis]]
+    axis, is_parabola = int(np.abs(x).argmin()), number == 0
+    supports = [grid[-1, axis]] if is_parabola else [grid[-1, axis], grid[len(depth) // 2, axis]]
     exact = displacements(pressure, along[supports], down[supports], box.young[number], box.poisson[number])
     fixed, imposed = np.zeros(load.shape, bool), np.zeros(load.shape)
-    if number == 0:
-        supports = supports[:1]
-    else:
-        fixed[supports[0], 1] = True
-    fixed[supports, 0], imposed[supports, 0] = True, exact[: len(supports), 0]
-    up = 1.0 if number == 0 else -1.0
-    height = along**2 / (2 * box.radius) * (1 - down / depth[-1]) if number == 0 else 0.0
-    walk = grid[0] if number == 0 else grid[0, ::-1]
+    fixed[supports, 0], imposed[supports, 0] = True, exact[:, 0]
+    fixed[supports[0], 1] = not is_parabola
+    up = 1.0 if is_parabola else -1.0
+    height = along**2 / (2 * box.radius) * (1 - down / depth[-1]) if is_parabola else 0.0
+    walk = grid[0, :: int(up)]
     inside = walk[np.isin(along[walk], zone)]
-    corners = (grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1])
-    cells = np.stack(corners[:: int(up)], axis=-1).reshape(-1, 4)
     return Body(
         np.column_stack([along, up * down + height]),
-        cells,
+        grid_cells(grid) if is_parabola else grid_cells(grid)[:, ::-1],
         np.column_stack([inside[:-1], inside[1:]]),
         box.young[number],
         box.poisson[number],
         fixed=fixed,
         imposed=imposed,
         load=load * [1, up],
-        start=np.array([0.0, -(a**2) / (2 * box.radius) if number == 0 else 0.0]),
+        start=np.array([0.0, -(a**2) / (2 * box.radius) if is_parabola else 0.0]),
         name=("parabola", "flat")[number],
     )
 
@@ -165,7 +163,11 @@ def mesh_lines(number: int, across: int) -> tuple[FloatArray, FloatArray, FloatA
 
     An edge of the contact divides a segment one to two, the other edge two to one, so that errors fall evenly with h.
     """
-    count = segments_across(number, across)
+    count = across
+    if number == 1:  # No node of the flat meets one of the parabola.
+        count = ceil(RATIO * across)
+        while gcd(3 * across + 1, 3 * count + 2) > 1:
+            count += 1
     part = (number + 1) / 3
     size = 2 / (count + part)
     beyond = ceil(ZONE / size)
@@ -176,19 +178,6 @@ def mesh_lines(number: int, across: int) -> tuple[FloatArray, FloatArray, FloatA
     left, right, depth = (grade(length, size, parts, parts) for length, parts in zip(lengths, steps, strict=True))
     x: FloatArray = np.concatenate([zone[0] - left[:0:-1], zone, zone[-1] + right[1:]])
     return x, depth, np.array(zone, dtype=np.float64)
-
-
-def segments_across(number: int, across: int) -> int:
-    """Return how many whole segments of parabola (0) or flat (1) lie across the contact: of the parabola `across`.
-
-    The number of the flat is such that no node of one side meets one of the other.
-    """
-    if number == 0:
-        return across
-    count = ceil(RATIO * across)
-    while gcd(3 * across + 1, 3 * count + 2) > 1:
-        count += 1
-    return count
 
 
 def exact_displacements(box: HertzBox, penalty: float | None, number: int, x: FloatArray, across: int) -> FloatArray:
@@ -226,37 +215,14 @@ def _exact_displacements(box: HertzBox, penalty: float | None, number: int, plac
     return freeze(moves, np.float64)
 
 
-def exact_forces(
-    box: HertzBox, penalty: float | None, interface: Interface, parabola_is_slave: bool, positions: FloatArray
-) -> FloatArray:
-    """Return the exact forces ∫ N_i p ds (n_nodes, 2) that push the nodes at positions (n_nodes, 2)."""
-    pressure, forces = box.pressure(penalty), np.zeros(positions.shape)
-    for number, nodes in _sides(interface, parabola_is_slave):
-        order = nodes[np.argsort(positions[nodes, 0])]
-        forces[order, 1] = (1.0 if number == 0 else -1.0) * pressure.nodal_forces(positions[order, 0])
-    return forces
-
-
-def exact_moves(box: HertzBox, penalty: float | None, scene: Scene, parabola_is_slave: bool, across: int) -> FloatArray:
-    """Return the exact displacements (n_nodes, 2) of the nodes of a scene of `hertz_box`, along x and upwards."""
-    places = scene.interface.nodes
-    moves = np.zeros(places.shape)
-    for number, nodes in _sides(scene.interface, parabola_is_slave):
-        moves[nodes] = exact_displacements(box, penalty, number, places[nodes, 0], across)
-    return moves
-
-
-def _sides(interface: Interface, parabola_is_slave: bool) -> list[tuple[int, IntArray]]:
-    """Return the number of the body, parabola (0) or flat (1), and its nodes, of the slave and of the master."""
-    slave, master = np.split(np.arange(interface.n_nodes), [interface.n_slave_nodes])
-    return [(0, slave), (1, master)] if parabola_is_slave else [(1, slave), (0, master)]
-
-
 BOX = HertzBox()
 PEAK, WIDTH = "peak", "half-width"  # Kinds of error
 MESHES = (COARSEST, 20, 26, 33, 66)  # Two octaves: numbers of the parabola's segments across the contact.
 # The penalties of studies: their stiffness, and whether that is ε̂ over E/a, the same on all meshes, or ε̂ over E/h.
 PENALTIES = {"layer": (1.0, True), "soft": (1.0, False), "stiff": (100.0, False)}
+
+
+_FACTS = ("parabola_is_slave", "stiffness", "fixed")  # The attributes of HertzStudy that a case has.
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,11 +233,7 @@ class HertzStudy:
     stiffness: float  # The penalty ε̂ over E/h, with E and the segments h of the parabola
     fixed: bool = False  # The stiffness is ε̂ over E/a instead, with the half-width a, the same on all meshes.
     box: HertzBox = BOX
-
-    @property
-    def meshes(self) -> tuple[int, ...]:
-        """The numbers of the parabola's segments across the contact."""
-        return MESHES
+    meshes: tuple[int, ...] = MESHES  # The numbers of the parabola's segments across the contact
 
     def size(self, across: int) -> float:
         """Return half the length of the parabola's segments over the half-width of the contact."""
@@ -284,26 +246,36 @@ class HertzStudy:
 
     def pose(self, across: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh. With a penalty, Newton's method starts at the exact displacements."""
-        multipliers, role = traits.rules.enforcement == "multiplier", self.parabola_is_slave
-        penalty = self.penalty(across)
+        multipliers, box, penalty = traits.rules.enforcement == "multiplier", self.box, self.penalty(across)
+        numbers = (0, 1) if self.parabola_is_slave else (1, 0)
         law = None if multipliers else penalty
-        scene = hertz_box(self.box, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=role)
-        start, pressure = None, self.box.pressure(law)
+        scene = hertz_box(
+            box, penalty=penalty, rigid_layer=multipliers, across=across, parabola_is_slave=self.parabola_is_slave
+        )
+        interface, pressure = scene.interface, box.pressure(law)
+        sides = np.split(np.arange(interface.n_nodes), [interface.n_slave_nodes])
+
+        def forces(positions: FloatArray) -> FloatArray:  # ∫ N_i p ds
+            forces = np.zeros(positions.shape)
+            for number, nodes in zip(numbers, sides, strict=True):
+                order = nodes[np.argsort(positions[nodes, 0])]
+                forces[order, 1] = (1.0 if number == 0 else -1.0) * pressure.nodal_forces(positions[order, 0])
+            return forces
+
+        start = None
         if not multipliers:  # Exact gaps of multipliers are 0 and do not say what is in contact; penetration does.
-            start = scene.transformation.T @ exact_moves(self.box, law, scene, role, across).reshape(-1)
-
-        def motion(places: FloatArray) -> FloatArray:
-            return exact_displacements(self.box, law, 0 if role else 1, places[:, 0], across)
-
-        forces = partial(exact_forces, self.box, law, scene.interface, role)
+            exact = np.zeros(interface.nodes.shape)
+            for number, nodes in zip(numbers, sides, strict=True):
+                exact[nodes] = exact_displacements(box, law, number, interface.nodes[nodes, 0], across)
+            start = scene.transformation.T @ exact.reshape(-1)
         return ProblemInstance(
             scene=scene,
             forces=forces,
-            motions=(motion,),
+            motions=(lambda places: exact_displacements(box, law, numbers[0], places[:, 0], across),),
             pressure=lambda places: pressure.pressure(places[:, 0]),
             pressure_scale=pressure.peak,
             deformed=False,
-            further=partial(_shape_errors, forces(scene.interface.nodes)),
+            further=partial(_shape_errors, forces(interface.nodes)),
             start=start,
             best=self._best(across, pressure, multipliers),
         )
@@ -320,11 +292,10 @@ class HertzStudy:
         chord = (2 * self.box.half_width * self.size(across)) ** 2 / (sqrt(180) * 2 * self.box.radius)
         facets = (penalty or self.penalty(across)) * chord
         constant = pressure.constant_error(slave) * sqrt(pressure.square / (2 * self.box.half_width))
+        slave_error, master_error = map(pressure.linear_error, (slave, master))
         return {
-            FORCES[0]: pressure.linear_error(slave),
-            FORCES[1]: pressure.linear_error(master),
-            MOTIONS[0]: pressure.linear_error(slave),
-            PEAK: pressure.linear_error(slave),
+            **dict(zip(FORCES, (slave_error, master_error), strict=True)),
+            **dict.fromkeys((MOTIONS[0], PEAK), slave_error),
             PRESSURE: (constant + facets) / pressure.peak,
             WIDTH: (slave[1] - slave[0]) / self.box.half_width,
         }
@@ -338,7 +309,7 @@ class HertzStudy:
     @classmethod
     def from_case(cls, case: Case) -> HertzStudy:
         """Return the study that a case stands for."""
-        slave, stiffness, fixed = map(case.parameter, ("parabola_is_slave", "stiffness", "fixed"))
+        slave, stiffness, fixed = map(case.parameter, _FACTS)
         return cls(bool(slave), stiffness, bool(fixed))
 
 
@@ -355,17 +326,14 @@ def _shape_errors(exact: FloatArray, solution: Solution) -> Errors:
     return {kind: abs(computed / right - 1) for kind, computed, right in zip((PEAK, WIDTH), *numbers, strict=True)}
 
 
-@cache
-def hertz_cases() -> tuple[Case, ...]:
+@listed
+def hertz_cases() -> Iterator[Case]:
     """Return six studies, each as the scene of its coarsest mesh: either body as the slave, three penalties."""
-    cases = []
     for slave, (word, penalty) in product(("parabola", "flat"), PENALTIES.items()):
         study = HertzStudy(slave == "parabola", *penalty)
-        role = study.parabola_is_slave
-        scene = hertz_box(BOX, penalty=study.penalty(COARSEST), parabola_is_slave=role, name=f"{slave}-{word}")
-        facts = {name: np.array(float(getattr(study, name))) for name in ("parabola_is_slave", "stiffness", "fixed")}
-        cases.append(replace(scene, facts=facts).case())
-    return tuple(cases)
+        coarsest = partial(hertz_box, BOX, penalty=study.penalty(COARSEST), name=f"{slave}-{word}")
+        facts = {name: np.array(float(getattr(study, name))) for name in _FACTS}
+        yield replace(coarsest(parabola_is_slave=study.parabola_is_slave), facts=facts).case()
 
 
 # Right formulations reach 1.2, 1.4, 2.2 and 2.2 times P1, strangers among them. One that closes a segment when its last
