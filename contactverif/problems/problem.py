@@ -70,18 +70,18 @@ class ProblemInstance:
 
     def exact_forces(self, state: Case) -> FloatArray:
         """Return the exact forces (n_nodes, 2) that push the nodes in a state of this mesh."""
-        forces = _call("forces", self.forces, state.positions if self.deformed else state.interface.nodes)
-        if forces.shape != state.interface.nodes.shape:
-            needed = f"{state.interface.nodes.shape}, a force for each node"
-            raise MisuseError("ProblemInstance.forces", f"shape {forces.shape}", needed)
-        return forces
+        positions = state.positions if self.deformed else state.interface.nodes
+        return _checked("forces", self.forces, "a force for each node", 2)(positions)
 
     @property
     def best_pressure(self) -> float:
         """The error of the best continuous pressure that is linear between the slave's nodes, as `errors` counts it."""
         guess = self.first_guess
-        pressure = _check_field("pressure", self.pressure)
-        return best_pressure_error(guess.interface.slave, guess.positions, pressure, self.pressure_scale)
+        return best_pressure_error(guess.interface.slave, guess.positions, self._pressure, self.pressure_scale)
+
+    @property
+    def _pressure(self) -> Field:
+        return _checked("pressure", self.pressure, "a number for each place")
 
     def errors(self, solution: Solution) -> Errors:
         """Return the errors of a solution by kind."""
@@ -92,33 +92,26 @@ class ProblemInstance:
         for kind, surface in zip(FORCES, surfaces, strict=True):
             errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
-            moves = solution.displacements
-            exact_motion = _check_field("motions", motion, 2)
-            errors[kind] = displacement_error(surface, interface.nodes, moves, exact_motion, self.parts)
-        pressure = pressure_error(solution, _check_field("pressure", self.pressure), self.pressure_scale)
+            checked = _checked("motions", motion, "a vector for each place", 2)
+            errors[kind] = displacement_error(surface, interface.nodes, solution.displacements, checked, self.parts)
+        pressure = pressure_error(solution, self._pressure, self.pressure_scale)
         if pressure is not None:
             errors[PRESSURE] = pressure
         return errors | self.further(solution)
 
 
-def _call(name: str, exact: Field, places: FloatArray) -> FloatArray:
-    """Return what an exact answer gives at places; an exception of it is named with its file and line."""
-    try:
-        return np.asarray(exact(places))
-    except Exception as error:  # A stranger's function may raise what it likes.
-        cause = f"{describe_error(error)}{place_of_error(error)}"
-        raise MisuseError(f"ProblemInstance.{name}", cause, "values at all places") from error
-
-
-def _check_field(name: str, exact: Field, *components: int) -> Field:
-    """Return a field that refuses values of another shape than a number, or so many components, for each place."""
+def _checked(name: str, exact: Field, needed: str, *components: int) -> Field:
+    """Return an exact field that refuses values of another shape, and names an exception with its file and line."""
 
     def values(places: FloatArray) -> FloatArray:
-        exact_values, needed = _call(name, exact, places), (len(places), *components)
-        if exact_values.shape != needed:
-            kind = "a vector" if components else "a number"
-            text = f"{needed}, {kind} for each place"
-            raise MisuseError(f"ProblemInstance.{name}", f"shape {exact_values.shape}", text)
+        try:
+            exact_values = np.asarray(exact(places))
+        except Exception as error:  # A stranger's function may raise what it likes.
+            cause = f"{describe_error(error)}{place_of_error(error)}"
+            raise MisuseError(f"ProblemInstance.{name}", cause, "values at all places") from error
+        shape = (len(places), *components)
+        if exact_values.shape != shape:
+            raise MisuseError(f"ProblemInstance.{name}", f"shape {exact_values.shape}", f"{shape}, {needed}")
         return exact_values
 
     return values
@@ -195,17 +188,13 @@ class Bound:
         """Return whether all errors that it needs are reported."""
         return errors.keys() >= set(self.kinds)
 
-    def size(self, errors: Errors) -> float:
-        """Return the largest error on the finest mesh."""
+    def size(self, errors: Mapping[str, float]) -> float:
+        """Return the largest of its errors on the finest mesh, those of a solution or of the best approximation."""
         return max(errors[kind] for kind in self.kinds)
-
-    def best(self, best: Mapping[str, float]) -> float:
-        """Return the error of the best approximation there, by which a limit is multiplied if `of_best` says so."""
-        return max(best[kind] for kind in self.kinds)
 
     def tolerance(self, group: str, best: Mapping[str, float]) -> float:
         """Return the tolerance for a group of studies on a finest mesh with these best approximations."""
-        return self.limit(group) * (self.best(best) if self.of_best else 1.0)
+        return self.limit(group) * (self.size(best) if self.of_best else 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,6 +21,7 @@ S. P. Timoshenko & J. N. Goodier, Theory of Elasticity (1970), Section 28 (Lamé
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf, pi
@@ -32,18 +33,16 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.problem import Problem, ProblemInstance, Variation
 
 Role = Literal["inner", "outer"]
+Area = Literal["current", "reference"]
 SEGMENTS = {"inner": 12, "outer": 16}  # Numbers of segments along the interface of a quarter, at refine = 1.
 GRADE = 0.15  # Angles of the outer ring are graded by so much, so that nodes do not meet nodes of the other ring.
 LAYERS = {"inner": 3, "outer": 6}  # Numbers of layers of cells across each ring, at refine = 1.
-
-
 _FACTS = ("inner_radius", "radius", "outer_radius", "young", "poisson", "interference")  # The attributes of ShrinkFit.
 
 
@@ -113,10 +112,9 @@ class ShrinkFit:
     @property
     def _flexibilities(self) -> list[float]:
         """By how much a force of 1 for each unit of angle moves each ring at its contact radius."""
-        radii = enumerate(self.contact_radii)
-        return [replace(self, radius=radius).compliances[ring] / radius for ring, radius in radii]
+        return [replace(self, radius=c).compliances[ring] / c for ring, c in enumerate(self.contact_radii)]
 
-    def finite(self, slave: Role, penalty: float = inf, area: Literal["current", "reference"] = "current") -> FiniteFit:
+    def finite(self, slave: Role, penalty: float = inf, area: Area = "current") -> FiniteFit:
         """Return the fit with contact measured after it.
 
         A force f for each unit of angle is a traction f/R on a ring of contact radius R, which moves by C(R) f/R with
@@ -130,14 +128,10 @@ class ShrinkFit:
             springs = force / (radii[index] + outwards * force) / penalty
             return sum(flexibilities) * force + springs - self.interference
 
-        from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
-
-        force = brentq(excess, 0.0, 2 * self.pressure() * self.radius, xtol=1e-300, rtol=1e-14)
+        force = _find_root(excess, 2 * self.pressure() * self.radius)
         return FiniteFit(force, force / (radii[index] + outwards * force), force)
 
-    def half_passes(
-        self, slave: Role, penalty: float = inf, area: Literal["current", "reference"] = "current"
-    ) -> FiniteFit:
+    def half_passes(self, slave: Role, penalty: float = inf, area: Area = "current") -> FiniteFit:
         """Return the fit of two half passes, which give each ring the pressure on its own radius.
 
         With a pressure p the force for each unit of angle is f = p r on a ring of radius r after the fit, or of contact
@@ -156,9 +150,7 @@ class ShrinkFit:
             moves = [gives * force for gives, force in zip(flexibilities, forces(pressure), strict=True)]
             return sum(moves) + pressure / penalty - self.interference
 
-        from scipy.optimize import brentq
-
-        pressure = brentq(excess, 0.0, 2 * self.pressure(), xtol=1e-300, rtol=1e-14)
+        pressure = _find_root(excess, 2 * self.pressure())
         inner, outer = forces(pressure)
         return FiniteFit(inner, pressure, outer) if slave == "inner" else FiniteFit(outer, pressure, inner)
 
@@ -182,6 +174,12 @@ class ShrinkFit:
         free = (self.inner_radius, self.outer_radius)[index]
         mean = self.pressure(penalty) * self.radius**2 / (free**2 - self.radius**2)
         return *_plane_strain(self.young[index], self.poisson[index]), (mean, mean * free**2)
+
+
+def _find_root(excess: Callable[[float], float], high: float) -> float:
+    from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
+
+    return float(brentq(excess, 0.0, high, xtol=1e-300, rtol=1e-14))
 
 
 def _plane_strain(young: float, poisson: float) -> tuple[float, float]:
@@ -226,11 +224,10 @@ def shrink_fit(
     """
     if slave not in SEGMENTS:
         raise MisuseError("slave", repr(slave), "'inner' or 'outer'")
-    rings = {name: _ring(problem, name, refine, grading, quarters) for name in ("inner", "outer")}
-    order = ("inner", "outer") if slave == "inner" else ("outer", "inner")
+    order: tuple[Role, Role] = ("inner", "outer") if slave == "inner" else ("outer", "inner")
     facts = {name: np.array(getattr(problem, name)) for name in _FACTS}
     facts["outer_slave"] = np.array(float(slave == "outer"))
-    return Scene(tuple(rings[name] for name in order), facts=facts)
+    return Scene(tuple(_ring(problem, ring, refine, grading, quarters) for ring in order), facts=facts)
 
 
 @cache
@@ -247,9 +244,8 @@ def _ring(problem: ShrinkFit, ring: Role, refine: float, grading: float, quarter
     angles = pi / 2 * (shares + (grading if index else 0.0) * shares * (1 - shares))
     turn = np.array([[0.0, 1.0], [-1.0, 0.0]])  # A row times this matrix is turned by a quarter.
     quarter = np.column_stack([np.cos(angles), np.sin(angles)])[:-1]
-    whole, cut = quarters == 4, np.array([[0.0, 1.0]])
-    parts = [quarter @ np.linalg.matrix_power(turn, k) for k in range(quarters)]
-    directions = np.vstack(parts if whole else [*parts, cut])
+    whole, parts = quarters == 4, [quarter @ np.linalg.matrix_power(turn, k) for k in range(quarters)]
+    directions = np.vstack(parts if whole else [*parts, [[0.0, 1.0]]])
     number = np.arange((n_layers + 1) * len(directions)).reshape(n_layers + 1, -1)
     fixed = np.zeros((*number.shape, 2), bool)
     if whole:
@@ -258,11 +254,10 @@ def _ring(problem: ShrinkFit, ring: Role, refine: float, grading: float, quarter
         number = np.hstack([number, number[:, :1]])  # The last column is the first one.
     else:
         fixed[:, 0, 1] = fixed[:, -1, 0] = True
-    cells = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
     edge = number[0, ::-1] if index else number[-1]
     return Body(
         (radii[:, None, None] * directions).reshape(-1, 2),
-        cells,
+        np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4),
         np.column_stack([edge[:-1], edge[1:]]),
         problem.young[index],
         problem.poisson[index],
@@ -296,7 +291,7 @@ class RingStudy:
             kinds = kinds[:1]
         elif unbiased and balanced is False:
             kinds = kinds[1:]
-        area: Literal["current", "reference"] = "reference" if traits.rules.area == "reference" else "current"
+        area: Area = "reference" if traits.rules.area == "reference" else "current"
         return tuple(fit(self.slave, inf if multiplier else self.penalty, area) for fit in kinds)
 
     def pose(
@@ -315,26 +310,25 @@ class RingStudy:
             moves: FloatArray = outwards * places / np.linalg.norm(places, axis=1)[:, None]
             return moves
 
-        return ProblemInstance(
-            scene=scene,
-            forces=partial(self._forces, scene.interface, fit),
-            motions=(motion,),
-            pressure=lambda places: np.full(len(places), fit.pressure),
-            pressure_scale=fit.pressure,
-        )
-
-    def _forces(self, interface: Interface, fit: FiniteFit, positions: FloatArray) -> FloatArray:
-        """Return the exact forces, from those for each unit of angle."""
-
         def traction(of_master: bool, places: FloatArray) -> FloatArray:
             radii = np.linalg.norm(places, axis=1)[:, None]
             towards = -1.0 if (self.slave == "inner") is not of_master else 1.0
             pressures: FloatArray = towards * (fit.master_force / radii if of_master else fit.pressure) * places / radii
             return pressures
 
-        sides = ((interface.slave, False), (interface.master, True))
-        forces = [traction_forces(side, positions, partial(traction, of_master)) for side, of_master in sides]
-        return forces[0] + forces[1]
+        def forces(positions: FloatArray) -> FloatArray:
+            sides = ((scene.interface.slave, False), (scene.interface.master, True))
+            return np.add(
+                *(traction_forces(side, positions, partial(traction, of_master)) for side, of_master in sides)
+            )
+
+        return ProblemInstance(
+            scene=scene,
+            forces=forces,
+            motions=(motion,),
+            pressure=lambda places: np.full(len(places), fit.pressure),
+            pressure_scale=fit.pressure,
+        )
 
     @classmethod
     def from_case(cls, case: Case) -> RingStudy:
@@ -354,19 +348,17 @@ def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation)
     penalty = stiffness * min(problem.young) * SEGMENTS["inner"] * refine / (pi / 2 * problem.radius)
     study = RingStudy(problem, "outer" if variation.swapped else "inner", penalty)
     instance = study.pose(refine, traits, GRADE + 0.1 * variation.grading)
-    return replace(instance, sink=lambda times: _inflate(instance.scene, (times - 1) * problem.interference))
+    scene = instance.scene
 
+    def sink(times: float) -> FloatArray:
+        """Return the unknowns (n_free,) with the inner ring's surface moved outwards."""
+        nodes, way = scene.interface.nodes, (times - 1) * problem.interference
+        of_slave = np.arange(len(nodes)) < scene.interface.n_slave_nodes
+        inner = ~of_slave if variation.swapped else of_slave
+        moves = np.where(inner, way / np.linalg.norm(nodes, axis=1), 0.0)[:, None] * nodes
+        return np.asarray(scene.transformation.T @ moves.reshape(-1))
 
-def _inflate(scene: Scene, way: float) -> FloatArray:
-    """Return the unknowns (n_free,) with the inner ring's surface moved outwards by `way`, a length."""
-    nodes = scene.interface.nodes
-    radii = np.linalg.norm(nodes, axis=1)
-    inner = np.arange(len(nodes)) < scene.interface.n_slave_nodes
-    if scene.bodies[0].name == "outer":
-        inner = ~inner
-    moves = np.where(inner, way / radii, 0.0)[:, None] * nodes
-    unknowns: FloatArray = np.asarray(scene.transformation.T @ moves.reshape(-1))
-    return unknowns
+    return replace(instance, sink=sink)
 
 
 RINGS = Problem(

@@ -15,8 +15,9 @@ K. L. Johnson, Contact Mechanics (1985), Sections 2.2 (stress function of a half
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from itertools import product
 from math import inf, log1p, pi, sqrt
 
@@ -30,9 +31,11 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
+from contactverif.problems.flat_states import listed
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, Problem, ProblemInstance, Studies, Variation
 
 UPPER, LOWER = 0, 1
+_INTO = (1.0, -1.0)  # The direction of y that goes into each body.
 COLUMNS = (6, 8)  # The number of cells along the upper and the lower surface of the coarsest mesh.
 MESHES = (1, 2, 4, 8)  # The refinements r of a study.
 # The cells along both surfaces where one mesh is four times finer, and r. No inner node meets a node for these r.
@@ -89,13 +92,12 @@ class WavyProblem:
     def forces(self, interface: Interface, slave: int, positions: FloatArray) -> FloatArray:
         """Return the exact forces (n_nodes, 2) that push the nodes at positions (n_nodes, 2)."""
 
-        def traction(direction: float, places: FloatArray) -> FloatArray:
+        def traction(body: int, places: FloatArray) -> FloatArray:
             pressure = self.pressure(places[:, 0])  # The surface is flat but for slopes of 1e-6.
-            return np.column_stack([0 * pressure, direction * pressure])
+            return np.column_stack([0 * pressure, _INTO[body] * pressure])
 
         sides = ((interface.slave, slave), (interface.master, 1 - slave))
-        forces = [traction_forces(side, positions, partial(traction, _into(body))) for side, body in sides]
-        return forces[0] + forces[1]
+        return np.add(*(traction_forces(side, positions, partial(traction, body)) for side, body in sides))
 
     def displacements(self, body: int, places: FloatArray) -> FloatArray:
         """Return the displacements (..., 2) of a body at reference places (..., 2), those of the interface included.
@@ -105,7 +107,7 @@ class WavyProblem:
         u_η = p1/(E'k) cos kx [2 + (1+ν')kη] e^{−kη} + p̄(H−η)/M.
         The upper body moves down by the approach Δ too. The waviness of the surface counts for nothing here.
         """
-        k, modulus, ratio, into = self.wave_number, self.plane_modulus(body), self.plane_ratio(body), _into(body)
+        k, modulus, ratio, into = self.wave_number, self.plane_modulus(body), self.plane_ratio(body), _INTO[body]
         depth = into * places[..., 1]
         decay = self.wave / (modulus * k) * np.exp(-k * depth)
         along = -decay * np.sin(k * places[..., 0]) * ((1 - k * depth) - ratio * (1 + k * depth))
@@ -120,7 +122,7 @@ class WavyProblem:
         With the depth η: σ_yy = −p̄ − p1 (1+kη) e^{−kη} cos kx, σ_xx = −p̄ν' − p1 (1−kη) e^{−kη} cos kx, and
         σ_xy = ± p1 kη e^{−kη} sin kx, + in the lower body.
         """
-        k, into = self.wave_number, _into(body)
+        k, into = self.wave_number, _INTO[body]
         depth = into * places[..., 1]
         wave = self.wave * np.exp(-k * depth)
         cosine, sine = np.cos(k * places[..., 0]), np.sin(k * places[..., 0])
@@ -134,12 +136,7 @@ class WavyProblem:
         The bodies share the layer's part: a = A ± (2p1/(kE') + p1/2ε̂), + for the lower body.
         """
         indentation = 2 * self.wave / (self.wave_number * self.plane_modulus(body))
-        return self.amplitude - _into(body) * (indentation + self.wave / (2 * self.penalty))
-
-
-def _into(body: int) -> float:
-    """Return the direction of y that goes into the body."""
-    return 1.0 if body == UPPER else -1.0
+        return self.amplitude - _INTO[body] * (indentation + self.wave / (2 * self.penalty))
 
 
 @lru_cache(maxsize=128)  # The bodies of a scene are condensed once.
@@ -162,23 +159,18 @@ def wavy_scene(
     return Scene(bodies, (slave,), (1 - slave,), penalty=penalty, name="wavy")
 
 
-def _depths(height: float, n_equal: float, growth: float) -> FloatArray:
-    """Return the depths (n_rows + 1,) of rows: `n_equal` equal ones, or fewer that grow by a share from row to row."""
-    if not growth:
-        return np.linspace(0.0, height, max(1, round(n_equal)) + 1)
-    n_rows = max(1, round(log1p(growth * n_equal) / log1p(growth)))
-    powers = np.expm1(log1p(growth) * np.arange(n_rows + 1))
-    depths: FloatArray = height * powers / powers[-1]
-    return depths
-
-
 @lru_cache(maxsize=128)
 def _wavy_body(problem: WavyProblem, body: int, n_columns: int, grading: float, growth: float) -> Body:
     """Return one of the bodies, the same for both choices of the slave: cells are about square, edges move exactly."""
     t = np.linspace(0.0, 1.0, n_columns + 1)
     x = problem.wavelength * (t if body == UPPER else t + grading * t * (1 - t))
-    into, depth = _into(body), _depths(problem.height, problem.height * n_columns / problem.wavelength, growth)
-    levels = into * (depth if body == UPPER else depth[::-1])  # From bottom to top
+    n_rows = problem.height * n_columns / problem.wavelength  # If they are alike; fewer that grow.
+    n_rows = max(1, round(log1p(growth * n_rows) / log1p(growth) if growth else n_rows))
+    depth = np.linspace(0.0, problem.height, n_rows + 1)
+    if growth:
+        powers = np.expm1(log1p(growth) * np.arange(n_rows + 1))
+        depth = problem.height * powers / powers[-1]
+    levels = _INTO[body] * (depth if body == UPPER else depth[::-1])  # From bottom to top
     flat = np.stack(np.meshgrid(x, levels), axis=-1)  # (n_rows, n_columns, 2)
     fade = 1 - np.abs(flat[..., 1]) / problem.height
     nodes = flat.copy()
@@ -202,6 +194,9 @@ def _wavy_body(problem: WavyProblem, body: int, n_columns: int, grading: float, 
         start=np.array([0.0, -down]),
         name="upper body" if body == UPPER else "lower body",
     )
+
+
+_FACTS = ("slave", "stiffness", "amplitude", "contrast")  # The attributes of WavyStudy that a case has.
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,15 +236,13 @@ class WavyStudy:
     def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on a mesh."""
         penalty = self.penalty(refine)
-        multipliers = traits.rules.enforcement == "multiplier"
-        problem = WavyProblem(penalty=inf if multipliers else penalty, amplitude=self.amplitude)
-        problem = replace(problem, mean=self.load * problem.mean)
+        law = inf if traits.rules.enforcement == "multiplier" else penalty
+        problem = WavyProblem(penalty=law, amplitude=self.amplitude, mean=self.load * WavyProblem().mean)
         scene = wavy_scene(problem, refine, self.slave, self.columns, self.grading, self.growth)
-        if multipliers:
-            scene = replace(scene, penalty=penalty)
+        scene = scene if law == penalty else replace(scene, penalty=penalty)
 
         def motion(body: int, places: FloatArray) -> FloatArray:
-            return problem.displacements(body, np.column_stack([places[:, 0], 0 * places[:, 0]]))
+            return problem.displacements(body, places * [1.0, 0.0])
 
         # A pressure that is constant on each slave segment leaves h/√12 of a slope p1 k sin kx, and sin² has the
         # mean 1/2.
@@ -271,34 +264,36 @@ class WavyStudy:
     @property
     def case(self) -> Case:
         """The coarsest scene, with the attributes as parameters."""
-        facts = {name: np.array(float(getattr(self, name))) for name in ("slave", "stiffness", "amplitude", "contrast")}
+        facts = {name: np.array(float(getattr(self, name))) for name in _FACTS}
         scene = self.pose(self.meshes[0], Traits()).scene
         name = f"{self.group(Traits()) or ('upper slave', 'lower slave')[self.slave]}, {self.stiffness:g} E/h"
-        return replace(replace(scene, facts=facts).case(), name=name)
+        return replace(scene, facts=facts, name=name).case()
 
     @classmethod
     def from_case(cls, case: Case) -> WavyStudy:
         """Return the study that a case stands for."""
-        slave, stiffness, amplitude, contrast = map(case.parameter, ("slave", "stiffness", "amplitude", "contrast"))
+        slave, stiffness, amplitude, contrast = map(case.parameter, _FACTS)
         return cls(int(slave), stiffness, amplitude, bool(contrast))
 
 
-@cache
-def flat_cases() -> tuple[Case, ...]:
+@listed
+def flat_cases() -> Iterator[Case]:
     """Return both choices of the slave at two penalties, then a slave four times finer, and one four times coarser."""
-    alike = [WavyStudy(slave, stiffness) for slave, stiffness in product((UPPER, LOWER), (10.0, 1e3))]
-    return tuple(study.case for study in (*alike, *(WavyStudy(slave, 10.0, contrast=True) for slave in (UPPER, LOWER))))
+    for slave, stiffness in product((UPPER, LOWER), (10.0, 1e3)):
+        yield WavyStudy(slave, stiffness).case
+    for slave in (UPPER, LOWER):
+        yield WavyStudy(slave, 10.0, contrast=True).case
 
 
 # Facets of the two meshes are up to this amplitude, a length, × k²h²/8 apart: 1 to 10 times p/ε̂ at 100 E/h.
 CURVED_AMPLITUDE = 1e-6
 
 
-@cache
-def curved_cases() -> tuple[Case, ...]:
+@listed
+def curved_cases() -> Iterator[Case]:
     """Return both choices of the slave at two penalties, on a curved interface."""
-    choices = product((UPPER, LOWER), (10.0, 100.0))
-    return tuple(WavyStudy(slave, stiffness, CURVED_AMPLITUDE).case for slave, stiffness in choices)
+    for slave, stiffness in product((UPPER, LOWER), (10.0, 100.0)):
+        yield WavyStudy(slave, stiffness, CURVED_AMPLITUDE).case
 
 
 _SERIES = {
@@ -362,15 +357,10 @@ def pose_wavy(
 
     Rows of cells have equal heights, or grow by the share `growth` from one to the next.
     """
-    columns = round(segments * variation.size), round(segments * variation.size * COLUMNS[LOWER] / COLUMNS[UPPER])
-    study = WavyStudy(
-        LOWER if variation.swapped else UPPER,
-        stiffness,
-        own_columns=columns,
-        grading=GRADING + 0.1 * variation.grading,
-        load=variation.load,
-        growth=growth,
-    )
+    wanted, grading = segments * variation.size, GRADING + 0.1 * variation.grading
+    columns = round(wanted), round(wanted * COLUMNS[LOWER] / COLUMNS[UPPER])
+    body = LOWER if variation.swapped else UPPER
+    study = WavyStudy(body, stiffness, own_columns=columns, grading=grading, load=variation.load, growth=growth)
     return study.pose(1, traits)
 
 

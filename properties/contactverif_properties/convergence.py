@@ -48,7 +48,7 @@ def _measure_convergence(studies: Studies, case: Case, subject: Subject) -> Meas
         """Return whether a rate is asked: some only of large errors, where no size fails."""
         if group not in bound.only_above:
             return True
-        return not fails and bound.size(last) > bound.only_above[group] * bound.best(instance.best)
+        return not fails and bound.size(last) > bound.only_above[group] * bound.size(instance.best)
 
     rates = [bound for bound in bounds if bound.rate and counts(bound)]
     coarser = study.meshes[:-1] if rates else ()
