@@ -8,7 +8,7 @@ import pytest
 from subjects import load_subject
 
 from contactverif import MisuseError, Scene
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.contract.errors import parse_name, unknown_name_error
 from contactverif.mechanics import newton
 from contactverif.mechanics.system import System
@@ -21,21 +21,17 @@ every_name = pytest.mark.parametrize("name", BLOCKS)
 every_name_of_the_paper = pytest.mark.parametrize("name", [name for name, drawing in BLOCKS.items() if drawing.source])
 
 
-def coordinates(scene: Scene) -> tuple[list[float], list[float]]:
+def coordinates(scene: Scene) -> list[list[float]]:
     """Along the interface, in the scene's own axes, ascending."""
-    interface = scene.interface
-    along = interface.nodes @ scene.bodies[0].frame[:, 0]
-    n = interface.n_slave_nodes
-    return sorted(along[:n].tolist()), sorted(along[n:].tolist())
+    along = scene.interface.nodes @ scene.bodies[0].frame[:, 0]
+    return [sorted(side.tolist()) for side in np.split(along, [scene.interface.n_slave_nodes])]
 
 
-def printed_nodes(name: str) -> tuple[list[float], list[float]]:
+def printed_nodes(name: str) -> list[list[float]]:
     """Return the nodes as the drawing has them."""
     drawing = BLOCKS[name]
     sides = ((drawing.slave_from, drawing.slave), (drawing.master_from, drawing.master))
-    return tuple(
-        [start, *(start + total for total in itertools.accumulate(map(float, lengths)))] for start, lengths in sides
-    )  # type: ignore[return-value]
+    return [[start, *(start + total for total in itertools.accumulate(map(float, each)))] for start, each in sides]
 
 
 # --- the scenes -------------------------------------------------------------------------------------------------
@@ -45,20 +41,16 @@ def printed_nodes(name: str) -> tuple[list[float], list[float]]:
 @pytest.mark.parametrize("text", ["", ":refine=2", ":degrees=17.3,ratio=0.25", ":penalty=1e8,poisson=0"])
 def test_every_scene_solves(name: str, text: str) -> None:
     """With a formulation that passes: the pressure is the one on top, in every body."""
-    scene = load_scene(name + text)
-    subject = load_subject("vts-ppt-balanced")
-    formulation = subject.for_case(scene.case())
+    scene, p = load_scene(name + text), BLOCKS[name].pressure
+    formulation = load_subject("vts-ppt-balanced").for_case(scene.case())
     trace = newton.solve(scene, formulation)
     assert trace.converged
-    p = BLOCKS[name].pressure
     system = System(scene, formulation)
     matrix, floor = system.matrix(trace.solution, system.pair(trace.solution))
-    off = (
-        np.abs(np.linalg.inv(matrix)).sum(axis=1).max() * floor.max()
-    )  # The error of displacements, if the residual is roundoff.
-    shortest = min(
-        body.nodes[body.cells][:, [0, 1, 2]].std(axis=1).max(axis=1).min() for body in scene.bodies if not body.rigid
-    )
+    # The error of displacements, if the residual is roundoff.
+    off = np.abs(np.linalg.inv(matrix)).sum(axis=1).max() * floor.max()
+    elastic = [body for body in scene.bodies if not body.rigid]
+    shortest = min(body.nodes[body.cells][:, [0, 1, 2]].std(axis=1).max(axis=1).min() for body in elastic)
     for body, stresses in zip(scene.bodies, scene.stresses(trace.solution), strict=True):
         if not body.rigid:
             expected = [-p * body.poisson / (1 - body.poisson), -p, 0]
@@ -69,21 +61,24 @@ def test_every_scene_solves(name: str, text: str) -> None:
 @every_name_of_the_paper
 def test_what_is_known_of_a_scene(name: str) -> None:
     drawing, scene = BLOCKS[name], make_scene(name)
-    assert scene.name == name
-    assert drawing.summary
-    assert drawing.source
-    assert drawing.assumptions
-    assert coordinates(scene) == printed_nodes(name)
+    assert all((scene.name == name, drawing.summary, drawing.source, drawing.assumptions))
     slave, master = coordinates(scene)
-    assert master[0] <= slave[0]
-    assert slave[-1] <= master[-1]
+    assert [slave, master] == printed_nodes(name)
+    assert master[0] <= slave[0] < slave[-1] <= master[-1]
     assert scene.bodies[1].rigid == drawing.rigid_master
-    assert scene.bodies[0].young == 1e4
-    assert scene.bodies[0].poisson == 0.3
+    assert (scene.bodies[0].young, scene.bodies[0].poisson) == (1e4, 0.3)
     assert scene.penalty == 10 * 1e4 / np.mean(drawing.slave)
     case = scene.case()
     assert is_uniform(case)
     assert pressure_of(case, 123.0) == drawing.pressure
+    # What the summaries say: areas lie over one master segment or across a master node, quarter points on it or not.
+    halves = np.sort(np.concatenate([slave, np.add(slave[1:], slave[:-1]) / 2]))  # Ends of areas of two points.
+    quarters = (halves[1:] + halves[:-1]) / 2
+    crossing = any(low < node < high for low, high in itertools.pairwise(halves) for node in master)
+    assert crossing == (name in ("c", "c-prime", "example-1bis"))
+    assert set(quarters.tolist()) & set(master) == ({9.0} if name == "c" else set())
+    if name in ("example-1", "example-1bis"):
+        assert all(side == [-x for x in reversed(side)] for side in (slave, master))
 
 
 def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
@@ -100,28 +95,6 @@ def test_the_slave_of_the_dead_zone_overhangs_inside_its_segments() -> None:
     assert not any(overhangs(make_scene(name).case()) for name in BLOCKS if name != "dead-zone")
 
 
-def under(name: str, points: FloatArray) -> set[float]:
-    """Points that lie exactly on a master node."""
-    return set(points.tolist()) & set(printed_nodes(name)[1])
-
-
-@every_name_of_the_paper
-def test_where_areas_of_competence_lie(name: str) -> None:
-    """Check what the summaries say: over one master segment or across a master node, on a node or not."""
-    slave, master = map(np.array, printed_nodes(name))
-    halves = np.sort(np.concatenate([slave, (slave[1:] + slave[:-1]) / 2]))  # ends of areas of two virtual slave nodes
-    quarters = (halves[1:] + halves[:-1]) / 2
-    crossing = any(low < node < high for low, high in itertools.pairwise(halves) for node in master.tolist())
-    assert crossing == (name in ("c", "c-prime", "example-1bis"))
-    assert under(name, quarters) == ({9.0} if name == "c" else set())
-
-
-def test_the_punch_is_symmetrical() -> None:
-    for name in ("example-1", "example-1bis"):
-        for side in printed_nodes(name):
-            assert side == [-x for x in reversed(side)]
-
-
 @every_name
 @pytest.mark.parametrize("refine", [2, 3, 7])
 def test_refining_keeps_the_printed_nodes_exactly(name: str, refine: int) -> None:
@@ -136,24 +109,22 @@ def test_refining_keeps_the_printed_nodes_exactly(name: str, refine: int) -> Non
 
 
 @pytest.mark.parametrize(
-    ("degrees", "turn"), [(90, [[0, -1], [1, 0]]), (180, [[-1, 0], [0, -1]]), (270, [[0, 1], [-1, 0]])]
+    ("degrees", "turn"),
+    [(90, [[0, -1], [1, 0]]), (180, [[-1, 0], [0, -1]]), (270, [[0, 1], [-1, 0]]), (360, np.eye(2))],
 )
 def test_quarter_turns_are_exact(degrees: int, turn: list[list[int]]) -> None:
     upright = make_scene("c-prime")
     for angle in (degrees, float(degrees), degrees - 360, degrees + 720):
-        turned = make_scene("c-prime", degrees=angle)
-        for body, other in zip(turned.bodies, upright.bodies, strict=True):
+        for body, other in zip(make_scene("c-prime", degrees=angle).bodies, upright.bodies, strict=True):
             assert np.array_equal(body.nodes, other.nodes @ np.transpose(turn))
             assert np.array_equal(body.frame, turn)
             assert np.array_equal(body.load, other.load)
-    assert np.array_equal(make_scene("c-prime", degrees=360).bodies[0].nodes, upright.bodies[0].nodes)
 
 
 def test_any_other_turn() -> None:
-    angle = np.radians(17.3)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    upright, turned = make_scene("b"), make_scene("b", degrees=17.3)
-    for body, other in zip(turned.bodies, upright.bodies, strict=True):
+    cos, sin = np.cos(np.radians(17.3)), np.sin(np.radians(17.3))
+    turn = np.array([[cos, -sin], [sin, cos]])
+    for body, other in zip(make_scene("b", degrees=17.3).bodies, make_scene("b").bodies, strict=True):
         assert np.abs(body.nodes - other.nodes @ turn.T).max() <= 4 * UNIT_ROUNDOFF * 12 * np.sqrt(2)
         assert np.abs(body.frame - turn).max() <= UNIT_ROUNDOFF
 
@@ -165,14 +136,11 @@ def test_the_disk() -> None:
     for body, same in zip(scene.bodies, other.bodies, strict=True):
         assert np.array_equal(body.nodes, same.nodes)
         assert (body.young, body.poisson) == (same.young, same.poisson)
-    assert scene.penalty == other.penalty
-    assert scene.name == "example-2"
+    assert (scene.penalty, scene.name) == (other.penalty, "example-2")
     assert not is_uniform(scene.case())
-    stiffer = make_scene(
-        "example-2", young=2e8, ratio=2.0, poisson=0.25, penalty=2e9, force=3e6, lowered=0.01, refine=2
-    )
-    assert [body.young for body in stiffer.bodies] == [2e8, 4e8]
-    assert [body.poisson for body in stiffer.bodies] == [0.25, 0.25]
+    numbers = {"young": 2e8, "ratio": 2.0, "poisson": 0.25, "penalty": 2e9, "force": 3e6, "lowered": 0.01}
+    stiffer = make_scene("example-2", refine=2, **numbers)
+    assert [(body.young, body.poisson) for body in stiffer.bodies] == [(2e8, 0.25), (4e8, 0.25)]
     assert (stiffer.penalty, stiffer.bodies[0].load.sum()) == (2e9, -3e6)
     assert stiffer.bodies[0].start.tolist() == [0, -0.01]
     assert len(stiffer.bodies[1].cells) == 4 * 160 * 30
@@ -240,36 +208,23 @@ WRONG = {
     "c:name=b": "--scene: option of 'c:name=b': found 'name'; needed one of degrees, lowered, penalty, poisson, "
     f"pressure, ratio, refine, sides, young; {ALL_OPTIONS}",
     **{
-        f"c:refine={value}": f"--scene: refine of 'c:refine={value}': found {word}; needed a whole number from 1 to 64"
-        for value, word in (("0", "0"), ("-1", "-1"), ("65", "65"), ("1.5", "1.5"), ("true", "True"), ("x", "'x'"))
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {found}; needed {needed}"
+        for options, values, needed in (
+            (["refine"], ["0", "-1", "65", "1.5", "true", "x"], "a whole number from 1 to 64"),
+            (["penalty", "young", "ratio", "pressure"], ["0", "-1", "nan", "inf"], "a number > 0"),
+            (["penalty", "young", "ratio", "pressure", "poisson", "degrees", "lowered"], ["soft", "true"], "a number"),
+            (["degrees", "lowered"], ["nan", "inf", "-inf"], "a finite number"),
+            (["poisson"], ["0.5", "-1.0", "2.0", "nan", "inf"], "Poisson's ratio above −1 and below 0.5"),
+            (["sides"], ["fre", "1"], "rollers or free"),
+            (["young"], [f"1{'0' * 400}"], "a number > 0"),
+        )
+        for option, value in itertools.product(options, values)
+        for found in [{"true": "True", "x": "'x'", "soft": "'soft'", "fre": "'fre'"}.get(value, value)]
     },
-    **{
-        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {word}; needed a number > 0"
-        for option in ("penalty", "young", "ratio", "pressure")
-        for value, word in (("0", "0"), ("-1", "-1"), ("nan", "nan"), ("inf", "inf"))
-    },
-    **{
-        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {word}; needed a number"
-        for option in ("penalty", "young", "ratio", "pressure", "poisson", "degrees", "lowered")
-        for value, word in (("soft", "'soft'"), ("true", "True"))
-    },
-    **{
-        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {value}; needed a finite number"
-        for option in ("degrees", "lowered")
-        for value in ("nan", "inf", "-inf")
-    },
-    **{
-        f"c:poisson={value}": f"--scene: poisson of 'c:poisson={value}': found {value}; needed Poisson's ratio above "
-        "−1 and below 0.5"
-        for value in ("0.5", "-1.0", "2.0", "nan", "inf")
-    },
-    "c:sides=fre": "--scene: sides of 'c:sides=fre': found 'fre'; needed rollers or free",
-    "c:sides=1": "--scene: sides of 'c:sides=1': found 1; needed rollers or free",
     "example-2:refine=5": "--scene: refine of 'example-2:refine=5': found 5; needed a whole number from 1 to 4",
     "example-2:force=0": "--scene: force of 'example-2:force=0': found 0; needed a number > 0",
     "example-2:sides=free": "--scene: option of 'example-2:sides=free': found 'sides'; needed one of force, lowered, "
     "penalty, poisson, ratio, refine, young; there are refine, penalty, young, ratio, poisson, force, lowered",
-    f"c:young=1{'0' * 400}": f"--scene: young of 'c:young=1{'0' * 400}': found 1{'0' * 400}; needed a number > 0",
 }
 
 
@@ -281,7 +236,6 @@ def test_what_is_no_scene(text: str, message: str) -> None:
     with pytest.raises(MisuseError) as error:
         load_scene(text)
     assert str(error.value) == message
-    assert "\n" not in message
 
 
 @pytest.mark.parametrize(
@@ -319,11 +273,8 @@ def test_numbers_of_numpy_are_numbers() -> None:
     [
         ("nts", "nts", {}),
         ("vts-me:n=4", "vts-me", {"n": 4}),
-        (
-            "a:b=1.5,c=1e4,d=true,e=false,f=word,g=-3",
-            "a",
-            {"b": 1.5, "c": 1e4, "d": True, "e": False, "f": "word", "g": -3},
-        ),
+        ("a:b=1.5,c=1e4,d=true,e=false", "a", {"b": 1.5, "c": 1e4, "d": True, "e": False}),
+        ("a:f=word,g=-3", "a", {"f": "word", "g": -3}),
         ("a:b=c=d", "a", {"b": "c=d"}),
         ("a:b=x:y", "a", {"b": "x:y"}),
         ("a:b=True", "a", {"b": "True"}),

@@ -33,22 +33,15 @@ def _gradient(field: Callable[[FloatArray], FloatArray], places: FloatArray) -> 
 
 
 @BODIES
-def test_stresses_are_in_equilibrium(body: int) -> None:
-    gradient = _gradient(lambda x: PROBLEM.stresses(body, x), _places(body))
-    size = PROBLEM.wave * PROBLEM.wave_number
-    np.testing.assert_allclose((gradient[:, 0, 0] + gradient[:, 2, 1]) / size, 0, atol=1e-14)
-    np.testing.assert_allclose((gradient[:, 2, 0] + gradient[:, 1, 1]) / size, 0, atol=1e-14)
-
-
-@BODIES
-def test_stresses_follow_from_displacements_by_hookes_law(body: int) -> None:
+def test_stresses_are_in_equilibrium_and_follow_from_displacements_by_hookes_law(body: int) -> None:
     places = _places(body)
+    gradient = _gradient(lambda x: PROBLEM.stresses(body, x), places)
+    size = PROBLEM.wave * PROBLEM.wave_number
+    np.testing.assert_allclose((gradient[:, [0, 2], 0] + gradient[:, [2, 1], 1]) / size, 0, atol=1e-14)
     gradient = _gradient(lambda x: PROBLEM.displacements(body, x), places)
     strain = np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]], axis=1)
-    material = elasticity(wavy_scene(PROBLEM).bodies[body])
-    np.testing.assert_allclose(
-        strain @ material / PROBLEM.wave, PROBLEM.stresses(body, places) / PROBLEM.wave, atol=1e-13
-    )
+    hooke = strain @ elasticity(wavy_scene(PROBLEM).bodies[body])
+    np.testing.assert_allclose(hooke / PROBLEM.wave, PROBLEM.stresses(body, places) / PROBLEM.wave, atol=1e-13)
 
 
 def test_both_bodies_press_on_one_another_with_the_pressure_and_without_friction() -> None:
@@ -65,36 +58,26 @@ def test_the_gap_that_is_left_is_the_pressure_over_the_penalty(penalty: float, a
     problem = replace(PROBLEM, penalty=penalty, amplitude=amplitude)
     x = np.linspace(0, 4, 41)
     flat = np.column_stack([x, 0 * x])
-    heights = [
-        problem.profile(body) * np.cos(problem.wave_number * x) + problem.displacements(body, flat)[:, 1]
-        for body in (UPPER, LOWER)
-    ]
-    gap = heights[UPPER] - heights[LOWER]
-    np.testing.assert_allclose(gap, -problem.pressure(x) / penalty, rtol=1e-9, atol=1e-15 * (amplitude + 1e-5))
-    wave = (heights[UPPER] + heights[LOWER]) / 2
-    np.testing.assert_allclose(
-        wave - wave.mean(), amplitude * (np.cos(problem.wave_number * x) - 1 / 41), atol=1e-14 * (amplitude + 1e-5)
-    )
+    cosine, size = np.cos(problem.wave_number * x), amplitude + 1e-5
+    upper, lower = (problem.profile(b) * cosine + problem.displacements(b, flat)[:, 1] for b in (UPPER, LOWER))
+    np.testing.assert_allclose(upper - lower, -problem.pressure(x) / penalty, rtol=1e-9, atol=1e-15 * size)
+    wave = (upper + lower) / 2
+    np.testing.assert_allclose(wave - wave.mean(), amplitude * (cosine - 1 / 41), atol=1e-14 * size)
 
 
 @BODIES
-def test_sides_are_planes_of_symmetry(body: int) -> None:
+def test_sides_are_planes_of_symmetry_and_the_far_edge_moves_with_the_exact_field(body: int) -> None:
     y = (1 if body == UPPER else -1) * np.linspace(0, 1.5, 7)
     for x in (0.0, 4.0):
         places = np.column_stack([np.full(7, x), y])
         assert np.abs(PROBLEM.displacements(body, places)[:, 0]).max() < 1e-15 * PROBLEM.wave
         assert np.abs(PROBLEM.stresses(body, places)[:, 2]).max() < 1e-14 * PROBLEM.wave
-
-
-@BODIES
-def test_the_far_edge_moves_with_the_exact_field(body: int) -> None:
-    scene = wavy_scene(PROBLEM, 2)
-    nodes = scene.bodies[body].nodes
-    far = np.flatnonzero(np.abs(np.abs(nodes[:, 1]) - PROBLEM.height) < 1e-12)
+    held = wavy_scene(PROBLEM, 2).bodies[body]
+    far = np.flatnonzero(np.abs(np.abs(held.nodes[:, 1]) - PROBLEM.height) < 1e-12)
     assert len(far) in (13, 17)
-    assert scene.bodies[body].fixed[far].all()
-    exact = PROBLEM.displacements(body, nodes[far])
-    np.testing.assert_allclose(scene.bodies[body].imposed[far], exact, atol=1e-14 * PROBLEM.approach)
+    assert held.fixed[far].all()
+    exact = PROBLEM.displacements(body, held.nodes[far])
+    np.testing.assert_allclose(held.imposed[far], exact, atol=1e-14 * PROBLEM.approach)
 
 
 @pytest.mark.parametrize("refine", [1, 2, 4, 8, 16])
