@@ -23,7 +23,7 @@ from contactverif.contract.case import Case
 from contactverif.mechanics.bodies import UPRIGHT, Placing, Rectangle
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.catalogue import MODERATE_PENALTY, load_scene_case
-from contactverif.problems.flat_states import TINY_MESHES, TINY_PENALTIES, listed
+from contactverif.problems.flat_states import TINY_MESHES, TINY_PENALTIES, collect
 from contactverif.problems.named_states import named_case
 
 _BESIDE = 0.5  # The length by which the master goes beyond the slave on either side.
@@ -54,14 +54,14 @@ _SINGLE = {
 }
 
 
-@listed
+@collect
 def normal_scenes() -> Iterator[Case]:
     """Return the paper's A1 and A2, and scenes of ours whose inner master nodes all lie on slave nodes."""
     yield from map(load_scene_case, ("a1", "a2-uniform", "a2-graded"))
     yield from _class_cases(_NORMAL)
 
 
-@listed
+@collect
 def single_scenes() -> Iterator[Case]:
     """Return the paper's B and Example 1, and scenes of ours with master nodes in the middle of slave segments."""
     yield from map(load_scene_case, ("b", "example-1"))
@@ -78,14 +78,14 @@ def _class_cases(drawings: dict[str, _ClassMesh]) -> Iterator[Case]:
             Rectangle(slave, np.linspace(0.0, height, 4), poisson=0.3),
             Rectangle(master - _BESIDE, np.linspace(-0.75 * height, 0.0, 3), young=ratio, poisson=0.2),
             penalty=MODERATE_PENALTY * min(1.0, ratio) / mean / scale,
-            placing=_inclined(degrees, scale),
+            placing=_incline(degrees, scale),
         )
 
 
 _UNITS = ("1e-6", "1", "1e6")  # E of the master over E of the slave.
 
 
-@listed
+@collect
 def case_c() -> Iterator[Case]:
     """Return the paper's case C and its variant C′, as states and solved with unequal materials at two penalties."""
     names = ("c", "c-prime")
@@ -95,14 +95,14 @@ def case_c() -> Iterator[Case]:
         yield replace(scene, name=f"{name} solved, ε̂ = {label}")
 
 
-@listed
+@collect
 def tiny_segment_scenes() -> Iterator[Case]:
     """Return blocks with a segment of 1.2e-5 in an interface of 12, pressed together at three penalties."""
     for (side, mesh), penalty in product(TINY_MESHES.items(), TINY_PENALTIES):
         yield _hard_case(f"{side} solved, ε̂ = {penalty:g}", *mesh, penalty=penalty)
 
 
-@listed
+@collect
 def stiff_scenes() -> Iterator[Case]:
     """Return blocks whose springs are up to 1e10 times as stiff as the softer one; E of the other is 1 to 1e6 times."""
     mesh = [0.0, 3.0, 8.0, 12.0], [0.0, 5.0, 12.0]
@@ -111,7 +111,7 @@ def stiff_scenes() -> Iterator[Case]:
         yield _hard_case(f"ε̂h/E = {stiff}, E ratio {ratio}", *mesh, float(ratio), penalty=penalty)
 
 
-@listed
+@collect
 def contrast_scenes() -> Iterator[Case]:
     """Return a fine block and a coarse one, each as the slave, the stiffer one or the softer one, at two penalties."""
     fine, coarse = np.linspace(0.0, 12.0, 9).tolist(), [0.0, 7.0, 12.0]
@@ -122,7 +122,7 @@ def contrast_scenes() -> Iterator[Case]:
         yield _hard_case(f"{mesh}, E ratio {ratio}, ε̂ = {label}", slave, master, float(ratio), penalty=penalty)
 
 
-@listed
+@collect
 def vanishing_overlap_scenes() -> Iterator[Case]:
     """Return blocks whose master covers 1e-1 to 1e-12 of the last slave segment, upright and inclined."""
     places = [("", 0.0, exponent) for exponent in range(1, 13)]
@@ -130,10 +130,10 @@ def vanishing_overlap_scenes() -> Iterator[Case]:
     for label, degrees, exponent in places:
         name, end = f"overlap 1e-{exponent}{label}", 5.0 + 3 * 10.0**-exponent
         slave, master = [0.0, 2.0, 5.0, 8.0], [-1.0, 1.5, 3.0, end]
-        yield _hard_case(name, slave, master, penalty=10.0 / 3, placing=_inclined(degrees))
+        yield _hard_case(name, slave, master, penalty=10.0 / 3, placing=_incline(degrees))
 
 
-@listed
+@collect
 def unloaded_scenes() -> Iterator[Case]:
     """Return blocks that touch with no load, started in touch, pushed in or lifted, upright and inclined."""
     starts = {"touching": 0.0, "pushed in": 2.0**-4, "lifted": -(2.0**-4)}
@@ -142,11 +142,11 @@ def unloaded_scenes() -> Iterator[Case]:
     for (start, lowered), (label, degrees), (way, load) in product(
         starts.items(), {"": 0.0, ", inclined": 33.0}.items(), {"free": "pressure", "held": "approach"}.items()
     ):
-        others: dict[str, Any] = {load: 0.0, "lowered": lowered, "placing": _inclined(degrees)}
+        others: dict[str, Any] = {load: 0.0, "lowered": lowered, "placing": _incline(degrees)}
         yield replace(two_blocks(slave, master, penalty=10.0 / 3, **others).case(), name=f"{way}, {start}{label}")
 
 
-def _inclined(degrees: float, scale: float = 1.0) -> Placing:
+def _incline(degrees: float, scale: float = 1.0) -> Placing:
     angle = radians(degrees)
     return Placing((cos(angle), sin(angle)) if degrees else UPRIGHT.axis, scale=scale)
 

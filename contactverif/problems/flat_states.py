@@ -23,7 +23,7 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights
 
 
-def listed(make: Callable[[], Iterator[Case]]) -> Callable[[], tuple[Case, ...]]:
+def collect(make: Callable[[], Iterator[Case]]) -> Callable[[], tuple[Case, ...]]:
     """Return a function that returns the cases of a generator, made once."""
 
     @cache
@@ -124,14 +124,14 @@ TINY_MESHES: dict[str, tuple[list[float], list[float]]] = {
 TINY_PENALTIES = (1.0, 1e4, 1e8)
 
 
-@listed
+@collect
 def tiny_segment_states() -> Iterator[Case]:
     """Return flat states of length 12 with a segment of 1.2e-5 on a side or both, at three penalties."""
     for (side, (slave, master)), penalty in product(TINY_MESHES.items(), TINY_PENALTIES):
         yield flat_state(f"{side}, ε̂ = {penalty:g}", slave, flat_master(master), 2.0**-4, penalty=penalty)
 
 
-@listed
+@collect
 def offset_states() -> Iterator[Case]:
     """Return flat states whose distance from the origin is 1e9 to 1e15 times their penetration.
 
@@ -150,7 +150,7 @@ def offset_states() -> Iterator[Case]:
     yield flat_state("1e6, gap 1e-6 in decimals", slave, master, 1e-6, offset=(1e6, 1e6))
 
 
-@listed
+@collect
 def deep_states() -> Iterator[Case]:
     """Return flat states that penetrate by half a segment and by two segments."""
     slave, master = [2.0, 3.0, 4.25, 5.0], flat_master([-1.0, 0.0, 1.0, 2.5, 3.0, 4.0, 5.5, 6.0, 7.0, 8.0])
@@ -158,7 +158,7 @@ def deep_states() -> Iterator[Case]:
         yield flat_state(f"{depth}{label}", slave, master, share, turn=turn)
 
 
-@listed
+@collect
 def node_hit_states() -> Iterator[Case]:
     """Return flat states in which a slave node or a quarter point is over a master node, or beside it by a rounding.
 
@@ -177,7 +177,7 @@ _EIGHT = (1.0, 0.75, 1.25, 1.0, 0.5, 1.5, 1.25, 0.75), (0.75, 1.25, 1.5, 0.875, 
 MANY_EIGHTS = 38  # So many of these make more segments than a number of one byte tells apart.
 
 
-@listed
+@collect
 def equal_length_states() -> Iterator[Case]:
     """Return flat states whose slave and master are equally long, with as many segments of the mean length 1.
 
@@ -199,7 +199,7 @@ def equal_length_states() -> Iterator[Case]:
         yield flat_state(name, places, flat_master(below), depth, turn=turn, penalty=penalty)
 
 
-@listed
+@collect
 def search_states() -> Iterator[Case]:
     """Return states on which a search is known to go wrong: the flat part is right, and something else is near."""
     plate = [8.0, 5.0, 2.5, 0.0]
@@ -245,7 +245,7 @@ _SPACING = 4.0  # From one pair of surfaces to the next, more than twice the len
 _FINENESS = 2.0**20
 
 
-@listed
+@collect
 def touching_states() -> Iterator[Case]:
     """Return states that touch exactly at about 1000 angles, four each, and states with a gap of ±1e-16.
 
@@ -422,7 +422,7 @@ def flat_face_state(
 _SHEETS = grid([0.25, 1.375, 3.0], [0.5, 1.75, 2.5]), grid([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
 
 
-@listed
+@collect
 def node_hit_face_states() -> Iterator[Case]:
     """Return flat states in which a node of the master lies under a node, an edge or a centre, or a rounding beside.
 
@@ -445,7 +445,7 @@ def node_hit_face_states() -> Iterator[Case]:
             yield flat_face_state(f"{name} {label}{turn_label}", *pair, 2.0**-4, turn=turn)
 
 
-@listed
+@collect
 def offset_face_states() -> Iterator[Case]:
     """Return flat states whose distance from the origin is 1e9 to 1e15 times their penetration; lengths are near 1."""
     for (label, offset, depth), (turn_label, turn) in product(_OFFSETS, _SPACE_TURNS.items()):
@@ -456,14 +456,14 @@ def offset_face_states() -> Iterator[Case]:
     yield flat_face_state("1e6, gap 1e-6 in decimals", *_SHEETS, 1e-6, offset=(1e6, 1e6, 1e6))
 
 
-@listed
+@collect
 def deep_face_states() -> Iterator[Case]:
     """Return flat states that penetrate by half a length and by two lengths, where edges have about one."""
     for (name, depth), (label, turn) in product(_DEPTHS.items(), _SPACE_TURNS.items()):
         yield flat_face_state(f"{name}{label}", *_SHEETS, depth, turn=turn)
 
 
-@listed
+@collect
 def equal_area_states() -> Iterator[Case]:
     """Return flat states whose slave has as much area as nodes, and a master with as many nodes on that area.
 
@@ -480,7 +480,7 @@ def equal_area_states() -> Iterator[Case]:
         yield replace(state, penalty=penalty)
 
 
-@listed
+@collect
 def search_face_states() -> Iterator[Case]:
     """Return states on which a search is known to go wrong: something else is near the flat part, or faces are many.
 
@@ -502,7 +502,7 @@ def search_face_states() -> Iterator[Case]:
         yield flat_face_state(f"{name}{label}", here, master, 2.0**-5, turn=turn)
 
 
-@listed
+@collect
 def touching_face_states() -> Iterator[Case]:
     """Return states that touch exactly at some 160 rotations, and states with a gap of ±1e-16 at a tenth of them.
 

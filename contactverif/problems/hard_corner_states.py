@@ -28,7 +28,7 @@ import numpy as np
 
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
-from contactverif.problems.flat_states import listed
+from contactverif.problems.flat_states import collect
 
 _PENALTY = 16.0
 _DEPTH = 2.0**-4
@@ -37,7 +37,7 @@ _UP = (0.0, 1.0)
 _FLAT = ((4.0, 0.0), (2.5, 0.0), (1.0, 0.0), (0.0, 0.0))
 
 
-@listed
+@collect
 def convex_kink_states() -> Iterator[Case]:
     """Return a roof that penetrates another one, its vertex swept over the bisector from one side to the other.
 
@@ -62,7 +62,7 @@ def convex_kink_states() -> Iterator[Case]:
         )
 
 
-@listed
+@collect
 def concave_corner_states() -> Iterator[Case]:
     """Return a corner pushed into a re-entrant corner of 90°; its node is as far from one face as from the other.
 
@@ -89,7 +89,7 @@ def concave_corner_states() -> Iterator[Case]:
         )
 
 
-@listed
+@collect
 def free_end_states() -> Iterator[Case]:
     """Return slaves at, past and beyond the free end of a flat master, where a formulation decides by itself.
 
@@ -113,7 +113,7 @@ def free_end_states() -> Iterator[Case]:
         yield _bounded_case(name, slave, edges=(up, up), bounds=(0.0, 0.0))
 
 
-@listed
+@collect
 def steep_slave_states() -> Iterator[Case]:
     """Return one slave segment that stands on a flat master, or faces away from it, with one node or both inside.
 

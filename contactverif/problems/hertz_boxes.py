@@ -40,7 +40,7 @@ from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.disk import grade
-from contactverif.problems.flat_states import listed
+from contactverif.problems.flat_states import collect
 from contactverif.problems.hertz import (
     LinePressure,
     displacements,
@@ -326,7 +326,7 @@ def _shape_errors(exact: FloatArray, solution: Solution) -> Errors:
     return {kind: abs(computed / right - 1) for kind, computed, right in zip((PEAK, WIDTH), *numbers, strict=True)}
 
 
-@listed
+@collect
 def hertz_cases() -> Iterator[Case]:
     """Return six studies, each as the scene of its coarsest mesh: either body as the slave, three penalties."""
     for slave, (word, penalty) in product(("parabola", "flat"), PENALTIES.items()):

@@ -17,7 +17,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif.problems.flat_states import grid, listed, rotation
+from contactverif.problems.flat_states import collect, grid, rotation
 
 _FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0
@@ -33,7 +33,7 @@ class _Part(NamedTuple):
     closed: bool = False  # The last point of each chain is joined to its first.
 
 
-@listed
+@collect
 def long_face_states() -> Iterator[Case]:
     """Return the states in space: triangles on a wave, few on many, many on few, and nearly flat and hardly in touch.
 
@@ -62,7 +62,7 @@ def long_face_states() -> Iterator[Case]:
         yield Case(interface, current.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
 
 
-@listed
+@collect
 def long_states() -> Iterator[Case]:
     """Return the states of chains, each turned by an angle; slave nodes penetrate by different depths."""
     groups = {

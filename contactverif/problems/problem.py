@@ -71,7 +71,7 @@ class ProblemInstance:
     def exact_forces(self, state: Case) -> FloatArray:
         """Return the exact forces (n_nodes, 2) that push the nodes in a state of this mesh."""
         positions = state.positions if self.deformed else state.interface.nodes
-        return _checked("forces", self.forces, "a force for each node", 2)(positions)
+        return _check_field("forces", self.forces, "a force for each node", 2)(positions)
 
     @property
     def best_pressure(self) -> float:
@@ -81,7 +81,7 @@ class ProblemInstance:
 
     @property
     def _pressure(self) -> Field:
-        return _checked("pressure", self.pressure, "a number for each place")
+        return _check_field("pressure", self.pressure, "a number for each place")
 
     def errors(self, solution: Solution) -> Errors:
         """Return the errors of a solution by kind."""
@@ -92,7 +92,7 @@ class ProblemInstance:
         for kind, surface in zip(FORCES, surfaces, strict=True):
             errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
-            checked = _checked("motions", motion, "a vector for each place", 2)
+            checked = _check_field("motions", motion, "a vector for each place", 2)
             errors[kind] = displacement_error(surface, interface.nodes, solution.displacements, checked, self.parts)
         pressure = pressure_error(solution, self._pressure, self.pressure_scale)
         if pressure is not None:
@@ -100,7 +100,7 @@ class ProblemInstance:
         return errors | self.further(solution)
 
 
-def _checked(name: str, exact: Field, needed: str, *components: int) -> Field:
+def _check_field(name: str, exact: Field, needed: str, *components: int) -> Field:
     """Return an exact field that refuses values of another shape, and names an exception with its file and line."""
 
     def values(places: FloatArray) -> FloatArray:

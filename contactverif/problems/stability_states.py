@@ -21,7 +21,7 @@ from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.bodies import Rectangle
 from contactverif.problems.blocks import two_blocks
-from contactverif.problems.flat_states import listed
+from contactverif.problems.flat_states import collect
 
 TURN = (3.0, 4.0)  # The rotation by cos = 3/5 and sin = 4/5.
 HYPOTENUSE = 5.0
@@ -40,7 +40,7 @@ _PENALTY = 16.0
 _PRESSURE = 2.0**-10  # The pressure on the solved blocks, whose modulus E is 1.
 
 
-@listed
+@collect
 @random_source("contactverif_properties.stability_sweep.sweep_cases")
 def stability_states() -> Iterator[Case]:
     """Return the states of an interface alone, with names (``"gap-1e-9-a"``), whose kind is one of `SWEEPS`.
@@ -61,7 +61,7 @@ def stability_states() -> Iterator[Case]:
             yield _state(kind, f"{name}-{mesh}", mesh, **decades)
 
 
-@listed
+@collect
 @random_source("contactverif_properties.stability_stiffness.stiffness_cases")
 def stability_scenes() -> Iterator[Case]:
     """Return two blocks at penalties from soft springs to far beyond what doubles can carry."""

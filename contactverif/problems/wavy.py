@@ -31,7 +31,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import traction_forces
 from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
-from contactverif.problems.flat_states import listed
+from contactverif.problems.flat_states import collect
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Bound, Problem, ProblemInstance, Studies, Variation
 
 UPPER, LOWER = 0, 1
@@ -276,7 +276,7 @@ class WavyStudy:
         return cls(int(slave), stiffness, amplitude, bool(contrast))
 
 
-@listed
+@collect
 def flat_cases() -> Iterator[Case]:
     """Return both choices of the slave at two penalties, then a slave four times finer, and one four times coarser."""
     for slave, stiffness in product((UPPER, LOWER), (10.0, 1e3)):
@@ -289,7 +289,7 @@ def flat_cases() -> Iterator[Case]:
 CURVED_AMPLITUDE = 1e-6
 
 
-@listed
+@collect
 def curved_cases() -> Iterator[Case]:
     """Return both choices of the slave at two penalties, on a curved interface."""
     for slave, stiffness in product((UPPER, LOWER), (10.0, 100.0)):
