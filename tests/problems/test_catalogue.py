@@ -208,7 +208,7 @@ WRONG = {
     "c:name=b": "--scene: option of 'c:name=b': found 'name'; needed one of degrees, lowered, penalty, poisson, "
     f"pressure, ratio, refine, sides, young; {ALL_OPTIONS}",
     **{
-        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {found}; needed {needed}"
+        f"c:{option}={value}": f"--scene: {option} of 'c:{option}={value}': found {word}; needed {needed}"
         for options, values, needed in (
             (["refine"], ["0", "-1", "65", "1.5", "true", "x"], "a whole number from 1 to 64"),
             (["penalty", "young", "ratio", "pressure"], ["0", "-1", "nan", "inf"], "a number > 0"),
@@ -219,7 +219,7 @@ WRONG = {
             (["young"], [f"1{'0' * 400}"], "a number > 0"),
         )
         for option, value in itertools.product(options, values)
-        for found in [{"true": "True", "x": "'x'", "soft": "'soft'", "fre": "'fre'"}.get(value, value)]
+        for word in [{"true": "True", "x": "'x'", "soft": "'soft'", "fre": "'fre'"}.get(value, value)]
     },
     "example-2:refine=5": "--scene: refine of 'example-2:refine=5': found 5; needed a whole number from 1 to 4",
     "example-2:force=0": "--scene: force of 'example-2:force=0': found 0; needed a number > 0",

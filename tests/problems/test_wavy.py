@@ -72,12 +72,12 @@ def test_sides_are_planes_of_symmetry_and_the_far_edge_moves_with_the_exact_fiel
         places = np.column_stack([np.full(7, x), y])
         assert np.abs(PROBLEM.displacements(body, places)[:, 0]).max() < 1e-15 * PROBLEM.wave
         assert np.abs(PROBLEM.stresses(body, places)[:, 2]).max() < 1e-14 * PROBLEM.wave
-    held = wavy_scene(PROBLEM, 2).bodies[body]
-    far = np.flatnonzero(np.abs(np.abs(held.nodes[:, 1]) - PROBLEM.height) < 1e-12)
+    of_body = wavy_scene(PROBLEM, 2).bodies[body]
+    far = np.flatnonzero(np.abs(np.abs(of_body.nodes[:, 1]) - PROBLEM.height) < 1e-12)
     assert len(far) in (13, 17)
-    assert held.fixed[far].all()
-    exact = PROBLEM.displacements(body, held.nodes[far])
-    np.testing.assert_allclose(held.imposed[far], exact, atol=1e-14 * PROBLEM.approach)
+    assert of_body.fixed[far].all()
+    exact = PROBLEM.displacements(body, of_body.nodes[far])
+    np.testing.assert_allclose(of_body.imposed[far], exact, atol=1e-14 * PROBLEM.approach)
 
 
 @pytest.mark.parametrize("refine", [1, 2, 4, 8, 16])
