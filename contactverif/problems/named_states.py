@@ -79,25 +79,20 @@ def named_case(name: str) -> Case:
     MisuseError
         If there is no such case; the message suggests the nearest names.
     """
-    if name in _FLAT:
-        return _flat(name, *_FLAT[name])
+    if name in _FLAT:  # Lengths from left to right; master nodes are numbered from right to left.
+        slave_x, master_x = map(_places, _FLAT[name])
+        slave, master = _points(slave_x), _points(master_x[::-1])
+        parameters = {
+            "penetration": np.array(_PENETRATION),
+            "along": np.concatenate([slave_x, master_x[::-1]]),
+            "direction": np.array([1.0, 0.0]),
+        }
+        z = np.vstack([_points(slave_x, -_PENETRATION), master]).reshape(-1)
+        return Case(Interface.from_chains(slave, master), z, 1 / _PENETRATION, parameters, name=name)
     if name in _OTHERS:
         return _OTHERS[name]()
     near = get_close_matches(name, NAMED, n=3, cutoff=0.4) or NAMED
     raise MisuseError("name", repr(name), f"the name of a case, perhaps {' or '.join(map(repr, near))}")
-
-
-def _flat(name: str, slave: Sequence[float], master: Sequence[float]) -> Case:
-    """Return a flat case from lengths from left to right; master nodes are numbered from right to left."""
-    slave_x, master_x = _places(slave), _places(master)[::-1]
-    interface = Interface.from_chains(_points(slave_x), _points(master_x))
-    z = np.vstack([_points(slave_x, -_PENETRATION), _points(master_x)]).reshape(-1)
-    parameters = {
-        "penetration": np.array(_PENETRATION),
-        "along": np.concatenate([slave_x, master_x]),
-        "direction": np.array([1.0, 0.0]),
-    }
-    return Case(interface, z, 1 / _PENETRATION, parameters, name=name)
 
 
 def _tilt_segment() -> Case:

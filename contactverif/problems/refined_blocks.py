@@ -10,7 +10,7 @@ every point closed, so that the answer to the wave is linear: the difference bet
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -24,6 +24,7 @@ from contactverif.contract.case import Case
 from contactverif.mechanics.bodies import Rectangle
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.blocks import two_blocks
+from contactverif.problems.flat_states import collect
 
 LENGTH, HEIGHT = 4.0, 1.0  # Of each block, lengths.
 POISSON = 0.3
@@ -44,10 +45,11 @@ def refined_blocks(n_slave: int, n_master: int) -> Scene:
     return replace(scene, facts={"columns": np.array([n_slave, n_master], dtype=np.float64)})
 
 
-@cache
-def refinement_cases() -> tuple[Case, ...]:
+@collect
+def refinement_cases() -> Iterator[Case]:
     """Return the coarsest mesh of each family, by its name."""
-    return tuple(replace(refined_blocks(*columns).case(), name=name) for name, columns in FAMILIES.items())
+    for name, columns in FAMILIES.items():
+        yield replace(refined_blocks(*columns), name=name).case()
 
 
 def refinements(case: Case) -> tuple[Scene, ...]:
@@ -92,13 +94,11 @@ def wave_blocks(n_slave: int, n_master: int, penalty: float, *, wave: float) -> 
     return replace(uniform, bodies=_wavy_bodies(n_slave, n_master, wave), penalty=distributed, facts=numbers)
 
 
-@cache
-def wave_cases() -> tuple[Case, ...]:
+@collect
+def wave_cases() -> Iterator[Case]:
     """Return the scenes of both choices of the slave at all penalties, under the mean pressure."""
-    return tuple(
-        replace(wave_blocks(*columns, penalty, wave=0.0).case(), name=case_name(columns, penalty))
-        for columns, penalty in product(COLUMNS, PENALTIES)
-    )
+    for columns, penalty in product(COLUMNS, PENALTIES):
+        yield replace(wave_blocks(*columns, penalty, wave=0.0), name=case_name(columns, penalty)).case()
 
 
 def case_name(columns: tuple[int, int], penalty: float) -> str:
@@ -160,18 +160,13 @@ def _wavy_bodies(n_slave: int, n_master: int, wave: float) -> tuple[Body, Body]:
     """Return both blocks, the slave with the load of a wave of that amplitude on its top."""
     slave, master = _uniform_blocks(n_slave, n_master).bodies
     top = np.flatnonzero(slave.nodes[:, 1] == HEIGHT)
-    load = np.array(slave.load)
-    load[top, 1] -= wave * _integrate_cosine(slave.nodes[top, 0])
-    return replace(slave, load=load), master
-
-
-def _integrate_cosine(x: FloatArray) -> FloatArray:
-    """Return ∫N cos(2πx/L) dx of each node of a line x (n,), a length."""
-    points, weights = _GAUSS
+    x, (points, weights) = slave.nodes[top, 0], _GAUSS
     share = (points + 1) / 2  # (n_points,)
     places = x[:-1, None] + np.diff(x)[:, None] * share  # (n_segments, n_points)
     forces = np.cos(2 * np.pi * places / LENGTH) * np.diff(x)[:, None] * weights / 2
-    nodal = np.zeros(len(x))
+    nodal = np.zeros(len(x))  # ∫N cos(2πx/L) dx
     nodal[:-1] += forces @ (1 - share)
     nodal[1:] += forces @ share
-    return nodal
+    load = np.array(slave.load)
+    load[top, 1] -= wave * nodal
+    return replace(slave, load=load), master
