@@ -116,7 +116,7 @@ def same(a: FloatArray, b: FloatArray) -> bool:
     return bool(equal(a, b).all())
 
 
-def listed(name: str, numbers: Iterable[object]) -> str:
+def spell(name: str, numbers: Iterable[object]) -> str:
     """Return what has these numbers, in words: `slave node 1`, or `slave nodes 1, 2`."""
     words = [*map(str, numbers)]
     return f"{name}{'s' * (len(words) > 1)} {', '.join(words)}"

@@ -24,10 +24,10 @@ from contactverif.diagnosis.flat_state import (
     FlatState,
     equal,
     flat_state,
-    listed,
     pushes_of,
     residual_of,
     same,
+    spell,
 )
 
 _MEANINGS = {  # {factor: what it may mean}
@@ -82,7 +82,7 @@ def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
     for number, depths in _OPEN.items():
         pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
         if free := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
-            yield f"where slave segment {number} is open, nothing pushes {listed('slave node', free)}, which penetrate"
+            yield f"where slave segment {number} is open, nothing pushes {spell('slave node', free)}, which penetrate"
     if promises.conserves_force:
         yield _diagnose_balance(subject)
 
@@ -200,7 +200,7 @@ def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
         are = "is" if len(missed) == 1 else "are"
-        return f"{listed(f'{name} segment', missed)} {are} left out{_ends(missed, len(segments))}"
+        return f"{spell(f'{name} segment', missed)} {are} left out{_ends(missed, len(segments))}"
     words = ", ".join(f"{name} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
     ends = _ends(segments[wrong].tolist(), len(segments))
     return f"segments have forces of another size: {words} the exact one, all others right{ends}"

@@ -15,7 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, dense
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state, listed
+from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state, spell
 
 DEPTHS = tuple(2.0**-power for power in (5, 6, 7, 8))
 # Central differences of a step of 2^-20 of forces that are smooth over 1 err by less, over the largest entry.
@@ -152,7 +152,7 @@ def _wrong_nodes(pair: Tangents, axis: int) -> str:
     unknowns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=axis) > SAME * pair.scale)
     nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
     sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
-    return " and ".join(listed(f"{side} node", part) for side, part in sides.items() if len(part))
+    return " and ".join(spell(f"{side} node", part) for side, part in sides.items() if len(part))
 
 
 def _one_part(pair: Tangents) -> str:

@@ -50,7 +50,7 @@ def test_a_body_is_a_read_only_copy() -> None:
             getattr(body, name)[0] = 0
 
 
-def changed(name: str, place: tuple[int, ...], value: Any) -> Any:
+def alter(name: str, place: tuple[int, ...], value: Any) -> Any:
     """Return an attribute of the block of which an entry, or a row, is another."""
     values = getattr(BLOCK, name).copy()
     values[place] = value
@@ -97,23 +97,23 @@ WRONG = [
     *rows("cells", dtype_of, "int64", BLOCK.cells * 1.0),
     *rows("contact", dtype_of, "int64", [[0.0, 1.0]]),
     *rows("fixed", dtype_of, "bool", np.ones((9, 2))),
-    *rows("nodes", INFINITE, "finite numbers", changed("nodes", (4, 1), np.nan), changed("nodes", (4, 1), -np.inf)),
-    *rows("imposed", INFINITE, "finite numbers", changed("imposed", (7, 1), np.nan)),
-    *rows("load", INFINITE, "finite numbers", changed("load", (1, 1), np.inf)),
+    *rows("nodes", INFINITE, "finite numbers", alter("nodes", (4, 1), np.nan), alter("nodes", (4, 1), -np.inf)),
+    *rows("imposed", INFINITE, "finite numbers", alter("imposed", (7, 1), np.nan)),
+    *rows("load", INFINITE, "finite numbers", alter("load", (1, 1), np.inf)),
     *rows("start", INFINITE, "finite numbers", (0.0, np.nan)),
     *rows("nodes", RAGGED, "an array", [[0, 1], [2]]),
     *rows("cells", RAGGED, "an array", [[0, 1, 4, 3], [1, 2, 5]]),
     *rows("axis", str, "a unit vector", (1.0, 1e-5), (0.0, 0.0)),
     (WITH_A_NODE, "punch: nodes: found node 9 in no cell; needed every node in a cell"),
     *rows("cells", "cell 0, which is clockwise, folded or flat", CONVEX, BLOCK.cells[:, ::-1]),
-    *rows("cells", "cell 0, which is clockwise, folded or flat", CONVEX, changed("cells", (0,), [0, 1, 3, 4])),
-    *rows("cells", "cell 2, which is clockwise, folded or flat", CONVEX, changed("cells", (2,), [3, 6, 7, 4])),
+    *rows("cells", "cell 0, which is clockwise, folded or flat", CONVEX, alter("cells", (0,), [0, 1, 3, 4])),
+    *rows("cells", "cell 2, which is clockwise, folded or flat", CONVEX, alter("cells", (2,), [3, 6, 7, 4])),
     *(
         (change, f"punch: cells: found cell 1, which is clockwise, folded or flat; needed {CONVEX}")
-        for change in ({"nodes": changed("nodes", (4,), place)} for place in ((3.5, 3.5), (2.0, 1.0)))
+        for change in ({"nodes": alter("nodes", (4,), place)} for place in ((3.5, 3.5), (2.0, 1.0)))
     ),
-    *rows("cells", "node number 9", "numbers from 0 to 8", changed("cells", (3, 2), 9)),
-    *rows("cells", "node number -1", "numbers from 0 to 8", changed("cells", (3, 2), -1)),
+    *rows("cells", "node number 9", "numbers from 0 to 8", alter("cells", (3, 2), 9)),
+    *rows("cells", "node number -1", "numbers from 0 to 8", alter("cells", (3, 2), -1)),
     *rows("contact", "node number 99", "numbers from 0 to 8", [[0, 99]]),
     *rows(
         "cells",
@@ -126,7 +126,7 @@ WRONG = [
     *rows("contact", "the edge from node 0 to node 4", BOUNDARY, [[0, 4]]),
     *rows("contact", "no edges", "the edges that may touch something", np.zeros((0, 2), int)),
     *rows("contact", "two edges that begin or end at one node", "each edge once", [[0, 1], [1, 2], [0, 1]]),
-    *rows("imposed", "a displacement of a free component", "0 where nothing is fixed", changed("imposed", (1, 1), 0.1)),
+    *rows("imposed", "a displacement of a free component", "0 where nothing is fixed", alter("imposed", (1, 1), 0.1)),
 ]
 
 
