@@ -206,13 +206,11 @@ def inf_sup(case: Case, subject: Subject) -> Measurement:
     """
     nodal = subject.traits.rules.penalty == "nodal"
     meshes = [inf_sup_constant(scene, subject.for_case(scene.case()), nodal=nodal) for scene in refinements(case)]
-    segments, constants = (np.array([getattr(mesh, name) for mesh in meshes]) for name in ("segment", "constant"))
+    parts = {CONSTANT: "constant", SEGMENT: "segment", ZERO_COUNT: "n_zero", MULTIPLIER_COUNT: "n_multipliers"}
     series = {
-        CONSTANT: constants,
-        SEGMENT: segments,
-        ZERO_COUNT: np.array([mesh.n_zero for mesh in meshes], dtype=np.float64),
-        MULTIPLIER_COUNT: np.array([mesh.n_multipliers for mesh in meshes], dtype=np.float64),
+        name: np.array([getattr(mesh, part) for mesh in meshes], dtype=np.float64) for name, part in parts.items()
     }
+    segments, constants = series[SEGMENT], series[CONSTANT]
     values = {ZEROS: float(series[ZERO_COUNT].max())}
     if (constants > 0).all():
         values[SLOPE] = float(np.polyfit(np.log(segments[-N_FITTED:]), np.log(constants[-N_FITTED:]), 1)[0])

@@ -142,10 +142,7 @@ def plan_moves(case: Case, pattern: BoolArray) -> Moves:
     pairs = [side[[first, second]] for side in corners for first, second in combinations(range(len(side)), 2)]
     first, second = np.concatenate(pairs, axis=1)
     itself = np.arange(groups.count)
-    i, j = (
-        np.concatenate([rows, columns, first, second, itself]),
-        np.concatenate([columns, rows, second, first, itself]),
-    )
+    i, j = np.hstack([[rows, columns], [columns, rows], [first, second], [second, first], [itself, itself]])
     contacts = csr_array((np.ones(len(i)), (i, j)), shape=(groups.count, groups.count))
     members, owners = [], []
     for colour in _colours(contacts):

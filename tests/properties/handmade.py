@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from subjects import load_subject
 
 from contactverif import Case, ContactPoints, Interface, Subject, Traits
 
@@ -66,6 +67,39 @@ class Springs(Handmade):
         tangent = np.zeros((z.size, z.size))
         tangent[:4, :4] = np.kron([[1, -1], [-1, 1]], k)
         return tangent
+
+
+class Plain:
+    """A formulation in doubles alone, with an error in its tangent if asked for; without a pairing if asked for."""
+
+    def __init__(self, inner: Any, change: Any = None, *, paired: bool = True) -> None:
+        self._inner, self._change = inner, change
+        self.traits = inner.traits.revise(takes_complex=False, takes_longdouble=False, batched=False)
+        if hasattr(inner, "n_multipliers"):
+            self.n_multipliers = inner.n_multipliers
+        if paired:
+            self.pair = inner.pair
+
+    def _ask(self, verb: str, interface: Any, pairing: Any, z: Any) -> Any:
+        if not hasattr(self, "pair"):
+            pairing = self._inner.pair(interface, z)
+        return getattr(self._inner, verb)(interface, pairing, z)
+
+    def residual(self, *state: Any) -> Any:
+        return self._ask("residual", *state)
+
+    def tangent(self, *state: Any) -> Any:
+        matrix = self._ask("tangent", *state)
+        if self._change is None:
+            return matrix
+        matrix = matrix.toarray()
+        self._change(state[0], matrix)
+        return matrix
+
+
+def plain(name: str, change: Any = None, *, paired: bool = True) -> Subject:
+    inner = load_subject(name)
+    return Subject(name, lambda *, penalty: Plain(inner.with_penalty(penalty).plugin, change, paired=paired))
 
 
 def subject(plugin: Callable[..., Any], **options: Any) -> Subject:

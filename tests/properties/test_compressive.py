@@ -228,7 +228,7 @@ def test_a_node_that_loses_a_free_end_as_the_slave_is_lifted_is_not_accused() ->
 
 
 def test_the_multipliers_of_a_textbook_are_not_accused() -> None:
-    textbook = Subject("textbook", lambda *, penalty: NodalMultipliers(penalty=penalty))
+    textbook = Subject("textbook", NodalMultipliers)
     result = run([textbook], [load_property(name) for name in ("multipliers.rank", "unilateral")], examples=40, seed=0)
     assert [row.verdict for row in result.rows] == [Verdict.PASS, Verdict.PASS], [row.reason for row in result.rows]
 

@@ -22,11 +22,8 @@ from contactverif_properties.invariants import (
     FAR,
     SCALED_FORCES,
     SCALED_TANGENT,
-    exchange_roles,
-    mirror_case,
     objectivity,
     remote,
-    renumber,
     renumbering,
     renumbering_cases,
     units,
@@ -174,20 +171,6 @@ def test_half_of_the_renumbered_meshes_are_closed_rings_with_another_seam() -> N
     for state in closed:
         assert (state.interface.slave.neighbours >= 0).all()
         assert (state.interface.master.neighbours >= 0).all()
-
-
-def test_a_relabelled_case_is_the_same_part() -> None:
-    state = over_a_node(0.25)
-    slave, master = state.interface.slave.segments, state.interface.master.segments
-    other, carry = renumber(state, np.array([1, 0, 4, 2, 3]), slave, master[::-1])
-    assert other.positions[carry.nodes].tolist() == state.positions.tolist()
-    assert other.interface.master.segments.tolist() == [[2, 3], [4, 2]]
-    image, carry = mirror_case(state)
-    assert image.positions.tolist() == (state.positions * [-1, 1]).tolist()
-    assert image.interface.slave.segments.tolist() == [[1, 0]]
-    exchanged, carry = exchange_roles(state)
-    assert exchanged.positions[carry.nodes].tolist() == state.positions.tolist()
-    assert exchanged.interface.n_slave_nodes == 3
 
 
 def test_a_promise_to_be_unbiased_is_found_out() -> None:

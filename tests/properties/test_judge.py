@@ -1,6 +1,7 @@
 """All judges share no code with the judged, and see wrong forces."""
 
 import subprocess
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from fresh_process import PYTHON
 from handmade import Handmade, case, subject
 from subjects import judge_as
 
-from contactverif import Property, Verdict, judge_case, load_properties, named_case
+from contactverif import Property, Subject, Verdict, load_properties, named_case
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif_properties.balance import force_balance, moment_balance
 from contactverif_properties.patch_flat import FORCE, patch_flat_transmission
@@ -34,31 +35,35 @@ def test_the_judge_loads_no_code_of_a_plugin() -> None:
     assert process.stdout == "[]\n"
 
 
-class Exact(Handmade):
-    """The residual of case a1, which pushes the slave up: 1 and 2 and 1 against 2 and 2; one node off by a factor."""
+class Fixed(Handmade):
+    """Forces (5,) along y that do not depend on the positions."""
 
-    def __init__(self, node: int = 0, error: float = 0.0, **traits: Any) -> None:
+    def __init__(self, *forces: float, **traits: Any) -> None:
         super().__init__(**traits)
-        self.node, self.error = node, error
+        self.forces = np.column_stack([np.zeros(5), forces]).reshape(-1)
 
     def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = np.zeros((5, 2))
-        forces[:, 1] = [-1.0, -2.0, -1.0, 2.0, 2.0]
-        forces[self.node, 1] *= 1 + self.error
-        return forces.reshape(-1)
+        return self.forces
+
+
+EXACT = np.array([-1.0, -2.0, -1.0, 2.0, 2.0])  # The residual of case a1.
+
+
+def fixed(*forces: float) -> Subject:
+    return subject(partial(Fixed, *forces))
 
 
 def test_exact_forces_pass() -> None:
-    outcome = judge_as(Verdict.PASS, patch_flat_transmission, named_case("a1"), subject(Exact))
+    outcome = judge_as(Verdict.PASS, patch_flat_transmission, named_case("a1"), fixed(*EXACT))
     assert outcome.measurement.values == {FORCE.name: 0.0}
 
 
 @pytest.mark.parametrize("node", range(5))
 @pytest.mark.parametrize("error", [1.0, 1e-6, 1e-12])
 def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) -> None:
-    outcome = judge_as(Verdict.FAIL, patch_flat_transmission, named_case("a1"), subject(Exact, node=node, error=error))
-    size = [1, 2, 1, 2, 2][node]
-    assert outcome.measurement.values[FORCE.name] == pytest.approx(error * size / 4, rel=1e-3)
+    wrong = EXACT * np.where(np.arange(5) == node, 1 + error, 1.0)
+    outcome = judge_as(Verdict.FAIL, patch_flat_transmission, named_case("a1"), fixed(*wrong))
+    assert outcome.measurement.values[FORCE.name] == pytest.approx(error * abs(EXACT[node]) / 4, rel=1e-3)
 
 
 def test_states_that_penetrate_are_not_for_barriers() -> None:
@@ -89,42 +94,20 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
         assert bool(reasons["penalty"]) is (question.id in multipliers_alone)
 
 
-class Pair(Handmade):
-    """1 up on the first slave node, `back` down on the first master node."""
-
-    def __init__(self, back: float = 1.0, **traits: Any) -> None:
-        super().__init__(**traits)
-        self.back = back
-
-    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-        forces = np.zeros((5, 2))
-        forces[0, 1], forces[2, 1] = 1.0, -self.back
-        return forces.reshape(-1)
-
-
 def test_forces_balance_or_lack_what_they_lack() -> None:
-    assert judge_case(force_balance, case(), subject(Pair)).verdict is Verdict.PASS
-    outcome = judge_as(Verdict.FAIL, force_balance, case(), subject(Pair, back=0.96))
+    judge_as(Verdict.PASS, force_balance, case(), fixed(1, 0, -1, 0, 0))
+    outcome = judge_as(Verdict.FAIL, force_balance, case(), fixed(1, 0, -0.96, 0, 0))
     assert outcome.measurement.values["force imbalance"] == pytest.approx(0.04)
+    judge_as(Verdict.FAIL, force_balance, case(), fixed(0, 0, 0, 0, 1e-100))  # On the master alone
 
 
 def test_a_couple_balances_in_force_and_not_in_moment() -> None:
     """Its arm is the way along x from the slave node to the master node, 2 − 5/14."""
-    outcome = judge_as(Verdict.FAIL, moment_balance, case(), subject(Pair))
+    outcome = judge_as(Verdict.FAIL, moment_balance, case(), fixed(1, 0, -1, 0, 0))
     arm = 2 - (6 / 7 - 1 / 2)
     assert outcome.measurement.values["moment imbalance"] == pytest.approx(arm / case().diameter)
 
 
 @pytest.mark.parametrize("question", [force_balance, moment_balance], ids=lambda question: question.id)
 def test_no_force_balances(question: Any) -> None:
-    assert judge_case(question, case(), subject(Handmade)).verdict is Verdict.PASS
-
-
-def test_a_force_on_the_master_alone_is_seen() -> None:
-    class Ghost(Handmade):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            forces = 0 * z
-            forces[-1] = 1e-100
-            return forces
-
-    assert judge_case(force_balance, case(), subject(Ghost)).verdict is Verdict.FAIL
+    judge_as(Verdict.PASS, question, case(), subject(Handmade))

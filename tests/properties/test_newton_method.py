@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from handmade import plain
 from subjects import Changed, judge_as, load_subject, with_verbs
 
 import contactverif_nts
@@ -150,22 +151,7 @@ def test_a_body_that_nothing_presses_any_more_comes_to_rest() -> None:
 
 def test_without_a_pairing_kinks_are_seen_by_differences() -> None:
     case = load_scene_case("example-1bis:pressure=300,penalty=1e4")
-
-    def make(*, penalty: float) -> Any:
-        inner = contactverif_nts.vts_ppt(penalty=penalty)
-
-        class Unpaired:
-            traits = load_subject("vts-ppt").traits.revise(batched=False, takes_complex=False)
-
-            def residual(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
-                return inner.residual(interface, inner.pair(interface, z), z)
-
-            def tangent(self, interface: Any, pairing: Any, z: FloatArray) -> Any:
-                return inner.tangent(interface, inner.pair(interface, z), z)
-
-        return Unpaired()
-
-    assert judge_case(newton_order, case, Subject("unpaired", make)).verdict is Verdict.PASS
+    judge_as(Verdict.PASS, newton_order, case, plain("vts-ppt", paired=False))
 
 
 def test_who_gives_no_force_is_not_judged_on_a_given_scene_either() -> None:

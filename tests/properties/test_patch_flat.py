@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hard_strangers import PointSprings, Softened
-from subjects import judge_as, load_property, load_subject, with_promises, with_verbs
+from subjects import Changed, judge_as, load_property, load_subject, reporting, with_promises, with_verbs
 from textbook_cells import ClippedCells
 from zoo.at_points import PointsFirst, TurnedFrame
 from zoo.on_strips import SegmentPenalty
@@ -94,18 +94,11 @@ def test_a_force_lost_elsewhere_is_a_failure_though_an_end_is_lost_too() -> None
 @pytest.mark.parametrize("exponent", [-6, -9, -12])
 @pytest.mark.parametrize("quantity", ["gap", "pressure"])
 def test_what_is_reported_may_not_be_off_by_little(quantity: str, exponent: int) -> None:
-    class Boaster(TurnedFrame):
-        def contact_points(self, *arguments: Any) -> Any:
-            points = super().contact_points(*arguments)
-            changed: Any = {quantity: getattr(points, quantity) * (1 + 10.0**exponent)}
-            return replace(points, **changed)
+    def change(points: Any) -> Any:
+        return replace(points, **{quantity: getattr(points, quantity) * (1 + 10.0**exponent)})
 
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return TurnedFrame(penalty=self.penalty).residual(interface, pairing, z)
-
-    question, subject = load_property(SINGLE), with_promises(Boaster, single=True)
-    verdicts = [judge_case(question, case, subject).verdict for case in draw(SINGLE)]
-    assert Verdict.FAIL in verdicts
+    question, subject = load_property(SINGLE), with_promises(reporting(change, TurnedFrame)._make, single=True)
+    assert Verdict.FAIL in [judge_case(question, case, subject).verdict for case in draw(SINGLE)]
 
 
 @pytest.mark.parametrize("name", ["nts", "nts-ar", "vts-g"])
@@ -230,13 +223,7 @@ SILENT = Traits()
 
 def scale_springs(factor: float, traits: Traits) -> Subject:
     """Return quarter-point springs of another stiffness, which state these traits."""
-
-    class Scaled(PointSprings):
-        def __init__(self, penalty: float) -> None:
-            super().__init__(factor * penalty)
-            self.traits = traits
-
-    return Subject("scaled", lambda *, penalty: Scaled(penalty))
+    return Subject("scaled", lambda *, penalty: Changed(PointSprings(factor * penalty), traits=traits))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -258,16 +245,15 @@ def test_another_factor_fails_in_silence_too(factor: float) -> None:
 def test_a_long_interface_shows_what_a_short_one_hides() -> None:
     """Half a percent too stiff, and the number of a segment in one byte."""
 
-    class OneByte(PointSprings):
-        def pair(self, interface: Any, z: Any) -> Any:
-            pairing = dict(super().pair(interface, z))
-            (name,) = (key for key, numbers in pairing.items() if numbers.dtype == np.int64 and numbers.max() > 200)
-            return {**pairing, name: pairing[name].astype(np.uint8).astype(np.int64)}
+    def pair(right: Any, *state: Any) -> Any:
+        pairing = dict(right(*state))
+        (name,) = (key for key, numbers in pairing.items() if numbers.dtype == np.int64 and numbers.max() > 200)
+        return {**pairing, name: pairing[name].astype(np.uint8).astype(np.int64)}
 
     long = CASES["304 segments"]
     judge_as(Verdict.FAIL, SCALE, long, scale_springs(1.005, SILENT))
     judge_as(Verdict.PASS, SCALE, CASES["16 segments, stiff"], scale_springs(1.005, SILENT))
-    judge_as(Verdict.FAIL, SCALE, long, Subject("one byte", lambda *, penalty: OneByte(penalty)))
+    judge_as(Verdict.FAIL, SCALE, long, with_verbs(PointSprings, pair=pair))
 
 
 def test_a_master_that_gets_more_than_the_slave_fails_whatever_is_promised() -> None:
@@ -289,10 +275,9 @@ def test_springs_that_state_their_area_act_once() -> None:
 
 @pytest.mark.parametrize("name", ["nts", "two-pass/nts"])
 def test_nodal_springs_pass_whether_they_state_their_unit_or_not(name: str) -> None:
-    inner = load_subject(name)
-    silent = with_promises(lambda *, penalty: inner.with_penalty(penalty).plugin, penalty=None, unbiased=None)
+    right = load_subject(name)
     for case in CASES.values():
-        for subject in (inner, silent):
+        for subject in (right, with_promises(right._make, penalty=None, unbiased=None)):
             judge_as(Verdict.PASS, SCALE, case, subject)
 
 
@@ -307,7 +292,7 @@ def test_springs_that_lose_both_ends_to_roundoff_pass() -> None:
 
 
 def test_a_law_that_is_not_linear_has_no_stiffness_and_is_not_judged() -> None:
-    outcome = judge_case(SCALE, CASES["8 segments"], Subject("soft", lambda *, penalty: Softened(penalty)))
+    outcome = judge_case(SCALE, CASES["8 segments"], Subject("soft", Softened))
     assert outcome.verdict is Verdict.PASS
     assert not outcome.measurement.numbers
     assert 0 < outcome.measurement.details["springs over ε̂ L"] < 0.5
@@ -356,10 +341,7 @@ def test_half_of_the_steep_slaves_are_tilted_by_80_to_88_degrees_and_no_gap_is_l
 
 
 def test_only_who_states_no_rule_for_gaps_may_overlook_a_steep_slave() -> None:
-    class Blind(ClippedCells):
-        def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
-            return np.zeros_like(z)
-
+    blind = with_verbs(ClippedCells, residual=lambda _, *state: np.zeros_like(state[-1]))._make
     question = load_property("patch.tilted.resultant")
     cases = {case.kind: case for case in cases_of(question.id)}
     assert set(cases) == {TILTED, STEEP}
@@ -368,7 +350,7 @@ def test_only_who_states_no_rule_for_gaps_may_overlook_a_steep_slave() -> None:
         (TILTED, None, Verdict.FAIL),
         (STEEP, "slave normal", Verdict.FAIL),
     ):
-        judge_as(verdict, question, cases[kind], with_promises(Blind, force_along="slave normal", gap=gap))
+        judge_as(verdict, question, cases[kind], with_promises(blind, force_along="slave normal", gap=gap))
 
 
 def tilted_segment() -> Case:

@@ -35,7 +35,6 @@ from contactverif_properties.purity import (
     REPEATED,
     TANGENT,
     purity,
-    renumber,
 )
 
 
@@ -193,16 +192,6 @@ def test_a_penalty_that_instances_share_is_told() -> None:
 
     broken = purity.measure(case(seed=3), Subject("shares", make)).broken
     assert broken == "the forces change when another instance is made with another penalty"
-
-
-def test_the_other_interface_has_the_same_positions_under_other_numbers() -> None:
-    state = case()
-    other, z = renumber(state, subject(Pure).for_case(state))
-    assert other.nodes.shape == state.interface.nodes.shape
-    for surface, renumbered in ((state.interface.slave, other.slave), (state.interface.master, other.master)):
-        assert (z.reshape(-1, 2)[renumbered.segments] == state.positions[surface.segments]).all()
-        assert (other.nodes[renumbered.segments] == 2 * state.interface.nodes[surface.segments]).all()
-    assert not (other.slave.segments == state.interface.slave.segments).any()
 
 
 class TwoRoundings(Handmade):

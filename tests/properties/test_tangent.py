@@ -8,7 +8,7 @@ import gauss_springs
 import numpy as np
 import pytest
 from gauss_springs import RIGHT, springs_of
-from handmade import Handmade, OneForce, case, over_a_node, subject
+from handmade import Handmade, OneForce, Plain, case, over_a_node, plain, subject
 from subjects import judge_as, load_subject
 
 from contactverif import Case, Interface, Promises, Subject, Traits, Verdict, judge_case
@@ -327,39 +327,6 @@ def test_a_row_counts_over_its_own_derivative() -> None:
 FEW = draw_cases(smooth_cases(), seed="blocks", examples=40).cases
 
 
-class Plain:
-    """A formulation in doubles alone, with an error in its tangent if asked for; without a pairing if asked for."""
-
-    def __init__(self, inner: Any, change: Any = None, *, paired: bool = True) -> None:
-        self._inner, self._change = inner, change
-        self.traits = inner.traits.revise(takes_complex=False, takes_longdouble=False, batched=False)
-        if hasattr(inner, "n_multipliers"):
-            self.n_multipliers = inner.n_multipliers
-        if paired:
-            self.pair = inner.pair
-
-    def _ask(self, verb: str, interface: Any, pairing: Any, z: Any) -> Any:
-        if not hasattr(self, "pair"):
-            pairing = self._inner.pair(interface, z)
-        return getattr(self._inner, verb)(interface, pairing, z)
-
-    def residual(self, *state: Any) -> Any:
-        return self._ask("residual", *state)
-
-    def tangent(self, *state: Any) -> Any:
-        matrix = self._ask("tangent", *state)
-        if self._change is None:
-            return matrix
-        matrix = matrix.toarray()
-        self._change(state[0], matrix)
-        return matrix
-
-
-def plain(name: str, change: Any = None, *, paired: bool = True) -> Subject:
-    inner = load_subject(name)
-    return Subject(name, lambda *, penalty: Plain(inner.with_penalty(penalty).plugin, change, paired=paired))
-
-
 def off_by(size: float, node: int) -> Any:
     """Return a change of one entry by a share of its block, that of a node with itself."""
 
@@ -370,16 +337,11 @@ def off_by(size: float, node: int) -> Any:
     return change
 
 
-def test_unknowns_have_names_and_blocks_are_of_nodes_and_have_surroundings_of_their_unit() -> None:
-    groups, small = Groups(2, 5, 3), Groups(1, 2, 1)
-    assert [groups.describe(number) for number in (3, 4, 12)] == [
-        *("y of slave node 1", "x of master node 2", "multiplier 2")
-    ]
-    assert (groups.count, groups.size) == (8, 13)
-    assert groups.of_unknowns.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 6, 7]
-    assert small.largest(np.arange(25.0).reshape(5, 5) - 12).tolist() == [[12, 10, 8], [4, 6, 7], [9, 11, 12]]
+def test_unknowns_have_names_and_what_surrounds_a_block_has_its_unit() -> None:
+    names = [Groups(2, 5, 3).describe(number) for number in (3, 4, 12)]
+    assert names == ["y of slave node 1", "x of master node 2", "multiplier 2"]
     blocks = np.array([[1.0, 2.0, 100.0], [0.5, 3.0, 200.0], [7.0, 8.0, 0.0]])
-    assert small.surroundings(blocks).tolist() == [[2, 3, 200], [3, 3, 200], [8, 8, 0]]
+    assert Groups(1, 2, 1).surroundings(blocks).tolist() == [[2, 3, 200], [3, 3, 200], [8, 8, 0]]
 
 
 @pytest.mark.parametrize("name", ["vts-ppt-balanced", "mortar-dual-lm"])
