@@ -147,4 +147,4 @@ def _difference(a: Plan, b: Plan, *, shard_too: bool = False) -> str:
         (name, a, b) for name in ("command", "versions", *(["shard"] if shard_too else []))
     ]
     pairs += [(each.name, a.options, b.options) for each in fields(RunOptions) if each.name != "isolation"]
-    return next((name for name, one, other in pairs if getattr(one, name) != getattr(other, name)), "")
+    return next((name for name, mine, other in pairs if getattr(mine, name) != getattr(other, name)), "")

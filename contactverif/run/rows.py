@@ -156,7 +156,7 @@ class OpenRow:
 
     @property
     def witnessed(self) -> bool:
-        """Whether the witness is judged, or is among the planned cases; true without one, too."""
+        """Return whether the witness is judged, or is among the planned cases; true without one, too."""
         return self.witness is None or self._witness_outcome is not None or self._place_of_witness is not None
 
     @property
@@ -165,7 +165,7 @@ class OpenRow:
 
     @property
     def complete(self) -> bool:
-        """Whether all cases and the witness are judged."""
+        """Return whether all cases and the witness are judged."""
         return self._all_drawn and not self._expected and self.witnessed
 
     def judge(self, *, on_scene: bool) -> None:

@@ -252,8 +252,8 @@ class Driver:
         for question, subject in product(chain.from_iterable(self._groups.values()), self._subjects):
             key = subject.name, question.id
             case = self._store.failures.get(key)
-            is_asked = question is self._variants[key] and subject.name not in self._stopped
-            if case is not None and is_asked and question.promise(subject.traits) is not False:
+            is_open = question is self._variants[key] and subject.name not in self._stopped
+            if case is not None and is_open and question.promise(subject.traits) is not False:
                 before = Progress(*key, "asking again", 0, 1)
                 self._report(before)
                 note = partial(self._note_earlier_failure, before, subject, question)
@@ -392,9 +392,9 @@ class Driver:
         return jobs
 
     def _add_drawn(
-        self, rows: Sequence[OpenRow], number: int, drawn: tuple[Sequence[CaseChunk], PlannedCases]
+        self, rows: Sequence[OpenRow], number: int, block_in_chunks: tuple[Sequence[CaseChunk], PlannedCases]
     ) -> Iterable[Job]:
-        chunks, block = drawn
+        chunks, block = block_in_chunks
         if number == 0:
             for chunk in chunks[: -(-WHOLE // CHUNK)]:
                 chunk.keep()

@@ -49,12 +49,12 @@ class Fixed(Handmade):
 EXACT = np.array([-1.0, -2.0, -1.0, 2.0, 2.0])  # The residual of case a1.
 
 
-def fixed(*forces: float) -> Subject:
+def answer(*forces: float) -> Subject:
     return subject(partial(Fixed, *forces))
 
 
 def test_exact_forces_pass() -> None:
-    outcome = judge_as(Verdict.PASS, patch_flat_transmission, named_case("a1"), fixed(*EXACT))
+    outcome = judge_as(Verdict.PASS, patch_flat_transmission, named_case("a1"), answer(*EXACT))
     assert outcome.measurement.values == {FORCE.name: 0.0}
 
 
@@ -62,7 +62,7 @@ def test_exact_forces_pass() -> None:
 @pytest.mark.parametrize("error", [1.0, 1e-6, 1e-12])
 def test_an_error_on_any_node_of_either_side_is_seen(node: int, error: float) -> None:
     wrong = EXACT * np.where(np.arange(5) == node, 1 + error, 1.0)
-    outcome = judge_as(Verdict.FAIL, patch_flat_transmission, named_case("a1"), fixed(*wrong))
+    outcome = judge_as(Verdict.FAIL, patch_flat_transmission, named_case("a1"), answer(*wrong))
     assert outcome.measurement.values[FORCE.name] == pytest.approx(error * abs(EXACT[node]) / 4, rel=1e-3)
 
 
@@ -95,15 +95,15 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
 
 
 def test_forces_balance_or_lack_what_they_lack() -> None:
-    judge_as(Verdict.PASS, force_balance, case(), fixed(1, 0, -1, 0, 0))
-    outcome = judge_as(Verdict.FAIL, force_balance, case(), fixed(1, 0, -0.96, 0, 0))
+    judge_as(Verdict.PASS, force_balance, case(), answer(1, 0, -1, 0, 0))
+    outcome = judge_as(Verdict.FAIL, force_balance, case(), answer(1, 0, -0.96, 0, 0))
     assert outcome.measurement.values["force imbalance"] == pytest.approx(0.04)
-    judge_as(Verdict.FAIL, force_balance, case(), fixed(0, 0, 0, 0, 1e-100))  # On the master alone
+    judge_as(Verdict.FAIL, force_balance, case(), answer(0, 0, 0, 0, 1e-100))  # On the master alone
 
 
 def test_a_couple_balances_in_force_and_not_in_moment() -> None:
     """Its arm is the way along x from the slave node to the master node, 2 − 5/14."""
-    outcome = judge_as(Verdict.FAIL, moment_balance, case(), fixed(1, 0, -1, 0, 0))
+    outcome = judge_as(Verdict.FAIL, moment_balance, case(), answer(1, 0, -1, 0, 0))
     arm = 2 - (6 / 7 - 1 / 2)
     assert outcome.measurement.values["moment imbalance"] == pytest.approx(arm / case().diameter)
 

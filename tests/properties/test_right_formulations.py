@@ -20,7 +20,7 @@ from contactverif.sampling.draw import draw_cases
 
 NORMAL, SINGLE, NODAL, PUBLISHED = (f"patch.flat.{name}" for name in ("normal", "single", "nodal", "published"))
 ALL = 10**6  # More cases than a list has.
-MOST_UNDECIDED = 50  # Of all cases that a formulation of the zoo is asked.
+MOST_UNDECIDED = 50  # Among all cases that a formulation of the zoo is asked.
 
 
 class LoopOfNodes:
@@ -168,8 +168,8 @@ def test_what_is_asked_on_flat_meshes_is_promised() -> None:
 def test_a_right_formulation_from_a_paper_is_not_accused_of_anything(name: str) -> None:
     subject, undecided = Subject(name, STRANGERS[name]), 0
     for question in map(load_property, OF_STATES):
-        asked = question.promise(subject.traits) is True and not question.refusal_of(subject)
-        if asked and not question.needs - subject.provides:
+        is_promised = question.promise(subject.traits) is True and not question.refusal_of(subject)
+        if is_promised and not question.needs - subject.provides:
             undecided += count_undecided(question, subject, cases_of(question, "strangers/{}", 50)[:50])
     assert undecided <= MOST_UNDECIDED
 

@@ -108,14 +108,14 @@ def test_points_first_are_shown_and_break_nothing_but_a_promise_and_keep_a_state
     silent, boastful = springs_of(by_points_first), springs_of(by_points_first, translation_stable=True)
     stated = springs_of(by_points_first, translation_stable=False, witnesses=witnesses)
     modest = springs_of(*RIGHT["einsum"], translation_stable=False, witnesses=witnesses)
-    shown, accused, kept, broken = (
+    of_silent, of_boastful, of_stated, of_modest = (
         run([each], [stability_translation], examples=20, seed=0) for each in (silent, boastful, stated, modest)
     )
-    assert shown.rows[0].verdict is Verdict.FAIL
-    assert shown.promises_kept
-    assert accused.rows[0].unexpected
-    assert kept.promises_kept
-    assert broken.rows[0].unexpected == "stated to fail, but passes"
+    assert of_silent.rows[0].verdict is Verdict.FAIL
+    assert of_silent.promises_kept
+    assert of_boastful.rows[0].unexpected
+    assert of_stated.promises_kept
+    assert of_modest.rows[0].unexpected == "stated to fail, but passes"
 
 
 @pytest.mark.parametrize("name", ["differences first", "cross product", "point rounded before the difference"])
