@@ -309,6 +309,7 @@ class OtherAttributes(TypedDict, total=False):
     rank: float
     role: Role
     turn: int
+    restarts: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -345,6 +346,8 @@ class Property(PropertyInfo):
         answer is known.
     turn : int
         The turn among the properties that are asked first, from 0 on: cheap ones, of which one fails for most mistakes.
+    restarts : bool
+        A second process of the formulation is asked, too. It starts once if one process judges all cases.
     question : str
         What is asked, why it matters, how it is judged and what is undecided, from which the property's page is made.
     """
@@ -361,6 +364,7 @@ class Property(PropertyInfo):
     question: str = ""
     cases_in_space: Cases | None = None
     turn: int = LAST_TURN
+    restarts: bool = False
 
     @classmethod
     def define(

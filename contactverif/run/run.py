@@ -416,7 +416,8 @@ class Driver:
             yield from self._add(row, chunk.first, [stored[place] for place in range(chunk.count)])
         else:
             arguments = question, row.subject, chunk, self._store.writer(name, question.id, chunk.first), stored
-            yield Job(judge_cases, arguments, partial(self._add_judged, row, chunk.first), self._judging(row))
+            then = partial(self._add_judged, row, chunk.first)
+            yield Job(judge_cases, arguments, then, self._judging(row), is_local=question.restarts)
 
     def _judging(self, row: OpenRow) -> Progress:
         of_run = self._meter.read(self._rows)

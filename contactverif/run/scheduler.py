@@ -84,6 +84,7 @@ class Job:
     arguments: tuple[Any, ...]
     then: Callable[[Any], Iterable[Job] | None]
     progress: Progress | None = None  # At its start. In the parent, the function gets `count` to report each case.
+    is_local: bool = False  # The parent does it, if it takes part.
 
 
 class Scheduler:
@@ -117,9 +118,12 @@ class Scheduler:
         while waiting or running:
             is_full = len(running) >= self._limit
             job = None if is_full and not self._takes_part else _next_job(waiting)
+            if job is None and self._takes_part:  # What no worker has begun is done here.
+                job = next((running.pop(future) for future in reversed([*running]) if future.cancel()), None)
+                is_full = True
             if job is not None:
-                may_submit = not is_full and (self._start is None or self._start.done())
-                future = _submit(self._executor, job.function, *job.arguments) if may_submit else None
+                stays = is_full or (self._takes_part and (job.is_local or not self._has_workers))
+                future = None if stays else _submit(self._executor, job.function, *job.arguments)
                 if future is not None:
                     running[future] = job
                     continue
@@ -129,6 +133,10 @@ class Scheduler:
                 job = running.pop(future)
                 here = partial(job.function, *job.arguments, **self._counting(job.progress))
                 waiting.appendleft(iter(job.then(_fetch(future, here)) or ()))
+
+    @property
+    def _has_workers(self) -> bool:
+        return self._start is None or self._start.done()
 
     def _wait(self, running: Iterable[Future[bytes]], *, is_patient: bool) -> Iterable[Future[bytes]]:
         while running:

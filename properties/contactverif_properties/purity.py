@@ -208,6 +208,7 @@ FIRST_TANGENT = Quantity(
     rank=10,
     role="foundation",
     turn=1,
+    restarts=True,
     family="invariants",
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),

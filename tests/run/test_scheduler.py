@@ -8,7 +8,8 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from itertools import count
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -75,11 +76,45 @@ def test_a_formulation_that_stands_alone_is_judged_here_and_in_workers(pool: Exe
 
     scheduler.Scheduler(pool, subject=subject).work(jobs())
     assert os.getpid() in processes
+    processes.clear()
+    scheduler.Scheduler(pool, subject=subject).work(
+        scheduler.Job(os.getpid, (), processes.add, is_local=True) for _ in range(9)
+    )
+    assert processes == {os.getpid()}
     here, shared = (
         run([subject], load_properties(PROPERTY_IDS), examples=60, seed=3, executor=executor, shrink="all")
         for executor in (None, pool)
     )
     assert facts(here) == facts(shared)
+    host.end_all()
+
+
+class Busy(Executor):
+    """An executor whose only worker never begins its second job."""
+
+    _max_workers = 1
+
+    def __init__(self) -> None:
+        self.n_jobs = 0
+
+    def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
+        future, self.n_jobs = Future[Any](), self.n_jobs + 1
+        if self.n_jobs == 1:
+            future.set_result(function(*arguments, **options))
+        return future
+
+
+def test_what_no_worker_has_begun_is_done_here() -> None:
+    subject, busy, results = load_subject("nts", LIMITS), Busy(), list[int]()
+    assert isinstance(subject, RemoteSubject)
+    numbers = count()
+
+    def jobs() -> Iterator[scheduler.Job]:
+        while busy.n_jobs < 3:
+            yield scheduler.Job(abs, (next(numbers),), results.append)
+
+    scheduler.Scheduler(busy, subject=subject).work(jobs())
+    assert sorted(results) == [*range(next(numbers))]
     host.end_all()
 
 
