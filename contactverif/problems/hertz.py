@@ -151,7 +151,7 @@ class LinePressure:
 
     @cached_property
     def _primitives(self) -> tuple[FloatArray, FloatArray]:
-        """Coefficients (2, n_panels, n_terms + 2) of ∫ p ds and ∫ s p ds from the beginning of each panel.
+        """Return coefficients (2, n_panels, n_terms + 2) of ∫ p ds and ∫ s p ds from the beginning of each panel.
 
         Then the sums (2, n_panels + 1) of both up to the beginning of each panel, and up to the end.
         """
