@@ -18,6 +18,7 @@ Isolated = Annotated[RunOptions, Takes([ISOLATION])]
 ReportPath = Annotated[Path, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")]
 CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the report.", metavar="ID")]
 Share = Annotated[float, typer.Option(help="Share of the cases of each row that is judged again.", metavar="SHARE")]
+_MANY = 8  # Formulations of which the number is not known yet.
 _EVERY = "Take every installed formulation that wraps no other."
 
 
@@ -100,7 +101,8 @@ def _start_processes(options: RunOptions) -> None:
 
     with suppress(ContactverifError):  # What is wrong is told in its turn.
         settled = options.with_settings().settle()
-        jobs = settled.jobs or default_jobs(len(settled.names) * len(settled.properties) * settled.size.examples)
+        n_names = len(settled.names) or _MANY  # `--all`, `--engine` and `--resume` name theirs later.
+        jobs = settled.jobs or default_jobs(n_names * len(settled.properties) * settled.size.examples)
         writes = options.out or options.mesh or options.scene_file  # A box hides files that are not there yet.
         limits = settled.limits() if settled.names and not writes else None
         if limits is not None and (jobs == 1 or len(settled.names) == 1):

@@ -158,9 +158,9 @@ class Job:
 
     def run_options(self, **others: Any) -> dict[str, Any]:
         """Return the options of `contactverif.run.run.run`, and others beside them."""
-        of_run = {name: getattr(self.options, name) for name in ("known", "keep_going")}
-        shrink = self.options.shrink or "one"
-        return others | of_run | {"profile": self.options.size, "place": self.place, "shrink": shrink}
+        options = self.options
+        of_run = {"profile": options.size, "known": options.known, "keep_going": options.keep_going}
+        return others | of_run | {"place": self.place, "shrink": options.shrink or "one"}
 
     @property
     def jobs(self) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any, Generic, TypeVar
 
-from greenlet import GreenletExit, getcurrent, greenlet
+from greenlet import getcurrent, greenlet
 
 _Result = TypeVar("_Result")
 # What a call waits for. It returns False if a process has ended: then the calls begin anew, one after another.
@@ -26,7 +26,7 @@ class _Lane(Generic[_Result]):
         self._greenlet.lane = self
         self.result: _Result | None = None
         self.wish: Wish | None = None
-        self.cancelled, self.seconds = False, 0.0
+        self.seconds = 0.0
 
     def _work(self) -> None:
         self.result = self._call()
@@ -45,12 +45,9 @@ class _Lane(Generic[_Result]):
         """Stop this call, the one that runs, until the wish is granted."""
         self.wish = wish
         self._greenlet.parent.switch()
-        if self.cancelled:
-            raise GreenletExit
 
     def cancel(self) -> None:
         """End the call where it stands; if it asks on its way out, there too."""
-        self.cancelled = True
         while not self.ended:
             self._greenlet.throw()
 

@@ -144,8 +144,9 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
 def forces_to_draw(question: Property, case: Case, subject: Subject) -> NodalForces | None:
     """Return the forces of a formulation on a case, beside the exact ones where the property knows them."""
     forces = forces_on(case, subject)
-    exact = None if question.exact is None or forces is None else question.exact(case)
-    return None if forces is None else NodalForces(forces, exact)
+    if forces is None:
+        return None
+    return NodalForces(forces, None if question.exact is None else question.exact(case))
 
 
 @dataclass(frozen=True, slots=True)

@@ -284,7 +284,6 @@ class Driver:
         if reason := draw.why_the_engine_draws():
             provenance["drawing"] = reason
         provenance |= self._store.provenance()
-        provenance |= self._store.provenance()
         while self._groups:
             self._open_next()
         for row in self._rows.values():
