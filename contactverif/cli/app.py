@@ -24,24 +24,32 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-COMMANDS: dict[str, Callable[..., int | None]] = {
-    "list": commands.list_installed,
-    "verify": commands.verify,
-    "explain": commands.explain,
-    "campaign": commands.campaign,
-    "merge": commands.merge,
-    "compare": commands.compare,
-    "report": commands.report,
-    "replay": commands.replay,
-    "audit": commands.audit,
-    "draw": commands.draw,
-    "bench": commands.bench,
-    "paper": commands.paper,
-    "scenes": commands.list_scenes,
-    "new": commands.new,
+_GROUPS: dict[str, dict[str, Callable[..., int | None]]] = {  # {title in the help: {name: command}}
+    "Commands for every day": {
+        "verify": commands.verify,
+        "explain": commands.explain,
+        "compare": commands.compare,
+        "replay": commands.replay,
+        "report": commands.report,
+        "list": commands.list_installed,
+        "new": commands.new,
+    },
+    "Commands for runs of many hours": {
+        "campaign": commands.campaign,
+        "merge": commands.merge,
+        "audit": commands.audit,
+        "bench": commands.bench,
+    },
+    "Commands for scenes and for the paper": {
+        "scenes": commands.list_scenes,
+        "draw": commands.draw,
+        "paper": commands.paper,
+    },
 }
-for name, command in COMMANDS.items():
-    app.command(name)(spell_out(command))
+COMMANDS = {name: command for group in _GROUPS.values() for name, command in group.items()}
+for title, group in _GROUPS.items():
+    for name, command in group.items():
+        app.command(name, rich_help_panel=title)(spell_out(command))
 
 # The names that deeper modules have for an option.
 _OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {

@@ -11,11 +11,23 @@ from typing import Annotated
 
 import typer
 
-from contactverif.cli.options import Screen, Takes, complete_property, done_in, formulation_option, output_option
+from contactverif.cli.options import (
+    EARLIER,
+    Screen,
+    Takes,
+    complete_property,
+    done_in,
+    formulation_option,
+    output_option,
+)
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, RunOptions
 
 Isolated = Annotated[RunOptions, Takes([ISOLATION])]
 ReportPath = Annotated[Path, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")]
+Resumed = Annotated[
+    Path | None,
+    typer.Option(help="Go on with what was to write FILE and was stopped.", metavar="FILE", rich_help_panel=EARLIER),
+]
 CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the report.", metavar="ID")]
 Share = Annotated[float, typer.Option(help="Share of the cases of each row that is judged again.", metavar="SHARE")]
 _MANY = 8  # Formulations of which the number is not known yet.
@@ -28,7 +40,7 @@ def list_installed(
     traits: Annotated[bool, typer.Option("--traits", help="Show every promise, with its witness.")] = False,
     options: Isolated,
 ) -> None:
-    """List the installed formulations with their promises, properties, problems of bench, and engines.
+    """List the installed formulations, properties, problems and engines.
 
     A promise is what a formulation says of itself; verify checks it. A
     witness is a named case on which a formulation says that it fails.
@@ -54,9 +66,7 @@ def verify(
         ),
     ],
     screen: Screen,
-    resume: Annotated[
-        Path | None, typer.Option(help="Go on with the run that was to write FILE and was stopped.", metavar="FILE")
-    ] = None,
+    resume: Resumed = None,
 ) -> int:
     """Check every property of a formulation, and draw what fails.
 
@@ -126,7 +136,7 @@ def explain(
     case: CaseId = None,
     options: Isolated,
 ) -> None:
-    """Explain a property, a term or a trait; without NAME, list the terms.
+    """Explain a property, a term or a trait; or list the terms.
 
     Of a property it says what is asked and why, the tolerance with its
     reasons, and who is known to fail. With --report come the numbers of the
@@ -193,7 +203,7 @@ def merge(
     share: Share = 0.01,
     screen: Screen,
 ) -> None:
-    """Make the report of a campaign: that of one verify with the same seed.
+    """Make the report of a campaign, as one verify would make it.
 
     A share of the outcomes is judged again; a row in which one differs is
     named, and all of it is judged again. What fails is shrunk here. The
@@ -224,12 +234,9 @@ def compare(
     ],
     against: Annotated[list[str] | None, formulation_option("The one formulation to compare with.")] = None,
     screen: Screen,
-    resume: Annotated[
-        Path | None,
-        typer.Option(help="Go on with the comparison that was to write FILE and was stopped.", metavar="FILE"),
-    ] = None,
+    resume: Resumed = None,
 ) -> None:
-    """Compare formulations with a reference, on the same cases; or two reports.
+    """Compare formulations on the same cases, or two reports.
 
     Few lines say which verdicts differ, the errors and the time; -v shows all
     tables and the meshes on which they differ most.
@@ -307,7 +314,7 @@ def replay(
     ] = None,
     options: Isolated,
 ) -> None:
-    """Judge one stored counterexample again; without --case, list the ids.
+    """Judge a stored counterexample again, or list all of them.
 
     A report names the formulation that failed, and this runs it. It says which
     one, with which options, before it does.
@@ -378,7 +385,7 @@ def draw(
     ] = None,
     options: Isolated,
 ) -> None:
-    """Solve a scene and draw it: deformed bodies, contact pressure, residuals.
+    """Solve a scene; draw bodies, contact pressure and residuals.
 
     Displacements and penetration are magnified; the figure says how much.
     Several formulations are drawn side by side, also those for which
@@ -437,7 +444,7 @@ def bench(
         output_option("Write the results: FILE.nc all instances, FILE.html or FILE.md a page. Repeatable."),
     ] = None,
 ) -> None:
-    """Measure speed against error, on scenes whose exact solution is known.
+    """Measure speed against error, where the exact solution is known.
 
     All formulations solve the same instances of each mesh, from the same
     start. What an error costs is three numbers: the seconds of one

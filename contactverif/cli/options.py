@@ -17,7 +17,7 @@ import typer
 
 from contactverif.api.run_files import JSON, JUNIT, PAGE, PARAVIEW, PICTURES, REPORT, either
 from contactverif.contract.errors import MisuseError
-from contactverif.run.run_options import Option, RunOptions, declared_options, group_names
+from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, Option, RunOptions, declared_options, group_names
 
 if TYPE_CHECKING:
     from contactverif.contract.case import Case
@@ -32,6 +32,14 @@ _LABELS = {
     JUNIT: "JUnit",
     **dict.fromkeys(PICTURES, "picture"),
     PARAVIEW: "for ParaView",
+}
+EARLIER, _RESULTS = "Earlier runs", "Results"
+_PANELS = {  # {option, or group of options: its panel in a help page}; all others are in the first one.
+    SAMPLING: "Cases",
+    PLACE: "Mesh or scene",
+    ISOLATION: "Processes of plugins",
+    **dict.fromkeys(("out", "pictures", "verbose", "quiet", "show"), _RESULTS),
+    **dict.fromkeys(("last_failed", "memory"), EARLIER),
 }
 
 
@@ -151,8 +159,9 @@ def _make_parameter(name: str, kind: Any, option: Option, default: Any, words: s
     flags = option.flags or (f"--{name.replace('_', '-')}",)
     more: dict[str, Any] = {
         "help": words or option.help,
-        "metavar": option.metavar,
+        "metavar": "" if kind is bool else option.metavar,  # A flag takes no value.
         "autocompletion": _COMPLETIONS.get(name),
+        "rich_help_panel": _PANELS.get(option.group or name),
     }
     info = typer.Argument(**more) if name == "names" else typer.Option(*flags, **more)
     default = False if kind is bool else default

@@ -186,6 +186,7 @@ class RunOptions:
             "box: each plugin in a process of its own that can write nothing, and sees no network and no other "
             "process; the default where the system has boxes. landlock: a process that writes no file, the default "
             "where it can be had and a box cannot. process: without either. inline: in this process, for debugging.",
+            "WHERE",
             group=ISOLATION,
             setting="isolation",
             needed="box, landlock, process or inline",

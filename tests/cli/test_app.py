@@ -29,6 +29,7 @@ for words in sys.argv[1:]:
 print("\\nmodules:", *sorted(sys.modules))
 """
 SLOW = {"numba", "hypothesis", "numpy", "xarray", "matplotlib", "scipy", "netCDF4", "meshio", "pytest", "pandas"}
+PANELS = ["Cases", "Results", "Earlier runs", "Mesh or scene", "Processes of plugins"]
 FOR_SOLVING = (
     *("contactverif.mechanics", "contactverif.problems.blocks", "contactverif.problems.catalogue"),
     *("contactverif.problems.disk", "contactverif.problems.hertz", "contactverif.studies"),
@@ -48,6 +49,9 @@ def test_help_teaches_and_fits_the_terminal(ask: Ask, page: str) -> None:
     assert max(map(len, answer.out.splitlines())) <= 80
     assert "\b" not in answer.out
     assert f"Usage: contactverif {page}".rstrip() in answer.out
+    panels = re.findall(r"^╭─ (.*?) ─+╮$", answer.out, re.MULTILINE)
+    assert page or [title.split()[-1] for title in panels[1:]] == ["day", "hours", "paper"]
+    assert page != "verify" or panels[2:] == PANELS
     if page in ("verify", "replay", "draw"):
         example = f"contactverif {page}"
         examples = answer.out.partition("Examples\n" if "Examples\n" in answer.out else "Examples ")[2]
