@@ -10,8 +10,6 @@ In the plane a node has two unknowns, 2 v and 2 v + 1. A multiplier stands behin
 coupling is the multiplier i, whose unknown is 2 n_nodes + i. In space a pattern has three unknowns for each node.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

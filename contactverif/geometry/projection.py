@@ -27,8 +27,6 @@ Rules for the next editor:
 3. The harness judges plugins by `contactverif.oracle`, which shares no code with this file, and so must it stay.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

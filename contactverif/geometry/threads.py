@@ -5,8 +5,6 @@ are used, not numba's `prange`: no kernel is compiled a second time, a process m
 call at once, and NUMBA_NUM_THREADS sets no limit. Nothing is kept between calls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from threading import Thread

@@ -6,8 +6,6 @@ over all cells, because a loop over pairs of shape functions takes longer than a
 Rule for the next editor: the stiffness knows nothing of any contact formulation, since its nodal forces judge them all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache

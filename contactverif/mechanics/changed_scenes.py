@@ -4,8 +4,6 @@ Rule for the next editor: only powers of two change units, and only a way that a
 interface, so that nothing but the exponents, or the place, changes.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from math import frexp

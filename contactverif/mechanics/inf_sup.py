@@ -15,8 +15,6 @@ Source: Brezzi & Fortin, Mixed and Hybrid Finite Element Methods (1991), Section
 Bathe, Computers & Structures 47 (1993) 537–545.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

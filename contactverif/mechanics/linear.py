@@ -7,8 +7,6 @@ Rule for the next editor: no other singular system is solved. A step that a sing
 worse than none, because it looks like a solution.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

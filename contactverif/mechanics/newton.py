@@ -6,8 +6,6 @@ solution, the matrix before is taken once more. A solution that does not converg
 is recorded, `End` says how the iteration ended, and only a plugin that breaks the contract raises an exception.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any

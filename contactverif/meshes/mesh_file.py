@@ -5,8 +5,6 @@ elsewhere may have wrong is found here, before an `Interface` sees it, and is sa
 command line.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ Cells that share nodes are one body, and lines without cells beside them are a r
 Rule for the next editor: an error is said in terms of the options of the command line.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass

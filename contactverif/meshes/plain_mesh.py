@@ -4,8 +4,6 @@ What comes back is checked here: whoever gets a `PlainMesh` may rely on every st
 sets of cells and physical groups by name, and numbered groups by number as text.
 """
 
-from __future__ import annotations
-
 import os
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Rule for the next editor: this process never imports the file, and checks every array that it gets.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import sys

@@ -4,8 +4,6 @@ All arithmetic is rational on the stored floats; the only rounding is the last o
 common is a convex domain, which is given: a face is cut with the edges of the domain, never with other faces.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from fractions import Fraction

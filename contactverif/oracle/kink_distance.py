@@ -4,8 +4,6 @@ Rule for the next editor: the bound must be conservative, since a case within it
 judged. The derivation is in `kink_margin`; a new decision of formulations needs a margin of its own.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ cannot be nearest. A tie is a tie: every segment at the least distance is return
 first, then by number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction

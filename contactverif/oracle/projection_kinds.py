@@ -4,8 +4,6 @@ Rule for the next editor: all arithmetic is rational on the stored floats, and e
 measured, not by how a strategy makes it. The one exception is 89.9°, which has no rational cosine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import permutations

@@ -9,8 +9,6 @@ along the interface are exact. In ours the master goes beyond the slave, so that
 Source: Zavarise & De Lorenzis (2009), Sections 4, 5.1.2 and 7.1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product

@@ -6,8 +6,6 @@ configuration a method measures areas. Where one block is wider than the other, 
 beside the other, so that everything stays uniform.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

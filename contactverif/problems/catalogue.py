@@ -12,8 +12,6 @@ References
 Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Sections 4, 5 and 7.
 """
 
-from __future__ import annotations
-
 import inspect
 import itertools
 from collections.abc import Callable, Mapping, Sequence

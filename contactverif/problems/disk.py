@@ -17,8 +17,6 @@ References
 Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Section 7.2.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import asin, atan, expm1, pi, tan
 

@@ -18,8 +18,6 @@ segment_bounds (2,)
     The same as `bounds` for a rule that pushes along normals of segments, and loses nothing at a vertex.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import product
 from math import cos, radians, sin

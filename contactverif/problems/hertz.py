@@ -13,8 +13,6 @@ K. L. Johnson, Contact Mechanics (1985): equations 2.14, 2.19 and 2.24 (line loa
 and 5.8 (elastic foundation), equation 4.49 (McEwan's stresses).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache

@@ -7,8 +7,6 @@ it. Nodes lie off any lattice, so that no state is at a kink; all of the interfa
 Rule for the next editor: names and numbers are for good. A stored report refers to a state by its name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ are the paper's. The paper prints no dimensions of A2; its lengths here are ours
 lengths of slave and master are exchanged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 

@@ -8,8 +8,6 @@ Rule for the next editor: a state that is lifted stays as it is when it is lifte
 judged again.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 It is no part of `contract`, because scenes and solutions belong to mechanics, of which a contract knows nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol

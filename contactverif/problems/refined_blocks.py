@@ -8,8 +8,6 @@ every point closed, so that the answer to the wave is linear: the difference bet
 `matching_answer` is that of two meshes whose nodes coincide, joined by springs; it knows no contact formulation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache

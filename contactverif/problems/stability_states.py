@@ -8,8 +8,6 @@ rounds nothing. So the forces there are exactly those of the flat state, turned.
 Rule for the next editor: names and numbers are for good. A stored report refers to a state by its name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import log2

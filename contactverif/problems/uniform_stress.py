@@ -11,8 +11,6 @@ ratio of the shortest to the longest segment; u = 2⁻⁵³; X is the largest co
 modulus; U is the largest displacement; ℓ is the shortest segment; p is the exact pressure.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ change. So it is compared with stored draws first (`find_difference`). Where the
 different cases, the engine draws.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass

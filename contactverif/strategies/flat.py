@@ -8,8 +8,6 @@ The last ones stand on multiples of 2^-40, or of 2^-32 if they are moved by up t
 a Pythagorean triple. All this is exact, but products of the turned coordinates are rounded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from itertools import cycle

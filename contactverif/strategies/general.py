@@ -6,8 +6,6 @@ middle, lies over the master, and where the draws leave it open, the slave sinks
 A formulation looks for contact at nodes, at points inside segments or on whole segments; half a segment has all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache

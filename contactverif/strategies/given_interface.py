@@ -1,7 +1,5 @@
 """Random states of an interface that the user gives, in 2-D or 3-D: their mesh, our displacements."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy

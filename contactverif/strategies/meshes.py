@@ -1,7 +1,5 @@
 """Interfaces and states for an author's own tests: the meshes on which the properties judge formulations."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from hypothesis.strategies import SearchStrategy

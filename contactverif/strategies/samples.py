@@ -5,8 +5,6 @@ length 1, a quarter of a segment of penetration, no motion, scale 1. Strategies 
 each new one anew, which takes longer than drawing from it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps

@@ -4,8 +4,6 @@ Lengths are small integers, E and scales powers of two times small integers; all
 ν = 0, no motion. Penalties come as ε̂ h / E, so that "moderate" means the same for every mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache

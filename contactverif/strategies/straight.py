@@ -4,8 +4,6 @@ Each rule for gaps sees the same straight line or plane opposite. Everything sta
 2^-23, and the turns are matrices of integers, so that no coordinate is rounded: straight and plane stay so bit for bit.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial
 from itertools import accumulate, cycle, takewhile

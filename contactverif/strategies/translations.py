@@ -8,8 +8,6 @@ A sliding slave follows the graph of a broken line with slopes up to 1/2 from be
 segments, so each line along a normal meets the master once, and the nearest segment is always near.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache

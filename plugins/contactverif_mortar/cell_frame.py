@@ -26,8 +26,6 @@ So ΔR_k·n is a row. A method is p, p_c and p_g at each point.
 Rule for the next editor: nothing is allocated for a cell. The array `rows` is room that a caller reuses.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

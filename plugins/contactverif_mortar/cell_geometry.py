@@ -21,8 +21,6 @@ Rule for the next editor: every function here takes real and complex positions, 
 Source: Zavarise & Wriggers (1998), Puso & Laursen (2004), Popp, Gitterle, Gee & Wall (2010). The Δ are derived here.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

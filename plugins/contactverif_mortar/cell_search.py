@@ -20,8 +20,6 @@ Rules for the next editor:
 2. A doubt of some roundings keeps a box. No segment in the strip may be lost.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

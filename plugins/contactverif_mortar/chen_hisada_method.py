@@ -7,8 +7,6 @@ points, which is exact. So the flat patch test is passed, and force and moment b
 nothing to do with where its pressure acts, so the tangent is unsymmetric.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

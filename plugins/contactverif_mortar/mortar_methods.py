@@ -9,8 +9,6 @@
 Source: Puso & Laursen (2004); dual shapes: Popp, Gitterle, Gee & Wall (2010).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ on these. Groups are integers: they follow from the pairing alone. The factors g
 product is dense on the group of each row: N master segments over one slave segment give (2 N)² entries.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

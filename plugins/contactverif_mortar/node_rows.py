@@ -14,8 +14,6 @@ v of c on what is covered of its segment, too: κ = (1 − c̄²)/2v. So each sl
 `shape_rows` has the same for directions that turn.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

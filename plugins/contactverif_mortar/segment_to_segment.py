@@ -6,8 +6,6 @@ patch test is passed, with an overhang too.
 Source: Zavarise & Wriggers (1998); segmentation and tangent: here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -19,8 +19,6 @@ other, look along it, and spoil the weighted gap at its corner.
 Source: Duong, De Lorenzis & Sauer (2018), arXiv 1712.01179, after Sauer & De Lorenzis (2013).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
 
 import numpy as np

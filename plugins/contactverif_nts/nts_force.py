@@ -27,8 +27,6 @@ Rules for the next editor:
 Source: Zavarise & De Lorenzis (2009), Eqs. 6, A1–A12.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

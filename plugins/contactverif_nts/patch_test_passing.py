@@ -17,8 +17,6 @@ exact test; a preset that promises "does not" names the case that shows it.
 Source: Zavarise & De Lorenzis (2009), Boxes 1–3, Appendix A.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache, partial
 

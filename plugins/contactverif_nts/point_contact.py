@@ -26,8 +26,6 @@ Source: Zavarise & De Lorenzis (2009), Sections 4.1, 4.2 and 5.1.2; which method
 Sections 5.1.3, 6 and 7.1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType

@@ -9,8 +9,6 @@ What must stay true: exchanging the roles of the surfaces changes no force, not 
 Source: Zavarise & De Lorenzis (2009), Sections 1 and 5, after Taylor & Papadopoulos' two-pass node-to-segment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any

@@ -25,8 +25,6 @@ Rules for the next editor:
 Source: Zavarise & De Lorenzis (2009), Box 3, Eqs. 6, 8, 9.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -26,8 +26,6 @@ Rules for the next editor:
 Source: Zavarise & De Lorenzis (2009), Eqs. 8–11, A1–A28.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

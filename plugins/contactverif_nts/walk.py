@@ -24,8 +24,6 @@ Rule for the next editor: this file makes decisions. It returns integers and boo
 Source: Zavarise & De Lorenzis (2009), Boxes 1 and 2, Fig. 23.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

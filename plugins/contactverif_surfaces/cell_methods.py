@@ -14,8 +14,6 @@ at the node. The same pressure acts on every master face under the part, integra
 On triangles both sides balance where the master covers the part; on warped quadrilaterals they do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

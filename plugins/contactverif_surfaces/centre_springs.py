@@ -34,8 +34,6 @@ allocated. Numbers are real or complex. Master corners have the order of the cel
 2 − j of its face.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -25,8 +25,6 @@ else.
 Rule for the next editor: this file makes decisions. It returns integers, never a real number.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactverif.compiler import compile_kernel, compile_maker, compile_part

@@ -6,8 +6,6 @@ the foot. Neither the same stiffness at each node nor that of the area around it
 meshes that do not match.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -11,8 +11,6 @@ virtual slave node is open. Each formula is written below as the paper prints it
 Source: Zavarise & De Lorenzis (2009), Appendix A, Figs. 27–29, Box 3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any

@@ -4,8 +4,6 @@ Figures are one or two columns of a journal wide. Letters stay legible at half s
 so that they read in grey; a formulation has the same pen in every figure. Axes have the limits that the paper prints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any

@@ -4,8 +4,6 @@ A new item is one new line in `ITEMS`. An item computes the same data in every p
 item left behind.
 """
 
-from __future__ import annotations
-
 from concurrent.futures import Executor
 from functools import partial
 from typing import Any

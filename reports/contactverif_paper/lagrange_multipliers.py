@@ -7,8 +7,6 @@ multipliers do: one-pass NTS fails the patch test, two-pass NTS passes it, and V
 Source: Zavarise & De Lorenzis (2009), Sections 2, 5.1.3, 6, 6.3 and 7.1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any

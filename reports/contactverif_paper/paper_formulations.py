@@ -1,7 +1,5 @@
 """The formulations that the paper compares, under the paper's names, and some of ours beside them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated

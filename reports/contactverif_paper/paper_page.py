@@ -3,8 +3,6 @@
 In `paper.nc` each item has a group of its own name; style and units are those of a report (`reports/README.md`).
 """
 
-from __future__ import annotations
-
 import io
 import re
 from collections import Counter

@@ -3,8 +3,6 @@
 Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1, with Figs. 9–12, 17, 18, 21, 22, 32, 33, 35 and 36.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated

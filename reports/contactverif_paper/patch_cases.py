@@ -3,8 +3,6 @@
 Source: Zavarise & De Lorenzis (2009), Sections 4.3 to 5.2.3 and 7.1, Figs. 8-12, 16-18, 20-22 and 31-36.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated

@@ -17,8 +17,6 @@ them bent and tilted. Cost is counted as entries of the sparse tangent on a long
 Source: Zavarise & De Lorenzis (2009), Fig. 30, Sections 6.1 to 6.3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -3,8 +3,6 @@
 All that depends on a clock is in the group `timing`, so that the rest of two benches with the same plan is identical.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from itertools import product

@@ -1,7 +1,5 @@
 """Tells two reports apart: what was measured must be the same, bit by bit, in two runs with the same seed."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from typing import Any

@@ -5,8 +5,6 @@ all variables again at each turn. A child process opens the file that is read an
 damaged file can harm only the child; the process that shows a report never opens it with the netCDF library.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator, Mapping

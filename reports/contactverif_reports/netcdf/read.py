@@ -5,8 +5,6 @@ is wrong with a file is a `MisuseError` in one line. What is read only when some
 checked when the file is read.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

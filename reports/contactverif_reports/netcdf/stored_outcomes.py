@@ -6,8 +6,6 @@ with a finite list of cases asks every formulation the same, so such a case belo
 however many formulations fail it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, get_args

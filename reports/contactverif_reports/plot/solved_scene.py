@@ -4,8 +4,6 @@ Rule: nothing is solved here. Only what follows from the arrays is computed: whe
 its pressure.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

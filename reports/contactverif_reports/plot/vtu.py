@@ -1,7 +1,5 @@
 """Files for ParaView: a solved scene in one unstructured grid, or the surfaces of a case in space."""
 
-from __future__ import annotations
-
 import itertools
 import os
 from typing import Any
