@@ -35,9 +35,11 @@ from contactverif.run.rows import find_missing
 from contactverif.run.run_options import ISOLATION, RunOptions, declared_options
 from contactverif.run.scheduler import begin_loading
 from contactverif.run.worker_pool import worker_pool
-from contactverif.studies.comparison import Study, run_comparison
+from contactverif.studies.comparison import Study, measure_costs, run_comparison
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports import comparisons, regressions
+from contactverif_reports.bench_costs import format_seconds
+from contactverif_reports.comparisons import Cost
 from contactverif_reports.html.comparison_page import Drawing, changes_page, comparison_page
 from contactverif_reports.html.pages import write_page
 from contactverif_reports.netcdf.read import read_run
@@ -213,15 +215,28 @@ def _compare_formulations(job: verify.Job, screen: Screen) -> int:
             options = job.run_options(progress=bar.show_progress, executor=executor, store=store)
             reference = plugins.subject(job.options.names[0])
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
+        if not screen.quiet:
+            _show_verdicts(study, screen)
+        costs, last = _time_evaluations(plugins), last_line(study.comparison)
         missing = partial(find_missing, study.run, *plugins, job.sampling)
-        write = partial(_write_file, study, plugins)
+        write = partial(_write_file, study, plugins, costs)
         end = verify.end_run(job, store, missing, write, promises_kept=study.comparison.promises_kept)
+        if not costs:
+            end = end._replace(status=verify.STOPPED)
+            last.append("\nStopped before the time of an evaluation was known; all else is above.", "yellow")
     if job.pictures is not None:
         for differing in study.differing:
             _draw_pictures(differing, *_both(differing, plugins), job.pictures)
-    return verify.show_end(
-        job, screen, end, study.run, partial(_show_study, study, screen), last_line(study.comparison)
-    )
+    return verify.show_end(job, screen, end, study.run, partial(_show_costs, study, costs, screen), last)
+
+
+def _time_evaluations(plugins: verify.Plugins) -> tuple[Cost, ...]:
+    """Return the times of an evaluation; nothing if the user does not wait for them."""
+    try:
+        with Bar() as bar:
+            return measure_costs([item for item in plugins.subjects if isinstance(item, Subject)], progress=bar.update)
+    except KeyboardInterrupt:
+        return ()
 
 
 def _both(differing: comparisons.Differing, plugins: verify.Plugins) -> tuple[Property, Subject, Subject]:
@@ -229,7 +244,7 @@ def _both(differing: comparisons.Differing, plugins: verify.Plugins) -> tuple[Pr
     return plugins.question(differing.info.id), candidate, reference
 
 
-def _write_file(study: Study, plugins: verify.Plugins, path: Path) -> None:
+def _write_file(study: Study, plugins: verify.Plugins, costs: Sequence[Cost], path: Path) -> None:
     if path.suffix.lower() != PAGE:
         write_run(study.run, path)
         return
@@ -242,7 +257,7 @@ def _write_file(study: Study, plugins: verify.Plugins, path: Path) -> None:
         else:
             exact = None if question.exact is None else question.exact(case)
             drawings.append(Drawing(forces_on(case, candidate), forces_on(case, reference), exact))
-    write_page(path, comparison_page(study.comparison, study.differing, drawings, study.costs), "--out")
+    write_page(path, comparison_page(study.comparison, study.differing, drawings, costs), "--out")
 
 
 def _draw_pictures(
@@ -262,7 +277,7 @@ def _draw_pictures(
         draw_outcome(subject, question, outcome, path, argument="--pictures")
 
 
-def _show_study(study: Study, screen: Screen) -> None:
+def _show_verdicts(study: Study, screen: Screen) -> None:
     """Show what differs in few lines, or all tables; and the meshes on which they differ, if the user wants them."""
     show(*(_tables if screen.verbose else _few_lines)(study, columns()))
     if study.apart:
@@ -322,15 +337,26 @@ def _candidate(study: Study, name: str, width: int) -> Iterator[Text]:
     if fewer + equal + more_often:
         words = f"Newton iterations: fewer in {fewer} cases, the same in {equal}, more in {more_often}."
         yield fold(words, width, indent=0)
-    totals = {(cost.formulation, cost.n_segments): cost.total for cost in study.costs}
-    times, of_reference = [], f" of {reference}"
-    for (other, n), seconds in totals.items():
-        if other == name and isfinite(seconds):
-            ratio = seconds / totals[reference, n]  # NaN where the reference could not be timed.
-            times.append(f"{1e6 * seconds:.0f} µs on {n} segments ({short_number(ratio)}{of_reference})")
-            of_reference = ""
-    if times:
-        yield fold(f"An evaluation takes {', '.join(times)}.", width, indent=0)
+
+
+def _show_costs(study: Study, costs: Sequence[Cost], screen: Screen) -> None:
+    """Show the times of an evaluation: a line for each candidate, or the table of its parts."""
+    width, (reference, *names) = columns(), study.comparison.formulations
+    if screen.verbose and costs:
+        table = comparisons.cost_table(costs, reference)
+        show(table.without(*(comparisons.PARTS if width < _NARROW else ())).terminal())
+        return
+    totals = {(cost.formulation, cost.n_segments): cost.total for cost in costs}
+    for name in names:
+        times, of_reference = [], f" {reference}"
+        for (other, n), seconds in totals.items():
+            if other == name and isfinite(seconds):
+                ratio = seconds / totals[reference, n]  # NaN where the reference could not be timed.
+                beside = f", {float(f'{ratio:.2g}'):g} times{of_reference}" if isfinite(ratio) else ""
+                times.append(f"{format_seconds(seconds)} on {n} segments{beside}")
+                of_reference = ""
+        if times:
+            show(fold(f"{name}: an evaluation takes {'; '.join(times)}.", width, indent=0))
 
 
 def _differ(pair: comparisons.Pair) -> bool:
@@ -377,7 +403,5 @@ def _tables(study: Study, width: int) -> Iterator[RenderableType]:
     yield errors.terminal(dense=not wide)
     if comparison.iterations:
         yield comparisons.iterations_table(comparison).without(*without_counts).terminal()
-    costs = comparisons.cost_table(study.costs, comparison.reference)
-    yield costs.without(*(comparisons.PARTS if narrow else ())).terminal()
     for name, reason in comparison.not_loaded.items():
         yield Text(f"{name}: not loaded: {reason}", style="red")

@@ -48,7 +48,7 @@ from contactverif.sampling.draw import Sampling
 from contactverif_reports.files import made_folder, reason_not_to_grow
 
 VERIFY, COMPARE, CAMPAIGN = "verify", "compare", "campaign"
-_STOPPED = 130  # The exit status after Ctrl-C.
+STOPPED = 130  # The exit status after Ctrl-C.
 _NOT_WRITTEN = 2  # The exit status if a file could not be written.
 _CAMPAIGN_SEED = 0  # The seed if there is none: all shards must have the same.
 _BESIDE_RESUME = ("every", "keep_going", "last_failed", "memory", "jobs")
@@ -369,7 +369,7 @@ def watch_for_stops(job: Job) -> Iterator[None]:
     except RunStopped as stop:
         show(*run_screen(stop.run, columns()))
         print_resume_hint(job)
-        raise typer.Exit(_STOPPED) from None
+        raise typer.Exit(STOPPED) from None
     except WorkerError:
         print_resume_hint(job)
         raise

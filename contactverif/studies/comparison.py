@@ -1,4 +1,4 @@
-"""A comparison of candidates with a reference: one run over the same cases, then the cost of an evaluation.
+"""A comparison of candidates with a reference: one run over the same cases, and the cost of an evaluation.
 
 A run checks one formulation after the other, so its seconds depend on who came first and on what was shrunk. For the
 cost all formulations take turns on the same states. The first turn is not timed: kernels compile and answers are
@@ -28,9 +28,9 @@ from contactverif.run.run import run
 from contactverif.sampling.draw import Sampling, with_case
 from contactverif_reports.comparisons import PARTS, Comparison, Cost, Differing
 
-TURNS = 9  # The least number of turns that are timed.
+TURNS = 3  # The least number of turns that are timed.
 MOST_TURNS = 60
-ENOUGH_SECONDS = 1.0  # More turns than `TURNS` are taken as long as all of them took less than this.
+ENOUGH_SECONDS = 3.0  # More turns than `TURNS` are taken as long as all of them took less than this.
 SEGMENTS = (16, 256)  # Slave segments: few show what a call costs, many show what a segment costs.
 
 
@@ -42,7 +42,6 @@ class Study:
     comparison: Comparison  # Its numbers side by side.
     # The case of each property on which they differ most, the largest difference first.
     differing: tuple[Differing, ...]
-    costs: tuple[Cost, ...]  # The times of an evaluation.
     apart: tuple[str, ...] = ()  # The candidates with other cases: of another dimension, or on other faces.
 
 
@@ -74,11 +73,14 @@ def run_comparison(
         outcome = each.pair.new.row.outcomes[each.number]
         case = with_case(sampling, question_of[each.info.id], each.number, outcome).case
         differing.append(replace(each, case=case))
-    return Study(result, comparison, tuple(differing), measure_costs([reference, *loaded]), apart)
+    return Study(result, comparison, tuple(differing), apart)
 
 
 def measure_costs(
-    subjects: Sequence[Subject], cases: Sequence[Case] | None = None, turns: int = TURNS
+    subjects: Sequence[Subject],
+    cases: Sequence[Case] | None = None,
+    turns: int = TURNS,
+    progress: Callable[[str, int, int], None] = lambda words, n_finished, n_planned: None,
 ) -> tuple[Cost, ...]:
     """Time each formulation on each state, in turns, and return the fastest times."""
     costs: list[Cost] = []
@@ -90,6 +92,8 @@ def measure_costs(
                 number = (place + turn) % len(subjects)
                 if failed[number]:
                     continue
+                name, n_segments = subjects[number].name, len(case.interface.slave)
+                progress(f"timing an evaluation of {name} on {n_segments} segments", min(turn, turns), turns + 1)
                 try:
                     times = _take_turn(subjects[number], case, checked=turn == 0)
                 except Exception as error:  # A plugin without the harness' guard may raise anything.

@@ -85,8 +85,24 @@ def test_what_differs_takes_few_lines(ask: Ask) -> None:
     assert re.search(r"\n  accuracy.arc +pass +\S+ pass +\S+ *\n", answer.out)
     assert re.search(r"\n  \d+ more differ: ", answer.out)
     assert re.search(r"\nNewton iterations: fewer in \d+ cases, the same in \d+, more in \d+\.\n", answer.out)
-    assert re.search(r"\nAn evaluation takes \d+ µs on 16 segments \(\S+ of vts-ppt\),", answer.out)
+    assert re.search(r"\nvts-me: an evaluation takes \d\S* µs on 16 segments, \S+ times vts-ppt;", answer.out)
     assert ask(f"{words} -q -p balance.force").out == "Every promise of vts-me is kept.\n"
+
+
+def test_the_verdicts_stay_if_nobody_waits_for_the_times(
+    ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def press(*_: object, progress: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("contactverif.cli.compare.measure_costs", press)
+    answer = ask(QUICK, "--out", tmp_path / "r.nc", "--out", tmp_path / "r.html")
+    assert answer.status == 130
+    assert re.search(r"\n  patch.flat.transmission +fails as stated ", answer.out)
+    assert "an evaluation takes" not in answer.out
+    assert answer.out.splitlines()[-1] == "Stopped before the time of an evaluation was known; all else is above."
+    assert "No evaluation was timed." in read_page(tmp_path / "r.html").text
+    assert ask("report", tmp_path / "r.nc").status == 0
 
 
 def test_a_comparison_draws_all_meshes_on_which_formulations_differ(ask: Ask) -> None:

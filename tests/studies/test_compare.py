@@ -228,8 +228,6 @@ def test_all_are_asked_the_same_cases() -> None:
     assert [our.case for our in ours] == [their.case for their in theirs]
     (name, _, _), (_, outcome, _) = study.differing[0].sides
     assert (name, outcome.verdict) == ("vts-me", Verdict.PASS)
-    assert {cost.formulation for cost in study.costs} == {"vts-ppt", "vts-me"}
-    assert all(cost.total > 0 for cost in study.costs)
 
 
 def test_two_processes_find_the_same_differences() -> None:
