@@ -245,7 +245,7 @@ class Row:
     seconds : float
         Time spent judging, shrinking excluded.
     forces : NodalForces | None
-        The nodal forces on the counterexample, if that is an interface in space.
+        The nodal forces on the counterexample, if that has no bodies.
     """
 
     formulation: str

@@ -22,7 +22,7 @@ from typing import TypeVar, get_args
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import PLANE, SEGMENT, Interface
+from contactverif.contract.interface import SEGMENT, Interface
 from contactverif.contract.property import Outcome, Property, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
@@ -486,10 +486,10 @@ class Driver:
                 yield from self._shrink_row(row, shrinks=True)
 
     def _measure_forces(self) -> Iterator[Job]:
-        """Yield the jobs to ask for the forces on each counterexample in space, which no text can show."""
+        """Yield the jobs to ask for the forces on each counterexample without bodies, which are solved for."""
         for row in self._open_rows():
             outcome = counterexample_of(row.row)
-            if outcome is not None and outcome.case.interface.dim != PLANE and outcome.verdict is Verdict.FAIL:
+            if outcome is not None and not outcome.case.packed_bodies and outcome.verdict is Verdict.FAIL:
                 arguments = row.question, outcome.case, row.subject
                 yield Job(judge.forces_to_draw, arguments, partial(self._add_forces, row))
 

@@ -65,10 +65,10 @@ CASES = {
 def test_case_c_as_one_would_draw_it() -> None:
     assert as_text(CASES["C"]).splitlines() == [
         "4 slave on 4 master segments, flat",
-        "        0   1   2       3       4",
+        "nodes   0   1   2       3       4",
         "slave   ●─2─●─2─●───4───●───4───●",
         "master  o──3──o──3──o──3──o──3──o",
-        "        9     8     7     6     5",
+        "nodes   9     8     7     6     5",
         "penetration 1/8 at every slave node",
         "penalty 10   seed 7",
     ]
@@ -77,10 +77,10 @@ def test_case_c_as_one_would_draw_it() -> None:
 def test_lengths_in_units_of_a_power_of_two() -> None:
     assert as_text(CASES["tiny"]).splitlines() == [
         "2 slave on 1 master segment, flat",
-        "        0           1           2",
+        "nodes   0           1           2",
         "slave   ●─────1─────●─────1─────●",
         "master  o───────────2───────────o",
-        "        4                       3",
+        "nodes   4                       3",
         "lengths, positions and gaps in units of 2^-39",
         "penetration 1/16 at every slave node",
         "penalty 10   seed 7",
@@ -89,10 +89,10 @@ def test_lengths_in_units_of_a_power_of_two() -> None:
 
 def test_very_uneven_lengths_are_not_to_scale() -> None:
     assert as_text(CASES["uneven"]).splitlines()[1:6] == [
-        "        0        1      2",
+        "nodes   0        1      2",
         "slave   ●──1e-5──●──12──●",
         "master  o───6.5───o──6───o",
-        "        5         4      3",
+        "nodes   5         4      3",
         "not to scale",
     ]
 
@@ -171,6 +171,9 @@ def test_a_figure_says_what_it_shows(tmp_path: Path) -> None:
     assert "nts: patch" in words
     assert "gap -1e-9, drawn 2e8 times larger" in words
     assert (tmp_path / "b.svg").read_text() == words
+    plot_case(CASES["upside down"], tmp_path / "c.svg")
+    words = (tmp_path / "c.svg").read_text()
+    assert all(text in words for text in ("rotated by 180°, here turned back", "along the slave", "ℓ=1"))
 
 
 def test_matplotlib_and_xarray_are_imported_late() -> None:

@@ -114,6 +114,12 @@ def test_the_forces_found_and_exact_are_stored_and_stand_on_the_page(path: Path,
     assert "segment" not in figure[: figure.index("</svg>")]
 
 
+def test_the_page_shows_forces_in_the_plane_too() -> None:
+    page = report_page(run([load_subject("nts")], [load_property("patch.flat.transmission")], examples=2, seed=1), "a")
+    assert ">force of the formulation<" in page
+    assert ">exact force<" in page
+
+
 def test_the_page_lists_properties_that_do_not_apply_by_their_reason() -> None:
     properties = [load_property(id_) for id_ in ("balance.force", "hard.c", "patch.curved")]
     page = report_page(run([load_subject("nts-3d")], properties, examples=1, seed=1), "report.nc")

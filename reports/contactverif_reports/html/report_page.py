@@ -120,13 +120,9 @@ def _section(
 
 def _examples(run: Run, path: str) -> list[Example]:
     """Return all counterexamples, as many of them drawn as figures as the page holds."""
-    by_id, figures = counterexamples(run), dict[str, Markup]()
-    for id_ in sorted(by_id, key=lambda id_: not by_id[id_].row.unexpected)[:MOST_FIGURES]:
-        from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
-
-        case, forces = by_id[id_].case, by_id[id_].row.forces
-        arrows = {} if forces is None else {"forces": forces.of_formulation, "exact": forces.exact}
-        figures[id_] = svg_inline(make_mesh_figure(case, _WIDTH, **arrows), as_text(case).splitlines()[0])
+    by_id = counterexamples(run)
+    in_order = sorted(by_id, key=lambda id_: not by_id[id_].row.unexpected)
+    figures = {id_: _figure(by_id[id_]) for id_ in in_order[:MOST_FIGURES]}
     examples = []
     for id_, counterexample in by_id.items():
         measurement = counterexample.outcome.measurement
@@ -140,13 +136,17 @@ def _examples(run: Run, path: str) -> list[Example]:
     return examples
 
 
+def _figure(example: Counterexample) -> Markup:
+    """Return the figure of a case, with the forces that the run keeps of it."""
+    from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
+
+    forces = example.row.forces
+    arrows = {} if forces is None else {"forces": forces.of_formulation, "exact": forces.exact}
+    return svg_inline(make_mesh_figure(example.case, _WIDTH, **arrows), as_text(example.case).splitlines()[0])
+
+
 def run_view(run: Run, rows: Sequence[Row], remarks: Sequence[str], example: Counterexample | None) -> str:
     """Return the output of a notebook cell: the rows that fail, and a failing mesh; no formulation is asked."""
-    figure = Markup("")
-    if example is not None:
-        from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
-
-        figure = svg_inline(make_mesh_figure(example.case, _WIDTH))
     return render(
         "notebook.html.j2",
         headline=headline(run),
@@ -154,5 +154,5 @@ def run_view(run: Run, rows: Sequence[Row], remarks: Sequence[str], example: Cou
         rows=rows[:_MOST_NOTEBOOK_ROWS],
         n_more=max(len(rows) - _MOST_NOTEBOOK_ROWS, 0),
         words=[] if example is None else example.words,
-        figure=figure,
+        figure="" if example is None else _figure(example),
     )

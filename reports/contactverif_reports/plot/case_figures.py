@@ -89,7 +89,10 @@ def make_case_figure(
     lengths = segment_lengths(case)
     unit, unit_name = unit_of(np.concatenate(lengths))
     positions, change = _positions_to_draw(case, gaps, course.roundoff, with_forces)
-    positions = positions / unit
+    # A straight interface is turned as in text: the slave lies above the master.
+    turn = course.turn if course.rotation else np.eye(2)
+    positions = (positions / unit) @ turn
+    forces, exact = (None if each is None else np.reshape(each, (-1, 2)) @ turn for each in (forces, exact))
     size = float(np.ptp(positions, axis=0).max())
     across, high = np.ptp(positions, axis=0) + 2 * (_BODY + _ARROW * with_forces) * size
     height = float(np.clip((width - 1) * high / across, 1.6, width)) + 1.7
@@ -98,10 +101,12 @@ def make_case_figure(
     side = -1.0 if with_forces or gaps.gap.mean() < 0 else 1.0
     surfaces = (case.interface.master, case.interface.slave)
     for surface, pen, its_lengths in zip(surfaces, (MASTER, SLAVE), lengths[::-1], strict=True):
-        labels = [format_number(length, course.roundoff / unit) for length in (its_lengths / unit).tolist()]
+        labels = [f"ℓ={format_number(length, course.roundoff / unit)}" for length in (its_lengths / unit).tolist()]
         _plot_surface(axes, surface, positions, labels, pen, body=_BODY * size, side=side)
     _plot_arrows(axes, positions, forces, exact, longest=_ARROW * size)
-    axes.set(**{f"{axis}label": f"{axis} / {unit_name}" if unit_name else axis for axis in "xy"})
+    names = ("along the slave", "across it") if course.rotation else ("x", "y")
+    xlabel, ylabel = (f"{name} / {unit_name}" if unit_name else name for name in names)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
     axes.margins(0.05)
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
     facing = gaps.gap[gaps.facing]
@@ -110,6 +115,7 @@ def make_case_figure(
     )
     gap = " to ".join(format_number(float(end), course.roundoff) for end in ends)
     notes = [f"gap {gap}{change}" if gap else f"no slave node faces the master{change}"]
+    notes += [f"{course.rotation}, here turned back"] if course.rotation else []
     shortest = min(float(its_lengths.min()) for its_lengths in lengths) / unit
     if shortest < _SHORT * size:
         notes.append(f"shortest segment {format_number(shortest, course.roundoff / unit)}")

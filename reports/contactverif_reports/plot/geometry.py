@@ -60,9 +60,16 @@ class Course:
         return self.straight and self.rise <= NEARLY_FLAT * float(np.ptp(self.along))
 
     @property
-    def angle(self) -> float:
-        """Return the angle of `direction` to the x axis, in degrees."""
-        return float(np.degrees(np.arctan2(self.direction[1], self.direction[0])))
+    def turn(self) -> FloatArray:
+        """Return the matrix (2, 2) that takes positions (n, 2) to coordinates along `direction` and to its left."""
+        return np.array([self.direction, [-self.direction[1], self.direction[0]]]).T
+
+    @property
+    def rotation(self) -> str:
+        """Return the angle of a straight interface to the x axis in words; empty for none."""
+        angle = float(np.degrees(np.arctan2(self.direction[1], self.direction[0])))
+        is_rotated = self.nearly_flat and abs(angle) > 1e-9
+        return f"rotated by {format_number(angle, 1e-9)}°" if is_rotated else ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

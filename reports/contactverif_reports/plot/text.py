@@ -61,8 +61,7 @@ def as_text(case: Case, width: int = 72) -> str:
     notes.append("   ".join([*(f"{name} {format_number(number)}" for name, number in numbers), f"seed {case.seed}"]))
     n_slave, n_master = len(case.interface.slave), len(case.interface.master)
     shape = "flat" if course.flat else "nearly flat" if course.nearly_flat else "not flat"
-    is_rotated = course.nearly_flat and abs(course.angle) > 1e-9
-    rotation = f", rotated by {format_number(course.angle, 1e-9)}°" if is_rotated else ""
+    rotation = f", {course.rotation}" if course.rotation else ""
     segments = f"{n_slave} slave on {n_master} master segment{'s' * (n_master > 1)}"
     lines = [f"{_name(case)}{segments}, {shape}{rotation}", *picture, *table, *_wrap(notes, width)]
     return "\n".join(line.rstrip() for line in lines)
@@ -182,10 +181,10 @@ def _draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[l
         links = [[link._replace(label="") for link in side] for side in links]
         note = _TOO_MANY
     rows = [
-        " " * _MARGIN + _node_numbers(case.interface.slave, number, columns),
+        "nodes   " + _node_numbers(case.interface.slave, number, columns),
         "slave   " + _strip(links[0], columns, _SLAVE),
         "master  " + _strip(links[1], columns, _MASTER),
-        " " * _MARGIN + _node_numbers(case.interface.master, number, columns),
+        "nodes   " + _node_numbers(case.interface.master, number, columns),
     ]
     if note == _TOO_MANY:
         for name, side in zip(("slave", "master"), surfaces, strict=True):
@@ -261,9 +260,8 @@ def _draw_picture(case: Case, course: Course, gaps: Gaps, width: int) -> tuple[l
     scale = _rows_per_length(positions, width)
     is_apart = course.straight and bool(np.abs(gaps.gap).max() * scale < _DISTANCE)
     if is_apart:
-        left = np.array([-course.direction[1], course.direction[0]])
         is_slave = np.arange(len(positions)) < n_slave
-        positions = positions + is_slave[:, None] * _DISTANCE / scale * left
+        positions = positions + is_slave[:, None] * _DISTANCE / scale * course.turn[:, 1]
         scale = _rows_per_length(positions, width)
     offsets = positions - [positions[:, 0].min(), positions[:, 1].max()]
     columns = np.round(offsets[:, 0] * scale * _ASPECT).astype(np.int64) + 4
