@@ -4,11 +4,9 @@ An exact field is a function of places (n, 2), in the reference or in the curren
 are that come with it. A field that is not smooth inside a segment needs more `parts`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy import sparse
@@ -45,7 +43,7 @@ class Solution:
     no_solution: str = ""  # What another code says where it found none.
 
     @classmethod
-    def from_displacements(cls, scene: Scene, displacements: FloatArray, no_solution: str = "") -> Solution:
+    def from_displacements(cls, scene: Scene, displacements: FloatArray, no_solution: str = "") -> Self:
         """Return the solution of another code from its displacements (n_nodes, 2) of the interface's nodes.
 
         The forces are those that the bodies need for these displacements, supports included.

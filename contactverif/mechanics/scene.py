@@ -7,14 +7,12 @@ A body that no other can reach is no part of the interface and has none of the u
 while contact is solved. A case that holds a scene gives the same scene back to the last bit.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy import linalg, sparse
@@ -463,7 +461,7 @@ class WholeScene(Scene):
     """A scene whose unknowns are all free components of its bodies. `solve` takes it like any other scene."""
 
     @classmethod
-    def of_scene(cls, scene: Scene) -> WholeScene:
+    def of_scene(cls, scene: Scene) -> Self:
         """Return the same scene, uncondensed."""
         return cls(scene.bodies, scene.slave, scene.master, scene.penalty, scene.facts, scene.name)
 

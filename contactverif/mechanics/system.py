@@ -7,13 +7,11 @@ on the same node. Neither can be trusted, but one more difference, along a rando
 shows an error in any entry.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy import linalg, sparse
@@ -47,7 +45,7 @@ class Differences:
     sizes: FloatArray  # (n,) What each unknown is rounded like, in its own unit: the largest one of its kind.
     n_positions: int  # The number of unknowns that are positions, two for each node.
 
-    def away_from_kinks(self) -> Differences:
+    def away_from_kinks(self) -> Self:
         """Return differences with smaller steps, if forces have a kink within these: where contact begins, for one.
 
         With ρ the roundoff of positions over the step, the steps are ρ^¼ or √ρ times as large. Where these have kinks,

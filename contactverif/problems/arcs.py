@@ -7,10 +7,9 @@ measures gaps. Springs that depend on how the surface bends differ on every mesh
 Rule for the next editor: the master reaches beyond the slave at either end, so that nothing overhangs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import radians
+from typing import Self
 
 import numpy as np
 
@@ -72,7 +71,7 @@ class Arcs:
         return Case(interface, z, self.penalty, facts, name=name)
 
     @classmethod
-    def from_case(cls, case: Case) -> Arcs:
+    def from_case(cls, case: Case) -> Self:
         """Return the arcs that a case was made of by `case`, on whatever mesh."""
         slave, master = (tuple(case.parameters[side].tolist()) for side in ("slave", "master"))
         radius, depth, convex = map(case.parameter, ("radius", "depth", "convex_slave"))

@@ -5,8 +5,6 @@ longer by the denominator, so that coordinates of few bits stay exact. What a ca
 rationals: near 1e8 the stored penetration is another one than the penetration that was asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -305,7 +303,7 @@ class Sheet:
     points: Points  # (x, y, z)
     faces: Faces
 
-    def __add__(self, other: Sheet) -> Sheet:
+    def __add__(self, other: "Sheet") -> "Sheet":
         """Return both, which have no node in common."""
         moved = [[node + len(self.points) for node in face] for face in other.faces]
         return Sheet([*self.points, *other.points], [*self.faces, *moved])

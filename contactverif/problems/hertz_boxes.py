@@ -21,13 +21,12 @@ References
 K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache, partial
 from itertools import product
 from math import ceil, gcd, log1p, sqrt
+from typing import Self
 
 import numpy as np
 
@@ -307,7 +306,7 @@ class HertzStudy:
         return word if word != "stiff" else f"{'parabola' if self.parabola_is_slave else 'flat'} {word}"
 
     @classmethod
-    def from_case(cls, case: Case) -> HertzStudy:
+    def from_case(cls, case: Case) -> Self:
         """Return the study that a case stands for."""
         slave, stiffness, fixed = map(case.parameter, _FACTS)
         return cls(bool(slave), stiffness, bool(fixed))

@@ -8,10 +8,9 @@ exact for any penalty. With three or more it is the limit for ε̂ → ∞.
 Rule for the next editor: nodes of both meshes lie at every kink, and nowhere else on one another.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Self
 
 import numpy as np
 
@@ -85,7 +84,7 @@ class KinkedPatch:
         displacement: FloatArray = -self.contraction * (places - hinge)
         return displacement + self.translation(penetration) if upper else displacement
 
-    def cut(self, share: float = 0.25) -> KinkedPatch:
+    def cut(self, share: float = 0.25) -> Self:
         """Return the patch of a line with a third normal: one kink is cut off, from `share` of both facets."""
         if len(self.line) != 3:
             raise MisuseError("line", f"{len(self.line) - 1} facets", "two facets, which meet in one kink")

@@ -19,13 +19,11 @@ References
 S. P. Timoshenko & J. N. Goodier, Theory of Elasticity (1970), Section 28 (Lamé's thick-walled cylinder).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf, pi
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -331,7 +329,7 @@ class RingStudy:
         )
 
     @classmethod
-    def from_case(cls, case: Case) -> RingStudy:
+    def from_case(cls, case: Case) -> Self:
         """Return the study that a case of a scene of `shrink_fit` stands for, on whatever mesh."""
         facts = {name: case.parameters[name].tolist() for name in _FACTS}
         facts |= {name: tuple(facts[name]) for name in ("young", "poisson")}

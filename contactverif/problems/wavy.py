@@ -13,13 +13,12 @@ References
 K. L. Johnson, Contact Mechanics (1985), Sections 2.2 (stress function of a half-plane) and 13.2 (wavy surfaces).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import product
 from math import inf, log1p, pi, sqrt
+from typing import Self
 
 import numpy as np
 
@@ -270,7 +269,7 @@ class WavyStudy:
         return replace(scene, facts=facts, name=name).case()
 
     @classmethod
-    def from_case(cls, case: Case) -> WavyStudy:
+    def from_case(cls, case: Case) -> Self:
         """Return the study that a case stands for."""
         slave, stiffness, amplitude, contrast = map(case.parameter, _FACTS)
         return cls(int(slave), stiffness, amplitude, bool(contrast))

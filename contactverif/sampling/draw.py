@@ -6,13 +6,11 @@ same cases. A block is drawn without the blocks before it, so that a run of a mi
 cases of a block are different; two blocks may, rarely, have a case in common.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import cast
+from typing import Self, cast
 
 from hypothesis.strategies import SearchStrategy
 
@@ -51,7 +49,7 @@ class Sampling:
     scene: Case | None = None  # The scene on which bodies are checked; None for random ones.
 
     @classmethod
-    def at(cls, place: Interface | Case | None, examples: int, seed: int) -> Sampling:
+    def at(cls, place: Interface | Case | None, examples: int, seed: int) -> Self:
         """Return the sampling on an interface, on a scene, or on random ones."""
         return cls(examples, seed, place.interface, place) if isinstance(place, Case) else cls(examples, seed, place)
 

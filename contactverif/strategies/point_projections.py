@@ -4,13 +4,12 @@ Whether an example is of its kind is decided by the exact answer alone. Complex 
 turns and stretches, and −i times a tangent is the outward normal of a segment whose body is on the left.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import accumulate, pairwise
+from typing import Self
 
 import numpy as np
 from hypothesis import strategies as st
@@ -47,7 +46,7 @@ class Projection:
     _exact: Nearest = field(repr=False)
 
     @classmethod
-    def exact(cls, kind: str, point: tuple[float, float], nodes: FloatArray, segments: IntArray) -> Projection:
+    def exact(cls, kind: str, point: tuple[float, float], nodes: FloatArray, segments: IntArray) -> Self:
         """Return a point and a surface with their exact answer."""
         return cls(kind, point, nodes, segments, nearest_segments(nodes, segments, point))
 
@@ -204,7 +203,7 @@ class _Scene:
     closed: Collection[int] = ()  # The places of the chains whose last node is joined to the first.
     order: Sequence[int] | None = None  # The segments in another order.
 
-    def move(self, motion: Callable[[complex], complex]) -> _Scene:
+    def move(self, motion: Callable[[complex], complex]) -> "_Scene":
         return _Scene([[*map(motion, chain)] for chain in self.chains], motion(self.point), self.closed, self.order)
 
     def project(self, kind: str) -> Projection:

@@ -11,12 +11,11 @@ The segment of a sketch lies on the x-axis, its left node at the origin, and the
 the vertex or the slave point is the origin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import cos, floor, ldexp, log2, radians, sin
+from typing import Self
 
 import numpy as np
 from hypothesis import strategies as st
@@ -88,7 +87,7 @@ class Sketch:
     ordered: bool = False  # The numbers of nodes on the walk matter.
     mirrored: bool = True  # The mirror image is of the same kind.
 
-    def mirror(self) -> Sketch:
+    def mirror(self) -> Self:
         """Return the mirror image in the y-axis, every chain walked the other way."""
 
         def flip(chain: Chain) -> Chain:

@@ -5,12 +5,11 @@ rationals see the numbers that a formulation sees. A stretch multiplies all coor
 shrink to one square on one square, each cut in two, without any motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import ldexp
+from typing import Self
 
 import numpy as np
 from hypothesis import strategies as st
@@ -96,7 +95,7 @@ class SurfaceGrid:
         """The diagonal of each cell (n_cells,)."""
         return samples.repeat_cyclically(self.diagonals, self.columns * self.rows).astype(np.int64)
 
-    def with_ring(self) -> SurfaceGrid:
+    def with_ring(self) -> Self:
         """Return a grid with one more cell on each side, in which the cells of this grid keep their diagonals."""
         choices = np.pad(self.choices.reshape(self.columns, self.rows), 1).reshape(-1)
         return replace(self, columns=self.columns + 2, rows=self.rows + 2, diagonals=choices.tolist())

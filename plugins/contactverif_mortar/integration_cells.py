@@ -13,10 +13,8 @@ A kernel gets the fields of a class of arrays as a plain tuple and unpacks them 
 the time.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -96,7 +94,7 @@ class Cells(NamedTuple):
     behind: IntArray
 
     @classmethod
-    def find(cls, sides: Interface | Sides, x: FloatArray, averaged: bool) -> Cells:
+    def find(cls, sides: Interface | Sides, x: FloatArray, averaged: bool) -> Self:
         """Find the cells at the positions x (n_nodes, 2)."""
         slave, master = sides.slave, sides.master
         before = behind = np.full(len(slave), -1)
@@ -107,11 +105,11 @@ class Cells(NamedTuple):
         return cls(*find_cells(x, slaves, masters, search_tree(master, x)), before, behind)
 
     @classmethod
-    def from_pairing(cls, pairing: Pairing, prefix: str = "") -> Cells:
+    def from_pairing(cls, pairing: Pairing, prefix: str = "") -> Self:
         """Return the cells of a pairing, whose names begin with a prefix."""
         return cls(*(pairing[prefix + name] for name in cls._fields))
 
-    def select(self, selection: BoolArray | IntArray | slice) -> Cells:
+    def select(self, selection: BoolArray | IntArray | slice) -> "Cells":
         """Return some of the cells, selected by mask, number or range."""
         slave, master = self.slave[selection], self.master[selection]
         return Cells(slave, master, self.cut_low[selection], self.cut_high[selection], self.before, self.behind)
@@ -157,16 +155,16 @@ class Ranges(NamedTuple):
     high: IntArray
 
     @classmethod
-    def find(cls, sides: Interface | Sides, x: FloatArray, cells: Cells, rule: Quadrature) -> Ranges:
+    def find(cls, sides: Interface | Sides, x: FloatArray, cells: Cells, rule: "Quadrature") -> Self:
         """Return the points of the ranges that the cells make at the positions x (n_nodes, 2)."""
         return cls(*_find_ranges(x, sides.slave.segments, sides.master.segments, cells[:4], rule.places))
 
     @classmethod
-    def from_pairing(cls, pairing: Pairing, prefix: str) -> Ranges:
+    def from_pairing(cls, pairing: Pairing, prefix: str) -> Self:
         """Return the points of a pairing, whose names begin with a prefix."""
         return cls(*(pairing[prefix + name] for name in cls._fields))
 
-    def select(self, selection: BoolArray | slice) -> Ranges:
+    def select(self, selection: BoolArray | slice) -> "Ranges":
         """Return some of the points, selected by mask or range."""
         return Ranges(*(array[selection] for array in self))
 
@@ -206,7 +204,7 @@ class Quadrature:
     current: bool  # Lengths are those of the current configuration; else those of the reference configuration.
 
     @classmethod
-    def gauss(cls, n: int, current: bool) -> Quadrature:
+    def gauss(cls, n: int, current: bool) -> Self:
         """Return the rule with n Gauss points, exact for polynomials of degree 2n − 1."""
         places, weights = np.polynomial.legendre.leggauss(n)
         return cls(places, weights / 2, current)

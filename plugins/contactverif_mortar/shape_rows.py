@@ -21,9 +21,7 @@ Rule for the next editor: variations of points are large, so they are made for `
 Source: Puso & Laursen (2004); dual shapes: Wohlmuth (2000), on the covered part: Popp, Gitterle, Gee & Wall (2010).
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy import sparse
@@ -68,13 +66,13 @@ class Shapes(NamedTuple):
     variance: Array  # (n_states, n_points) The variance v of the segment; zero for standard shapes.
 
     @classmethod
-    def standard(cls, points: Array) -> Shapes:
+    def standard(cls, points: Array) -> Self:
         """Return the standard shapes at points (n_states, n_points, 6)."""
         c, nothing = points[..., C], np.zeros_like(points[..., C])
         return cls(np.stack([(1 - c) / 2, (1 + c) / 2], axis=-1), nothing + 0.5, *[nothing] * 5)
 
     @classmethod
-    def dual(cls, points: Array, segment: IntArray, n_segments: int) -> Shapes:
+    def dual(cls, points: Array, segment: IntArray, n_segments: int) -> Self:
         """Return the dual shapes on what the points cover; `segment` (n_points,) is the slave segment of each."""
         c, w = points[..., C], points[..., WEIGHT]
         begins = np.r_[True, segment[1:] != segment[:-1]] if len(segment) else np.zeros(0, bool)

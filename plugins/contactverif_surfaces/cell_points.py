@@ -9,10 +9,9 @@ of what it computes without truncation (`differentiate`): f(x + ih) = f(x) + ih 
 roundoff for h = 2^-200.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -64,7 +63,7 @@ class FacePairs:
     master_nodes: IntArray  # (n_cells, n_master_corners)
 
     @classmethod
-    def find(cls, interface: Interface, z: FloatArray) -> FacePairs:
+    def find(cls, interface: Interface, z: FloatArray) -> Self:
         """Return the cells of an interface at a state z (n_unknowns,)."""
         x, slave, master = np.array(z).reshape(-1, 3), interface.slave, interface.master
         faces, codes = find_cells(x, slave.faces, master.faces, longest_edges(slave, x), longest_edges(master, x))
@@ -72,7 +71,7 @@ class FacePairs:
         return cls.from_pairing(interface, arrays)
 
     @classmethod
-    def from_pairing(cls, interface: Interface, pairing: Mapping[str, IntArray]) -> FacePairs:
+    def from_pairing(cls, interface: Interface, pairing: Mapping[str, IntArray]) -> Self:
         """Return the cells that a pairing holds."""
         slave, master = pairing["slave_face"], pairing["master_face"]
         return cls(slave, master, pairing["corners"], interface.slave.faces[slave], interface.master.faces[master])
@@ -95,7 +94,7 @@ class FacePairs:
         """Return the positions (..., n_cells, n_corners, 3) of these nodes at states z (..., n_unknowns)."""
         return positions_of(z, self.nodes)
 
-    def view_at(self, z: FloatArray) -> SlaveView:
+    def view_at(self, z: FloatArray) -> "SlaveView":
         """Return the cells as their slave faces see them at a state z (n_unknowns,)."""
         return SlaveView.of_corners(positions_of(z, self.slave_nodes), positions_of(z, self.master_nodes))
 
@@ -187,7 +186,7 @@ class SlaveView:
     normal: Array  # (..., n_cells, 3)
 
     @classmethod
-    def of_corners(cls, slave: Array, master: Array) -> SlaveView:
+    def of_corners(cls, slave: Array, master: Array) -> Self:
         """Return the view of slave corners and master corners (..., n_cells, n_corners, 3)."""
         arms = [side - slave[..., :1, :] for side in (slave, master)]
         along, across, normal = axes_of(slave)

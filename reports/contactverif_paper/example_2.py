@@ -11,13 +11,11 @@ and hardly any is left where areas are measured in the reference configuration. 
 Source: Zavarise & De Lorenzis (2009), Section 7.2, Figs. 37 to 39.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -337,7 +335,7 @@ class Difference:
     ]
 
     @classmethod
-    def between(cls, solution: DiskSolution, other: DiskSolution) -> Difference:
+    def between(cls, solution: DiskSolution, other: DiskSolution) -> Self:
         """Subtract the pressures of another solution with the same contact points."""
         both = (solution.pressure > 0) & (other.pressure > 0)
         return cls(other.x[both], (solution.pressure - other.pressure)[both])

@@ -6,12 +6,10 @@ forces are rationals with small denominators up to a few roundings. So the ratio
 Source: Zavarise & De Lorenzis (2009), Figs. 8, 16 and 20.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -92,7 +90,7 @@ class ForceTable:
     rows: tuple[Forces, ...]
 
     @classmethod
-    def compute(cls, name: str, title: str, source: PrintedForces) -> ForceTable:
+    def compute(cls, name: str, title: str, source: PrintedForces) -> Self:
         """Compute the table of one case."""
         case = named_case(name)
         n_slave, along = case.interface.n_slave_nodes, case.parameters["along"]

@@ -5,14 +5,12 @@ declare the variables of `paper.nc`. `items.py` registers it, and nothing on the
 The verdict on a statement follows from numbers, never from the author's hand.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Self, get_type_hints
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -112,7 +110,7 @@ class Agreement(IntEnum):
         return "under a condition" if self is Agreement.CONDITIONAL else self.name.lower()
 
     @classmethod
-    def decide(cls, holds: bool, *, always: bool = True) -> Agreement:
+    def decide(cls, holds: bool, *, always: bool = True) -> Self:
         """Return AGREES or DIFFERS, or CONDITIONAL for what holds but not always."""
         return cls.DIFFERS if not holds else cls.AGREES if always else cls.CONDITIONAL
 
@@ -157,7 +155,7 @@ class PageTable:
     rows: tuple[tuple[Cell, ...], ...]
 
     @classmethod
-    def of_cells(cls, caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Iterable[Cell]]]) -> PageTable:
+    def of_cells(cls, caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Iterable[Cell]]]) -> Self:
         """Return a table of rows (head, cells)."""
         table = cls(caption, tuple(columns), tuple((Cell((head,)), *cells) for head, cells in rows))
         if any(len(row) != len(columns) for row in table.rows):
@@ -165,7 +163,7 @@ class PageTable:
         return table
 
     @classmethod
-    def of_numbers(cls, caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> PageTable:
+    def of_numbers(cls, caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Self:
         """Return a table whose rows have a head and, to its right, numbers."""
         return cls.of_cells(caption, columns, [(head, [Cell((t,), tone="n") for t in texts]) for head, *texts in rows])
 
@@ -180,7 +178,7 @@ class PaperFigure:
     plot: Callable[[Any], Figure]  # Draws it from the data that the item's `compute` returns.
 
     @classmethod
-    def define(cls, name: str, caption: str) -> Callable[[Callable[[Any], Figure]], PaperFigure]:
+    def define(cls, name: str, caption: str) -> Callable[[Callable[[Any], Figure]], "PaperFigure"]:
         """Return a decorator that makes a figure of the function that draws it."""
         return lambda plot: cls(name, caption, plot)
 

@@ -7,12 +7,10 @@ is the better one, depends on the penalty; who passes does not. Each solution is
 Source: Zavarise & De Lorenzis (2009), Sections 4, 5 and 7.1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -232,7 +230,7 @@ class Study:
 
     name: str  # Its group.
     compute: Callable[[], Any]
-    statement: Callable[[PatchTests], Statement]
+    statement: Callable[["PatchTests"], Statement]
     attributes: Mapping[str, str]
 
 
@@ -246,7 +244,7 @@ class PatchTests:
     numbers: Any
 
     @classmethod
-    def compute(cls, setups: tuple[PatchSetup, ...], printed: PrintedForces | None, study: Study | None) -> PatchTests:
+    def compute(cls, setups: tuple[PatchSetup, ...], printed: PrintedForces | None, study: Study | None) -> Self:
         """Solve the patch tests, and compute forces and numbers beside them."""
         forces = ForceTable.compute(setups[0].scene, setups[0].title, printed) if printed else None
         return cls(tuple(map(patch_solution, setups)), forces, study, study.compute() if study else None)

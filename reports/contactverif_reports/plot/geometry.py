@@ -3,11 +3,10 @@
 Rule: a drawing may be rough where a judge may not; nothing here is used for a verdict.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Self
 
 import numpy as np
 
@@ -31,7 +30,7 @@ class Course:
     straight: bool  # Whether each slave segment runs along `direction` and each master segment against it.
 
     @classmethod
-    def from_case(cls, case: Case) -> Course:
+    def from_case(cls, case: Case) -> Self:
         """Measure a case. Coordinates begin at the node furthest back along the direction."""
         positions, interface = case.positions, case.interface
         chords = _chords(interface.slave, positions)
@@ -81,7 +80,7 @@ class Gaps:
     facing: BoolArray  # (n_slave_nodes,) Whether the node faces the master; False beyond an end of the master surface.
 
     @classmethod
-    def from_case(cls, case: Case) -> Gaps:
+    def from_case(cls, case: Case) -> Self:
         """Compare each slave node with every master segment."""
         positions, master = case.positions, case.interface.master
         first, chords = positions[master.segments[:, 0]], _chords(master, positions)

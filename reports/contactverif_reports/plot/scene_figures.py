@@ -1,11 +1,9 @@
 """The figure of a solved scene: bodies, pressures along the interface, Newton's iterates. Importing it is slow."""
 
-from __future__ import annotations
-
 import os
 import textwrap
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import matplotlib
 import numpy as np
@@ -240,7 +238,7 @@ class Magnification:
     gap: float
 
     @classmethod
-    def for_solutions(cls, solved: SolvedScene, solutions: list[Solution]) -> Magnification:
+    def for_solutions(cls, solved: SolvedScene, solutions: list[Solution]) -> Self:
         """Return factors of one significant digit, for solutions that are compared.
 
         An enlarged drawing does not magnify displacements, because that would close gaps that stay open.
