@@ -267,19 +267,15 @@ class Cases:
 
     @classmethod
     def random(cls, make: Callable[..., Any]) -> Cases:
-        """Return random cases.
+        """Return random cases, of one kind of situation or of several with the same share.
 
         Parameters
         ----------
         make : Callable[..., Any]
-            Takes None, an interface or a scene, and returns a hypothesis strategy of `Case`, or None. Properties for
-            which the same function makes the cases are judged on the same ones, if it has a name (`random_source`).
+            Takes None, an interface or a scene, and returns a hypothesis strategy of `Case`, {kind: strategy}, or None.
+            Properties for which the same function makes the cases are judged on the same ones, if it has a name
+            (`random_source`).
         """
-        return cls(make, needs=needs_of_place(make))
-
-    @classmethod
-    def by_kind(cls, make: Callable[..., Mapping[str, Any] | Any]) -> Cases:
-        """Return random cases of several kinds of situation with the same share: `make` returns {kind: strategy}."""
         return cls(make, needs=needs_of_place(make))
 
     @classmethod

@@ -61,17 +61,14 @@ def zero_matrix(n_nodes: int, n_multipliers: int, couplings: Couplings, per_node
     A node has `per_node` unknowns.
     """
     sizes, latest = (n_nodes, n_multipliers, per_node), _latest[0] if _latest else None
-    if latest is None or latest[:3] != sizes or not _are_equal(latest.couplings, couplings):
+    pairs: Any = () if latest is None else zip(latest.couplings, couplings, strict=True)
+    if latest is None or latest[:3] != sizes or not all(np.array_equal(*pair) for pair in pairs):
         latest = _Pattern(*sizes, couplings, *_make_pattern(*sizes, tuple(couplings)))
         _latest[:] = [latest]
     indptr, indices = latest.indptr.copy(), latest.indices.copy()  # A caller may change its matrix.
     matrix = compressed_matrix("csr", len(indptr) - 1, np.zeros(len(indices)), indices, indptr)
     matrix.has_canonical_format = True  # Columns are ascending, and none occurs twice in a row.
     return matrix
-
-
-def _are_equal(couplings: Fields, others: Fields) -> bool:
-    return all(np.array_equal(first, second) for first, second in zip(couplings, others, strict=True))
 
 
 def _make_pattern(

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import ONE_SIDED, TRIANGLE, Interface, Surface, turns_of
+from contactverif.contract.interface import ONE_SIDED, SEGMENT, TRIANGLE, Interface, Surface, turns_of
 from contactverif.meshes.plain_mesh import Group, PlainMesh, groups_of, kinds_in, read_mesh, unknown_group_error
 
 FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
@@ -99,13 +99,9 @@ def read_sides(path: str | Path, *, slave: str, master: str, flip: bool, plane_o
     inside = None if in_space else _directed_edges(mesh, points)
     oriented = []
     for argument, side in sides.items():
-        if inside is None:
-            neighbours, signs = _neighbours_of_faces(argument, points, side), _outward(argument, mesh, side)
-            words = "a surface", "one body on one side"
-        else:
-            neighbours, signs = _neighbours_of_lines(argument, side, points), _leftward(argument, side, inside, points)
-            words = "a chain", "a body on one side of a chain"
-        oriented.append(_run_one_way(argument, points, side, neighbours, signs, words))
+        neighbours = _neighbours(argument, points, side)
+        signs = _outward(argument, mesh, side) if inside is None else _leftward(argument, side, inside, points)
+        oriented.append(_run_one_way(argument, points, side, neighbours, signs))
     # `flip` turns what has no cells beside it, or all if everything has some.
     every = all(by_cells.all() for _, by_cells in oriented)
     turned = [np.where((flip & (every | ~by_cells))[:, None], side[:, ::-1], side) for side, by_cells in oriented]
@@ -228,7 +224,6 @@ def _run_one_way(
     elements: IntArray,
     neighbours: list[list[tuple[int, bool]]],
     signs: IntArray,
-    words: tuple[str, str],
 ) -> tuple[IntArray, BoolArray]:
     """Turn lines or faces (n, n_corners) as those that they hang together with, and so that the body is behind them.
 
@@ -251,33 +246,39 @@ def _run_one_way(
         sides = signs[patch] * np.where(turned[patch], -1, 1)
         if sides.min() < 0 < sides.max():
             place = describe_place(points, elements[np.array(patch)[sides < 0][0], 0])
-            raise MisuseError(argument, f"{words[0]} that changes the side of its body, at {place}", words[1])
+            kind, needed = "surface", "one body on one side"
+            if elements.shape[1] == SEGMENT:
+                kind, needed = "chain", "a body on one side of a chain"
+            raise MisuseError(argument, f"a {kind} that changes the side of its body, at {place}", needed)
         turned[patch] ^= bool(sides.min() < 0)
         by_cells[patch] = bool(sides.any())
     return np.where(turned[:, None], elements[:, ::-1], elements), by_cells
 
 
-def _neighbours_of_lines(argument: str, lines: IntArray, points: FloatArray) -> list[list[tuple[int, bool]]]:
-    """Return for each line its neighbours, and whether both begin or both end in their node; lines form chains."""
-    touching: dict[int, list[int]] = {}
-    for index, line in enumerate(lines.tolist()):
-        for node in line:
-            touching.setdefault(node, []).append(index)
-    for node, several in touching.items():
-        if len(several) > 2:
-            actual = f"{len(several)} lines that meet at {describe_place(points, node)}"
-            raise MisuseError(argument, actual, "chains: at most two lines at a node")
-    if len(np.unique(np.sort(lines, axis=1), axis=0)) < len(lines):
+def _neighbours(argument: str, points: FloatArray, elements: IntArray) -> list[list[tuple[int, bool]]]:
+    """Return for each line or face its neighbours, and whether one of both is to be turned.
+
+    That is so if both lines begin or both end in their node, or both faces run the same way along their edge.
+    """
+    of_lines = elements.shape[1] == SEGMENT
+    owners: dict[tuple[int, ...], list[tuple[int, bool]]] = {}
+    for number, corners in enumerate(elements.tolist()):
+        for start, end in zip(corners, [*corners[1:], corners[0]], strict=True):
+            shared = (start,) if of_lines else (min(start, end), max(start, end))
+            owners.setdefault(shared, []).append((number, start == corners[0] if of_lines else start < end))
+    most = "chains: at most two lines at a node" if of_lines else "at most two faces on an edge"
+    neighbours: list[list[tuple[int, bool]]] = [[] for _ in elements]
+    for (node, *_), those in owners.items():
+        if len(those) > 2:
+            words = "lines that meet" if of_lines else "faces on one edge,"
+            raise MisuseError(argument, f"{len(those)} {words} at {describe_place(points, node)}", most)
+        if len({number for number, _ in those}) == 2:
+            (first, way), (second, other_way) = those
+            neighbours[first].append((second, way == other_way))
+            neighbours[second].append((first, way == other_way))
+    if of_lines and len(np.unique(np.sort(elements, axis=1), axis=0)) < len(elements):
         raise MisuseError(argument, "the same line twice", "each line once")
-    return [
-        [
-            (other, bool(lines[other, end] == node))
-            for end, node in enumerate(line)
-            for other in touching[node]
-            if other != index
-        ]
-        for index, line in enumerate(lines.tolist())
-    ]
+    return neighbours
 
 
 def describe_place(points: FloatArray, node: int) -> str:
@@ -295,24 +296,6 @@ def _is_in_space(mesh: PlainMesh, groups: dict[str, Group], name: str) -> bool:
     used = np.unique(np.concatenate([block.data.reshape(-1) for block in mesh.cells]))
     extent = np.ptp(mesh.points[used], axis=0)
     return bool(extent[2] > FLAT * extent.max())
-
-
-def _neighbours_of_faces(argument: str, points: FloatArray, faces: IntArray) -> list[list[tuple[int, bool]]]:
-    """Return for each face its neighbours, and whether both run the same way along their edge: one is turned then."""
-    owners: dict[tuple[int, int], list[tuple[int, bool]]] = {}
-    for face, corners in enumerate(faces.tolist()):
-        for start, end in zip(corners, [*corners[1:], corners[0]], strict=True):
-            owners.setdefault((min(start, end), max(start, end)), []).append((face, start < end))
-    neighbours: list[list[tuple[int, bool]]] = [[] for _ in faces]
-    for edge, those in owners.items():
-        if len(those) > 2:
-            place = describe_place(points, edge[0])
-            raise MisuseError(argument, f"{len(those)} faces on one edge, at {place}", "at most two faces on an edge")
-        if len(those) == 2:
-            (first, way), (second, other_way) = those
-            neighbours[first].append((second, way == other_way))
-            neighbours[second].append((first, way == other_way))
-    return neighbours
 
 
 def _outward(argument: str, mesh: PlainMesh, faces: IntArray) -> IntArray:

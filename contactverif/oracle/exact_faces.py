@@ -7,10 +7,11 @@ Rule for the next editor: a point is formed from the stored nodes and its shape 
 formulation reports is rounded, and nothing here reads it.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Self
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class FaceLattice:
     master: IntArray
 
     @classmethod
-    def from_state(cls, interface: Interface, z: FloatArray) -> Self:
+    def from_state(cls, interface: Interface, z: FloatArray) -> FaceLattice:
         """Return the lattice of a state z (n_unknowns + …,), whose numbers count as the rationals that they are."""
         values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
         return cls(as_integers(values).reshape(-1, 3), scale, interface.slave.faces, interface.master.faces)
@@ -48,7 +49,7 @@ class ExactFacePoints:
     outward: Integers  # (n_points, 3) A normal of any length.
 
     @classmethod
-    def at(cls, lattice: FaceLattice, face: IntArray, shape: FloatArray) -> Self:
+    def at(cls, lattice: FaceLattice, face: IntArray, shape: FloatArray) -> ExactFacePoints:
         """Return the points with shape functions (n_points, 3) on slave faces (n_points,).
 
         The first shape function is what the others leave of 1, so that a point is on its face.
@@ -80,7 +81,7 @@ class FaceView:
     corners: FloatArray  # (n_points, 3, 3) The corners of the master triangle, from the point.
 
     @classmethod
-    def of_faces(cls, lattice: FaceLattice, points: ExactFacePoints, faces: IntArray, *, closest: bool) -> Self:
+    def of_faces(cls, lattice: FaceLattice, points: ExactFacePoints, faces: IntArray, *, closest: bool) -> FaceView:
         """Return what points see of master faces (n_points,). One that is seen edge-on has infinite numbers."""
         nodes = lattice.nodes[lattice.master[faces]]
         outward = _outward(nodes)

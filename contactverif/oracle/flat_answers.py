@@ -131,21 +131,9 @@ _TRIANGLE = 3
 def uniform_surface_weights_exact(interface: Interface, plane: ArrayLike, domain: ArrayLike) -> list[Fraction]:
     """Return the areas that turn a uniform pressure into consistent nodal forces, as exact rationals.
 
-    The weight of a node is ∫ N over the part of its surface that lies in the domain.
-
-    Parameters
-    ----------
-    interface : Interface
-        Surfaces of triangles, or of quadrilaterals that lie in the domain as a whole.
-    plane : ArrayLike, shape (n_nodes, 2)
-        The coordinates of the nodes in the plane; floats count as the rationals that they are.
-    domain : ArrayLike, shape (n_corners, 2)
-        The corners of the convex domain, counter-clockwise.
-
-    Raises
-    ------
-    MisuseError
-        If a quadrilateral lies partly outside of the domain: there no polynomial is integrated.
+    The weight of a node is ∫ N over the part of its surface that lies in the convex domain, whose corners (n_corners,
+    2) run counter-clockwise. `plane` (n_nodes, 2) are the coordinates of the nodes; floats count as the rationals that
+    they are. A quadrilateral partly outside of the domain is refused: there no polynomial is integrated.
     """
     places, border = _as_points(plane), _as_points(domain)
     weights = [Fraction(0)] * len(places)

@@ -18,7 +18,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights, uniform_surface_weights
 
 
 def collect(make: Callable[[], Iterator[Case]]) -> Callable[[], tuple[Case, ...]]:

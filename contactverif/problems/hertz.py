@@ -288,12 +288,6 @@ def peak(force: float, radius: float, stiffness: float) -> float:
     return 2 * force / (pi * half_width(force, radius, stiffness))
 
 
-def pressure(x: FloatArray, force: float, radius: float, stiffness: float) -> FloatArray:
-    """Return the pressure p0 √(1 − x²/a²) at x from the middle, in the shape of x; 0 outside (Johnson, 4.44)."""
-    inside = 1 - (np.asarray(x, dtype=np.float64) / half_width(force, radius, stiffness)) ** 2
-    return peak(force, radius, stiffness) * np.sqrt(np.maximum(inside, 0.0))
-
-
 @lru_cache(maxsize=32)  # A root of some ten solutions: tests and tables ask for the same disk again and again.
 def solve_winkler_contact(force: float, radius: float, stiffness: float, penalty: float) -> LinePressure:
     """Solve Hertz on a Winkler layer for the force F > 0 per unit of thickness.

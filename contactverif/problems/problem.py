@@ -182,10 +182,6 @@ class Bound:
         """Return the limit for a group of studies."""
         return self.limits[group if group in self.limits else ""]
 
-    def is_reported(self, errors: Errors) -> bool:
-        """Return whether all errors that it needs are reported."""
-        return errors.keys() >= set(self.kinds)
-
     def size(self, errors: Mapping[str, float]) -> float:
         """Return the largest of its errors on the finest mesh, those of a solution or of the best approximation."""
         return max(errors[kind] for kind in self.kinds)

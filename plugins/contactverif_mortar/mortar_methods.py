@@ -260,8 +260,7 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
     ----------
     Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
-    traits, scale, weighting = _make(penalty, area, normals, dual=False)
-    return MortarMultipliers(_with_multipliers(traits), scale, weighting)
+    return MortarMultipliers(*_make(penalty, area, normals, dual=False, multipliers=True))
 
 
 def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
@@ -273,29 +272,20 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
     ----------
     Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
-    traits, scale, weighting = _make(penalty, area, normals, dual=True)
-    return MortarMultipliers(_with_multipliers(traits), scale, weighting)
+    return MortarMultipliers(*_make(penalty, area, normals, dual=True, multipliers=True))
 
 
-def _with_multipliers(traits: Traits) -> Traits:
-    return traits.revise(
-        enforcement="multiplier",
-        independent_multipliers=True,
-        inf_sup=True,
-        continuity=None,
-        integrates_linear_gap=None,
-    )
-
-
-def _make(penalty: float, area: str, normals: str, *, dual: bool) -> tuple[Traits, float, Weighting]:
+def _make(
+    penalty: float, area: str, normals: str, *, dual: bool, multipliers: bool = False
+) -> tuple[Traits, float, Weighting]:
     averaged, current = choose("normals", normals, NORMALS), choose("area", area, AREAS)
     kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
     pulls = {"nodal-push": "b"} if dual else {}
     traits = CELL_TRAITS.revise(
         kinked=not averaged,  # An averaged normal belongs to neither facet of a kink.
         # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
-        continuity=None if averaged else "C0",
-        integrates_linear_gap=None if averaged else False,
+        continuity=None if averaged or multipliers else "C0",
+        integrates_linear_gap=None if averaged or multipliers else False,
         nodes_push=not dual,  # Dual shapes are negative in places.
         area=area,
         gap=None if averaged else "cells",
@@ -303,5 +293,7 @@ def _make(penalty: float, area: str, normals: str, *, dual: bool) -> tuple[Trait
         witnesses={**kinked, **pulls, "patch.tilted": "tilted", **CELL_TRAITS.evidence.witnesses},
         source=_SOURCES[dual],
     )
+    if multipliers:
+        traits = traits.revise(enforcement="multiplier", independent_multipliers=True, inf_sup=True)
     # Two points are exact for linear shapes × linear gaps. Unit normals that turn are not polynomials and get a third.
     return traits, check_penalty(penalty), Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, current))

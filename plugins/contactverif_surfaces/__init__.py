@@ -5,6 +5,9 @@ every real number of a cell from the positions of its nodes. A method is a rule 
 at slave nodes from weighted gaps or at quarters of slave faces (`cell_methods`), or at slave nodes themselves
 (`nodes_on_faces`).
 
+Of all factories `penalty` is the stiffness ε̂ > 0, force per area per length of penetration; of `nts_3d` it is ε > 0,
+force per length.
+
 These files are written to be read. All numbers are computed on arrays of real or complex positions, so a tangent is the
 derivative of the same lines, by a complex step in the nodes of one cell. One method is compiled: one point a cell
 (`centre_springs`).

@@ -95,11 +95,6 @@ def sts_3d(*, penalty: float) -> CellSprings:
     A cell of triangles has three points a triangle of its fan, which are exact for a linear gap × a shape function; of
     quadrilaterals it has six.
 
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per area per length of penetration.
-
     References
     ----------
     Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; on faces: here.
@@ -208,11 +203,6 @@ def _forces(n_slave: int, corners: Array, codes: IntArray, pressure: Array) -> A
 
 def mortar_3d(*, penalty: float) -> SurfaceMortar:
     """Mortar in three dimensions: nodal pressures from weighted gaps, over exactly cut cells.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per area per length of penetration.
 
     References
     ----------
@@ -367,11 +357,6 @@ def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
 
 def vts_ppt_3d(*, penalty: float) -> FaceQuarters:
     """Virtual slave nodes at the centres of four equal parts of each triangle, pressing on all master faces below.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per area per length of penetration.
 
     References
     ----------

@@ -472,11 +472,5 @@ def _points(pairs: FacePairs, z: FloatArray) -> CellPoints:
 
 
 def vts_cell_3d(*, penalty: float) -> CentreSprings:
-    """Take one virtual slave node at the centroid of each cell, with the area of the cell. On triangles it is exact.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per area per length of penetration.
-    """
+    """Take one virtual slave node at the centroid of each cell, with the area of the cell. On triangles it is exact."""
     return CentreSprings(SURFACE_TRAITS.revise(source="here"), check_penalty(penalty))

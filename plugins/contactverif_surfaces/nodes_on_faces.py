@@ -148,26 +148,14 @@ def _node_areas(interface: Interface, z: Array) -> Array:
 
 
 def nts_3d(*, penalty: float) -> NodesOnFaces:
-    """Node to surface: a spring of the same stiffness at each slave node. It fails the patch test.
-
-    Parameters
-    ----------
-    penalty : float
-        Nodal stiffness ε > 0, force per length of penetration.
-    """
+    """Node to surface: a spring of the same stiffness at each slave node. It fails the patch test."""
     # The force is the derivative of ε g²/2, since the foot lies straight below the node.
     traits = _TRAITS.revise(penalty="nodal", area=None, symmetric=True, normal=None)
     return NodesOnFaces(traits, check_penalty(penalty), by_area=False)
 
 
 def nts_ar_3d(*, penalty: float) -> NodesOnFaces:
-    """Node to surface with the area around each node, an equal share of each face there. It fails the patch test.
-
-    Parameters
-    ----------
-    penalty : float
-        Distributed stiffness ε̂ > 0, force per area per length of penetration.
-    """
+    """Node to surface with the area around each node, an equal share of each face there. It fails the patch test."""
     return NodesOnFaces(_TRAITS, check_penalty(penalty), by_area=True)
 
 

@@ -222,8 +222,8 @@ def _places_along(case: Case) -> FloatArray:
 _define = partial(
     Property.define,
     family="invariants",
-    cases=Cases.by_kind(_pushing_cases),
-    cases_in_space=Cases.by_kind(_pushing_surfaces),
+    cases=Cases.random(_pushing_cases),
+    cases_in_space=Cases.random(_pushing_surfaces),
     kinds=(FLAT, ANY_SHAPE),
 )
 

@@ -138,7 +138,7 @@ def _largest(values: FloatArray) -> float:
 
 define_projection = partial(
     Property.define,
-    cases=Cases.by_kind(projected_cases),
+    cases=Cases.random(projected_cases),
     kinds=PROJECTED_KINDS,
     needs=frozenset({"contact_points"}),
 )
@@ -155,7 +155,7 @@ def _projected_faces(interface: Interface | None = None) -> dict[str, SearchStra
     return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
 
 
-ON_FACES = Cases.by_kind(_projected_faces)
+ON_FACES = Cases.random(_projected_faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

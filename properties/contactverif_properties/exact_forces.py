@@ -20,7 +20,7 @@ from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.property import Finding, Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
-from contactverif.oracle import uniform_pressure_weights, uniform_surface_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights, uniform_surface_weights
 from contactverif.problems.flat_states import overhangs
 from contactverif_properties.roundoff import COORDINATE_ROUNDING, gap_tolerance
 from contactverif_properties.states import FrozenState

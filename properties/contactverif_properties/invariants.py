@@ -29,7 +29,8 @@ from contactverif.contract.property import (
 )
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
-from contactverif.oracle import default_points, nearest_segments
+from contactverif.oracle.kink_distance import default_points
+from contactverif.oracle.nearest import nearest_segments
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.general import closed_cases
 from contactverif.strategies.straight import bent_end_cases, cases_over_a_body, plane_cases_by_a_plate
@@ -296,7 +297,7 @@ def renumbering_cases(
     rank=130,
     role="comparison",
     quantities=_same_answer("in other numbers"),
-    cases=Cases.by_kind(renumbering_cases),
+    cases=Cases.random(renumbering_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
     kinds=(ANY, CLOSED),
 )
@@ -368,8 +369,8 @@ def _remote_surface_cases(interface: Interface | None = None) -> dict[str, Searc
     rank=190,
     role="comparison",
     quantities=_same_answer("beside another body"),
-    cases=Cases.by_kind(_remote_cases),
-    cases_in_space=Cases.by_kind(_remote_surface_cases),
+    cases=Cases.random(_remote_cases),
+    cases_in_space=Cases.random(_remote_surface_cases),
     kinds=(FAR, BEHIND),
     asks=WITHOUT_BARRIER,  # The bodies that are added penetrate each other.
 )

@@ -20,7 +20,7 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import ACTIVATION, Case
 from contactverif.contract.interface import PLANE
-from contactverif.oracle import kink_margin
+from contactverif.oracle.kink_distance import kink_margin
 from contactverif.problems.open_states import activation_margin
 from contactverif_properties.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.states import FrozenState, random_directions

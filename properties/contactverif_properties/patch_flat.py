@@ -20,7 +20,7 @@ from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.property import WITH_BARRIER, Finding, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits, parse_forces
-from contactverif.oracle import nodal_spring_weights, nodal_surface_weights
+from contactverif.oracle.flat_answers import nodal_spring_weights, nodal_surface_weights
 from contactverif.problems.flat_states import equal_area_states, equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
@@ -483,7 +483,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
     id="patch.tilted.resultant",
     rank=250,
     quantities=(OFF_NORMAL, TILTED_TOTAL),
-    cases=Cases.by_kind(_resultant_cases),
+    cases=Cases.random(_resultant_cases),
     cases_in_space=Cases.random(tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,

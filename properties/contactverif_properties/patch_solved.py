@@ -25,7 +25,7 @@ from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_
 from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
-from contactverif.oracle import is_of_class
+from contactverif.oracle.flat_answers import is_of_class
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances

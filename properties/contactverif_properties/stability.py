@@ -22,7 +22,7 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import shape_integrals, solve_by_engine
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import System
-from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.oracle.flat_answers import uniform_pressure_weights_exact
 from contactverif.problems import refined_blocks
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.stability_states import stability_scenes, stability_states
@@ -117,7 +117,7 @@ def _local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
     id="stability.local",
     rank=170,
     quantities=(FORCES_THERE, TOTAL_THERE),
-    cases=Cases.by_kind(_local_cases),
+    cases=Cases.random(_local_cases),
     kinds=KINDS,
     promise=lambda traits: True if traits.promises.translation_stable else None,
     applicable=refuse_unknown_forces,

@@ -17,7 +17,7 @@ from contactverif.contract import schema
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.schema import Group
-from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.oracle.flat_answers import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
 from contactverif_paper.paper_formulations import (
     BALANCED,

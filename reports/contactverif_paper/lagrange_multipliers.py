@@ -18,7 +18,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.mechanics import newton
 from contactverif.mechanics.bodies import Rectangle
-from contactverif.oracle import uniform_pressure_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases

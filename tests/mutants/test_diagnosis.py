@@ -16,7 +16,7 @@ from contactverif import Run, Subject, load_properties
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.diagnosis.flat_state import flat_state
-from contactverif.oracle import uniform_pressure_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif.run.run import run
 
 TANGENT, PATCH = "tangent.directional", "patch.flat.transmission"

@@ -8,7 +8,6 @@ import pytest
 from exact_projection import project_point
 
 from contactverif.contract.interface import Interface, Surface
-from contactverif.oracle import nearest_segments
 from contactverif.oracle.exact_points import (
     Coverage,
     ExactPoints,
@@ -22,6 +21,7 @@ from contactverif.oracle.exact_points import (
     seen_excess,
     slave_normal_view,
 )
+from contactverif.oracle.nearest import nearest_segments
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import general_cases
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contactverif import Interface, MisuseError
-from contactverif.oracle import (
+from contactverif.oracle.flat_answers import (
     is_of_class,
     nodal_spring_weights,
     nodal_surface_weights,

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from contactverif import Case, Interface, Surface, named_case
 from contactverif.contract.arrays import FloatArray
-from contactverif.oracle import default_points, kink_margin, uniform_pressure_weights, uniform_pressure_weights_exact
+from contactverif.oracle.flat_answers import uniform_pressure_weights, uniform_pressure_weights_exact
+from contactverif.oracle.kink_distance import default_points, kink_margin
 from contactverif.strategies import flat_cases, general_cases, smooth_cases
 from contactverif.strategies.solids import dead_zone_cases
 

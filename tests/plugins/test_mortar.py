@@ -8,7 +8,7 @@ from every_formulation import load
 from surfaces import DEPTH, contact_forces, make_bent, make_flat
 
 from contactverif import Interface, MisuseError
-from contactverif.oracle import uniform_pressure_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif_mortar.cell_search import find_cells, longest_of_chain
 from contactverif_mortar.integration_cells import Cells
 from contactverif_mortar.node_factors import check_product

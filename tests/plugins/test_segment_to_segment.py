@@ -5,7 +5,7 @@ import pytest
 from every_formulation import bent_state, draw_multipliers, load
 from surfaces import DEPTH, contact_forces, make_flat
 
-from contactverif.oracle import uniform_pressure_weights_exact
+from contactverif.oracle.flat_answers import uniform_pressure_weights_exact
 
 PRESSURE_FROM_POSITIONS = (
     *("sts", "sts:area=reference", "chen-hisada", "mortar", "mortar:area=reference", "mortar-dual"),

@@ -11,7 +11,7 @@ import pytest
 import contactverif_surfaces
 from contactverif import Case, Interface, Pairing, Subject, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.oracle import uniform_surface_weights
+from contactverif.oracle.flat_answers import uniform_surface_weights
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases
 from contactverif_surfaces.cell_points import GAUSS, evaluate_shapes

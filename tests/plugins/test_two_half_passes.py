@@ -7,7 +7,7 @@ import pytest
 from surfaces import DEPTH, make_bent, make_flat
 
 from contactverif import Interface, Surface
-from contactverif.oracle import uniform_pressure_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif_mortar import integration_cells as cells_module
 from contactverif_mortar import mortar, mortar_two_half_pass
 from contactverif_mortar.integration_cells import WEIGHT, Cells, Quadrature, Ranges

@@ -30,7 +30,7 @@ from contactverif import (
     judge_case,
 )
 from contactverif.mechanics.scene import scene_of
-from contactverif.oracle import uniform_pressure_weights
+from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif.problems.refined_blocks import (
     COLUMNS,
     PENALTIES,

@@ -9,8 +9,7 @@ from hypothesis import Phase, find, settings
 from hypothesis.strategies import SearchStrategy
 
 from contactverif import Case, Interface, load_formulation, named_case
-from contactverif.oracle import is_of_kind, kind_of
-from contactverif.oracle.projection_kinds import KIND_TESTS
+from contactverif.oracle.projection_kinds import KIND_TESTS, is_of_kind, kind_of
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind

@@ -16,8 +16,8 @@ from hypothesis.strategies import SearchStrategy
 from contactverif import Case, Interface, MisuseError
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.mechanics.scene import scene_of
-from contactverif.oracle import default_points, is_of_class, kink_margin
-from contactverif.oracle.flat_answers import chain_ends
+from contactverif.oracle.flat_answers import chain_ends, is_of_class
+from contactverif.oracle.kink_distance import default_points, kink_margin
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import load_scene_case

@@ -10,7 +10,7 @@ from hypothesis import Phase, find, settings
 
 from contactverif import Case
 from contactverif.contract.interface import turns_of
-from contactverif.oracle import nodal_surface_weights, uniform_surface_weights_exact
+from contactverif.oracle.flat_answers import nodal_surface_weights, uniform_surface_weights_exact
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.straight import tilted_plane_cases
 from contactverif.strategies.surfaces import (
