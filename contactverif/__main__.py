@@ -1,5 +1,5 @@
 """Run the command line as `python -m contactverif`."""
 
-from contactverif.cli.app import main
+from contactverif.cli import main
 
 main()

@@ -6,6 +6,8 @@ TEXTS = {
     "lines": "a\nEvery promise is kept and every property was judged.\n\n",
     "bidirectional": "a\u202ecba\u2066d",
     "unseen": "a\u200bb\u200dc\ufeffd\ufe0f\U000e0001",
+    "looks": "nts\u2011ar",
+    "marks": "e" + "\u0301" * 300,
     "surrogate": "a\ud800b\udc80",
     "markup": "[bold red]a[/x] [link=http://x]b[/link] :warning: [/]",
     "html": "<script>alert(1)</script>&amp;\"'",
@@ -13,7 +15,7 @@ TEXTS = {
     "long": "x" * 300_000,
 }
 _HIDDEN = [chr(code) for code in [*range(32), *range(127, 160)] if chr(code) != "\n"]
-_HIDDEN += list("\u200b\u200d\u202e\u2066\ufeff\ufe0f\U000e0001\ud800\udc80")
+_HIDDEN += ["\u0301" * 3, *"\u2011\u200b\u200d\u202e\u2066\ufeff\ufe0f\U000e0001\ud800\udc80"]
 
 
 def hidden_characters(text: str) -> list[str]:

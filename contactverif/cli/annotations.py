@@ -18,18 +18,19 @@ from pathlib import Path
 
 import typer
 
-from contactverif.contract.errors import MisuseError, one_line, parse_name
+from contactverif.contract.errors import one_line
 from contactverif.contract.result import OPPOSITE_SIGN, Run
+from contactverif.isolation.file_reader import check_ordinary
 from contactverif.plugins.registry import FORMULATIONS
 
-_IN_WORKFLOW = "GITHUB_ACTIONS"
 _INSTALLED = {"site-packages", "dist-packages"}  # An environment may lie in the working folder.
+_LARGEST = 1 << 18  # Bytes that are read of a file.
 _MOST_HOPS = 8  # A name may be imported from module to module.
 
 
 def annotate(run: Run) -> None:
     """Print an annotation for all that makes a run fail, if this is a job of a workflow."""
-    if os.environ.get(_IN_WORKFLOW) != "true":
+    if os.environ.get("GITHUB_ACTIONS") != "true":
         return
     failures = [(item.formulation, f"{item.formulation} is not loaded", item.reason) for item in run.not_loaded]
     failures += [(name, f"{name}: sign", OPPOSITE_SIGN) for name in run.opposite_signs]
@@ -42,7 +43,7 @@ def annotate(run: Run) -> None:
         place = factory_place(formulation)
         words = {} if place is None else {"file": place[0], "line": str(place[1])}
         listed = ",".join(f"{name}={_escape(value, ':,')}" for name, value in {**words, "title": title}.items())
-        typer.echo(f"::error {listed}::{_escape(one_line(text))}")
+        typer.echo(f"::error {listed}::{_escape(one_line(text))}".encode())  # As bytes it passes `obey_nothing`.
 
 
 def _escape(text: str, marks: str = "") -> str:
@@ -58,13 +59,11 @@ def factory_place(name: str) -> tuple[str, int] | None:
 
     None if the file is not below the working folder, or is that of an installed package.
     """
-    try:
-        inner = parse_name("formulation", name)[0].rpartition("/")[2]
-    except MisuseError:
-        return None
+    inner = name.partition(":")[0].rpartition("/")[2]
     for entry in entry_points(group=FORMULATIONS, name=inner):
-        place = _follow(entry.module, entry.attr)
-        if place is not None and place[0].is_relative_to(os.getcwd()) and not _INSTALLED & {*place[0].parts}:
+        module, _, attribute = entry.value.partition(":")
+        place = _follow(module.strip(), attribute.strip())
+        if place is not None:
             return place[0].relative_to(os.getcwd()).as_posix(), place[1]
     return None
 
@@ -76,15 +75,14 @@ def _follow(module: str, name: str) -> tuple[Path, int] | None:
         if file is None:
             return None
         try:
-            tree = ast.parse(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError, SyntaxError):
+            with file.open("rb") as stream:
+                tree = ast.parse(stream.read(_LARGEST))
+        except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
             return file, 1
         for node in tree.body:
-            match node:
-                case ast.FunctionDef(name=defined) | ast.ClassDef(name=defined) if defined == name:
-                    return file, node.lineno
-                case ast.Assign(targets=targets) if name in (getattr(target, "id", "") for target in targets):
-                    return file, node.lineno
+            targets = getattr(node, "targets", ())
+            if name in (getattr(node, "name", None), *(getattr(target, "id", None) for target in targets)):
+                return file, node.lineno
         imports = [
             (node, alias.name)
             for node in tree.body
@@ -102,15 +100,16 @@ def _follow(module: str, name: str) -> tuple[Path, int] | None:
 
 
 def _file_of(module: str) -> Path | None:
+    """Return the file of a module; None if it is not one of the project, whatever links lead there."""
     top, *rest = module.split(".")
     try:
         spec = importlib.util.find_spec(top)
-    except (ImportError, ValueError):
+        path = Path((spec and spec.origin) or "")
+        if rest:
+            path = path.parent.joinpath(*rest)
+            path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        path = path.resolve()
+        check_ordinary(path, module, "a file")
+        return path if path.is_relative_to(os.getcwd()) and not _INSTALLED & {*path.parts} else None
+    except (ImportError, OSError, RuntimeError, ValueError):
         return None
-    if spec is None or spec.origin is None:
-        return None
-    path = Path(spec.origin)
-    if rest:
-        path = path.parent.joinpath(*rest)
-        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return path.resolve()

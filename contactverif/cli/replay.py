@@ -103,7 +103,7 @@ def draw(
             _check_surfaces(example.case, files)
             if len(names) > 1:
                 raise MisuseError("--formulation", f"{len(names)} of them", "one, for a case without bodies")
-            subject = registry.the_formulation(names[0] if names else announce_stored(example.formulation), limits)
+            subject = registry.the_subject(names[0] if names else announce_stored(example.formulation), limits)
             _judge_and_draw(example, subject, files)
             if not files.paths:
                 echo(as_text(example.case))

@@ -67,9 +67,12 @@ LONGEST_LINE = 2000  # Characters of a message that are kept.
 LONGEST_MESSAGE = 1000  # Characters of the message of an exception, which is a part of a line.
 LONGEST_FACT = 20_000  # Characters of a fact about a run, such as its command.
 
-# Python calls these printable, but nobody sees them: joiners, fillers and selectors of variants.
+# Python calls these printable, but nobody sees what they are: joiners, fillers, selectors of variants, hyphens that are
+# not the one of ASCII, and a third mark on a letter.
+_MARK = "[\u0300-\u036f\u0483-\u0489\u0591-\u05bd\u064b-\u065f\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]"
 _UNSEEN = re.compile(
-    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2010-\u2012\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+    f"|(?<={_MARK}{_MARK}){_MARK}"
 )
 _SPACES = frozenset("\n\u00a0\u2002\u2003\u2007\u2008\u2009\u200a\u202f")  # Harmless, but Python does not print them.
 _BREAKS = re.compile(r"[ \t]*(?:\r?\n|\t)[ \t\r\n]*")
@@ -105,11 +108,13 @@ def printable(text: str) -> str:
     if plain.replace("\n", "").isprintable() and (plain.isascii() or not _UNSEEN.search(plain)):
         return plain
     return "".join(
-        character
-        if character in _SPACES or (character.isprintable() and not _UNSEEN.match(character))
-        else character.encode("unicode_escape").decode("ascii")
-        for character in plain
+        character if character in _SPACES or character.isprintable() else _escape(character)
+        for character in _UNSEEN.sub(lambda match: _escape(match[0]), plain)
     )
+
+
+def _escape(text: str) -> str:
+    return text.encode("unicode_escape").decode("ascii")
 
 
 def describe_error(error: BaseException) -> str:
@@ -163,7 +168,7 @@ def unknown_name_error(argument: str, name: str, names: Iterable[str], otherwise
     needed = otherwise or (f"one of {', '.join(every)}" if every else "a name, but there is none")
     if near := difflib.get_close_matches(name, every, n=3):
         needed = f"a name that exists; the nearest: {', '.join(near)}"
-    return MisuseError(argument, repr(name), needed)
+    return MisuseError(argument, ascii(name), needed)  # A hyphen of another kind looks like one.
 
 
 def parse_name(
@@ -178,12 +183,12 @@ def parse_name(
     """
     name, colon, rest = text.partition(":")
     if not name:
-        raise MisuseError(argument, repr(text), form)
+        raise MisuseError(argument, ascii(text), form)
     options: dict[str, Any] = {}
     for part in rest.split(",") if colon else ():
         option, equals, value = part.partition("=")
         if not (option and equals and value):
-            raise MisuseError(argument, f"{part!r} in {text!r}", form)
+            raise MisuseError(argument, f"{part!a} in {text!a}", form)
         if option in options:
             raise MisuseError(argument, f"{option} twice in {text!r}", "each option once")
         options[option] = {"true": True, "false": False}.get(value, value)

@@ -27,6 +27,7 @@ from time import monotonic, sleep, time
 from contactverif.isolation.confine import NETWORK, PROCESSES, WRITABLE, landlock_version
 
 _SECONDS_TO_TRY = 10.0
+ATTEMPTS = 3  # Attempts to make a box: a socket that it hides may go meanwhile, and then it is not made.
 _INSTALL = "install the package bubblewrap of the system, or contactverif[box]"
 _ALLOW = "allow user namespaces, see 'What a plugin can do' in the documentation"
 MOST_PROCESSES = 512  # Processes and threads.
@@ -111,20 +112,21 @@ def why_no_box(box: Box = Box()) -> str:
         return "only Linux has boxes"
     if not _program():
         return f"bubblewrap is missing; {_INSTALL}"
-    try:
-        trial = subprocess.run(
-            enclose((_program(), "--version"), box, 1),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_SECONDS_TO_TRY,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return f"bubblewrap does not run ({type(error).__name__}); {_INSTALL}"
-    if trial.returncode == 0:
-        return ""
+    for _ in range(ATTEMPTS):
+        try:
+            trial = subprocess.run(
+                enclose((_program(), "--version"), box, 1),
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=_SECONDS_TO_TRY,
+                check=False,
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return f"bubblewrap does not run ({type(error).__name__}); {_INSTALL}"
+        if trial.returncode == 0:
+            return ""
     words = (trial.stderr.strip().splitlines() or [f"status {trial.returncode}"])[-1]
     return f"{words}; {_ALLOW}"
 
@@ -239,11 +241,6 @@ def _find_parents() -> Iterator[tuple[str, Path]]:
             with suppress(OSError):
                 enabled = (parent / "cgroup.subtree_control").read_text().split()
                 yield from ((controller, parent) for controller in ("memory", "pids") if controller in enabled)
-
-
-def may_group() -> bool:
-    """Return whether a group can be made here."""
-    return any(os.access(parent, os.W_OK) for _, parent in _find_parents())
 
 
 @cache

@@ -21,9 +21,10 @@ from contactverif.contract.arrays import Array
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError, one_line
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.isolation.box import ATTEMPTS
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.lockstep import wait_in_lockstep
-from contactverif.isolation.process import PINNING, PluginProcess, Question, end_marked
+from contactverif.isolation.process import PINNING, NoBoxError, PluginProcess, Question, end_marked
 from contactverif.isolation.wire import (
     MOST_QUESTIONS,
     Answer,
@@ -53,7 +54,6 @@ _MOST_HANGS = {
     _AT_FIRST: "no answer came to the first call of a method",
     2: "no answer came twice",
 }
-_MOST_BOXES = 3  # Attempts to make the box of a process.
 _LEAST_MEMORY = 1 << 30  # Bytes. With less, processes that were not asked for long make room for a new one.
 _SHELF = 256  # The number of interfaces, and of pairings of the judge, that a process keeps for further questions.
 _LARGE = 1 << 16  # Bytes. A pairing of the judge with more is sent anew for each question, and not kept here.
@@ -106,15 +106,16 @@ class Host:
     def load(self) -> Reply:
         """Let the process load the formulation, after a new start unless it does so already; return what that gave."""
         n_ended = self.n_ended
-        for _ in range(_MOST_BOXES):
+        for _ in range(ATTEMPTS):
             if self._loading is None:
                 self.begin_load()
             question, self._loading = self._loading, None
-            if self._flush_queue() or not self._last_words.startswith(b"bwrap: "):
+            self._flush_queue()
+            if not isinstance(question and question.answer, NoBoxError):
                 break
-            self.n_ended = n_ended  # A socket that the box hides went, so it was not made: nobody is to blame.
+            self.n_ended = n_ended
         assert question is not None
-        return raise_failure(question, loading=True)
+        return raise_failure(question)
 
     @property
     def is_loading(self) -> bool:
@@ -318,11 +319,8 @@ def answer_of(question: Question) -> Answer:
     return answer
 
 
-def raise_failure(question: Question, *, loading: bool = False) -> Reply:
-    """Return the reply to a question, or raise the error that it tells of.
-
-    Only while it loads may a plugin blame the user.
-    """
+def raise_failure(question: Question) -> Reply:
+    """Return the reply to a question, or raise the ContractError that it tells of; a MisuseError is its cause."""
     reply = question.answer
     assert reply is not None
     if isinstance(reply, PluginError):
@@ -331,8 +329,9 @@ def raise_failure(question: Question, *, loading: bool = False) -> Reply:
         return reply
     words = [one_line(text) for text in reply.words[:3]] or ["no words"]
     match reply.kind:
-        case "misuse" if loading and len(words) == 3:
-            raise MisuseError(*words)
+        case "misuse" if len(words) == 3:
+            error = MisuseError(*words)
+            raise ContractError(str(error)) from error
         case "plugin":
             raise PluginError(words[0], reply.cause if reply.cause in ("memory", "exit") else "exception")
         case "not finite":

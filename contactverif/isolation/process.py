@@ -24,7 +24,7 @@ from typing import IO
 
 import psutil
 
-from contactverif.contract.errors import PluginError
+from contactverif.contract.errors import PluginError, one_line
 from contactverif.isolation import box as boxes
 from contactverif.isolation.child import Child, ClosedError, TooLargeError, TooLateError, name_of_signal
 from contactverif.isolation.confine import MEGABYTE, MEMORY, ONE_THREAD, PROGRESS
@@ -55,6 +55,10 @@ _SECONDS_ON_A_CORE = 0.5  # The judge waits so long at most for a core that anot
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 # A process that waits for a core uses at least this share of the time, so that it ends however many take the core.
 _LEAST_SHARE = 1 / 16
+
+
+class NoBoxError(PluginError):
+    """The process has ended since its box was not made: nobody is to blame, and another try may make one."""
 
 
 class Question:
@@ -193,7 +197,10 @@ class PluginProcess:
             return PluginError(f"{verb}: it closed its end of the line", "channel", ended=True)
         if status < 0:
             return PluginError(f"{verb}: {name_of_signal(-status)} ended its process", "signal", ended=True)
-        return PluginError(f"{verb}: its process ended with status {status}", "exit", ended=True)
+        kind = NoBoxError if self._encloses and self.output.last.startswith(b"bwrap: ") else PluginError
+        last = self.output.last.decode(errors="replace").strip().splitlines()[-1:] if verb == "import" else []
+        words = "".join(f": {one_line(line)}" for line in last)  # One that cannot start says why.
+        return kind(f"{verb}: its process ended with status {status}{words}", "exit", ended=True)
 
     def end(self) -> None:
         """End the process and all that it started, as far as they stayed in its session; see `end_marked`."""

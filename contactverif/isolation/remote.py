@@ -31,10 +31,11 @@ from contactverif.contract.interface import Interface
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import FAST_PARTS, OPTIONAL_PARTS, Call, EngineSubject, Prefetching, Subject
 from contactverif.contract.traits import Traits
+from contactverif.isolation.box import ATTEMPTS
 from contactverif.isolation.child import FORKS
 from contactverif.isolation.host import Host, answer_of, host_of, raise_failure
 from contactverif.isolation.limits import Limits
-from contactverif.isolation.process import PluginProcess, Question, mapped_files
+from contactverif.isolation.process import NoBoxError, PluginProcess, Question, mapped_files
 from contactverif.isolation.wire import Answer, Load, Loaded, Reply, Unloaded, Wraps, encode
 
 _COMPRESSED = ("csr", "csc")
@@ -432,6 +433,8 @@ def load_remote(command: tuple[str, ...], name: str, limits: Limits) -> Subject 
     try:
         item = _read_reply(command, name, limits, host_of(command, name, limits).load())
     except ContractError as error:
+        if isinstance(error.__cause__, MisuseError):
+            raise error.__cause__ from None
         return _not_loaded(name, error)
     assert not isinstance(item, Wrapper)
     return item
@@ -459,14 +462,19 @@ def survey(command: tuple[str, ...], names: Iterable[str], limits: Limits) -> It
     """
     process: PluginProcess | None = None
     for name in names:
-        question = Question(0, "import")
-        try:
-            process = process or PluginProcess(command, limits)
-            process.ask(encode([Load(0, name, survey=True)]), [question])
-            yield _read_reply(command, name, limits, raise_failure(question, loading=True))
-        except ContractError as error:
-            process = None if isinstance(error, PluginError) and error.ended else process
-            yield _not_loaded(name, error)
+        for _ in range(ATTEMPTS):
+            question = Question(0, "import")
+            try:
+                process = process or PluginProcess(command, limits)
+                process.ask(encode([Load(0, name, survey=True)]), [question])
+                item = _read_reply(command, name, limits, raise_failure(question))
+            except ContractError as error:
+                process = None if isinstance(error, PluginError) and error.ended else process
+                item = _not_loaded(name, error)
+                if isinstance(error, NoBoxError):
+                    continue
+            break
+        yield item
         if process is not None and not FORKS:
             process.end()
             process = None

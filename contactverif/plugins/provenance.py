@@ -110,7 +110,7 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     }
     modules = {"contactverif"}
     for group, names in named.items():
-        modules |= {entry.module for entry in metadata.entry_points(group=group) if entry.name in names}
+        modules |= registry.modules_of(entry for entry in metadata.entry_points(group=group) if entry.name in names)
     packages = sorted({module.partition(".")[0] for module in modules})
     files = sorted({path for text in formulations for path in registry.files_within(text)})  # They load these.
     digests = {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}

@@ -59,7 +59,6 @@ _RENAMED = {"scale": "total-stiffness", "scaling": "units", "engine.scaling": "e
 _COMPILE_SECONDS = 60.0
 _OURS = "contactverif"  # The distribution whose problems keep their names.
 
-_SHORT_NAME = f"at most {LONGEST_NAME} characters"
 _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
 _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _ENGINE_FORM = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
@@ -110,8 +109,8 @@ def _read_entries(
 
 def load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
     """Return the object that the entry point refers to, or a NotLoaded."""
-    if name_line(name) != name:
-        return NotLoaded(name, f"its name is too long, or not of characters that can be shown; needed {_SHORT_NAME}")
+    if name_line(name) != name or not name.isascii():  # One with a letter of another script may look like ours.
+        return NotLoaded(name, f"its name is {name!a}; needed at most {LONGEST_NAME} characters of ASCII")
     if len(entries) > 1:
         return NotLoaded(name, f"registered {len(entries)} times: {', '.join(map(_origin, entries))}")
     try:
@@ -120,6 +119,11 @@ def load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
         raise
     except BaseException as error:  # A plugin may raise anything while it is imported.
         return NotLoaded(name, describe_error(error))
+
+
+def modules_of(entries: Iterable[EntryPoint]) -> set[str]:
+    """Return the modules that entry points name; one that is malformed names none."""
+    return {entry.module for entry in entries if entry.pattern.match(entry.value)}
 
 
 def _origin(entry: EntryPoint) -> str:
@@ -148,11 +152,8 @@ def formulation_names() -> tuple[str, ...]:
 
 def standalone_names(limits: Limits | None = None) -> tuple[str, ...]:
     """Return the names of the formulations that need no other one, file or kind, sorted; all are loaded to tell."""
-    installed = entries_by_name(FORMULATIONS)
-    if limits is None:
-        return tuple(name for name, entries in installed.items() if _load_wrapper(name, entries) is None)
-    items = remote.survey(_worker(), tuple(installed), limits)
-    return tuple(name for name, item in zip(installed, items, strict=True) if not isinstance(item, Wrapper))
+    items = zip(formulation_names(), load_formulations(limits), strict=True)
+    return tuple(name for name, item in items if not isinstance(item, Wrapper))
 
 
 def has_engine(names: Sequence[str]) -> bool:
@@ -177,11 +178,6 @@ def load_subject(text: str, limits: Limits | None = None) -> Subject | NotLoaded
 def the_subject(text: str, limits: Limits | None = None) -> Subject:
     """Return the formulation or engine of that name; one that does not load is a mistake here."""
     return that_loads(text, load_subject(text, limits))
-
-
-def the_formulation(name: str, limits: Limits | None = None) -> Subject:
-    """Return the formulation of that name, as `load_formulation` does; one that does not load is a mistake here."""
-    return that_loads(name, load_formulation(name, limits))
 
 
 def that_loads(text: str, loaded: Subject | NotLoaded) -> Subject:
@@ -209,12 +205,18 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
     Raises
     ------
     MisuseError
-        If the text is malformed, no such formulation is installed, or it has no such option or value.
+        If the text is malformed, no such formulation is installed, or it has no such option or value. An error about
+        an installed name without options is a reason instead.
     """
-    if limits is None:
-        make = _load_factory(text)
-        return make if isinstance(make, NotLoaded) else subject_of(text, make)
-    return remote.load_remote(_worker(), text, _with_store(limits, text))
+    try:
+        if limits is None:
+            make = _load_factory(text)
+            return make if isinstance(make, NotLoaded) else subject_of(text, make)
+        return remote.load_remote(_worker(), text, _with_store(limits, text))
+    except MisuseError as error:
+        if text not in formulation_names():
+            raise
+        return NotLoaded(text, str(error))
 
 
 def start_loading(text: str, limits: Limits) -> None:
@@ -232,7 +234,7 @@ def start_loading(text: str, limits: Limits) -> None:
 def _with_store(limits: Limits, text: str) -> Limits:
     """Return the limits of a formulation's process, with a store of its kernels in the box, if there is one."""
     installed = entries_by_name(FORMULATIONS)
-    modules = {entry.module for name in names_within(text) for entry in installed.get(name, ())}
+    modules = modules_of(entry for name in names_within(text) for entry in installed.get(name, ()))
     _compile_once(frozenset(module.partition(".")[0] for module in modules))
     if limits.box is not None:  # It keeps compiled kernels, those of all formulations of the same modules.
         store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share a package's name.
@@ -285,23 +287,12 @@ def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper |
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
-    """Load what is installed under a name, with the defaults of its options."""
-    wrapper = _load_wrapper(name, entries_by_name(FORMULATIONS)[name])
-    if wrapper is not None:
-        return wrapper
-    try:
-        return load_formulation(name)
-    except MisuseError as error:  # The factory has an option without a default.
-        return NotLoaded(name, str(error))
-
-
-def _load_wrapper(name: str, entries: Sequence[EntryPoint]) -> Wrapper | None:
-    """Return the wrapper or loader of that name; None if it stands for a formulation or does not load."""
-    make = load_entry(name, entries)
+    """Load what is installed under a name, with the defaults of its options: a wrapper or loader stands for itself."""
+    make = load_entry(name, entries_by_name(FORMULATIONS)[name])
     parameters = _parameters_of(make) if callable(make) else {}
     forms = {option: form for option, form in _NEEDED.items() if option in _required_among(parameters)}
     needed = next((f"{name}:{form}" for form in forms.values()), f"{name}/NAME" if "inner" in parameters else "")
-    return Wrapper(name, _first_line(make), needed) if needed else None
+    return Wrapper(name, _first_line(make), needed) if needed else load_formulation(name)
 
 
 def _first_line(make: Any) -> str:
@@ -339,7 +330,7 @@ def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotL
 def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     """Return `make(*, penalty)` for the text behind `depth` wrappers, with options and inner formulation filled in."""
     if len(text) > LONGEST_NAME:
-        raise MisuseError("formulation", repr(name_line(text)), _SHORT_NAME)
+        raise MisuseError("formulation", repr(name_line(text)), f"at most {LONGEST_NAME} characters")
     if text.partition(":")[0].endswith(".py"):
         needed = "an installed name (`contactverif new NAME` begins one); in Python, contactverif.verify takes a class"
         raise MisuseError("formulation", f"a file, {text!r}", needed)
@@ -447,12 +438,18 @@ def property_ids(*, engines: bool = False) -> tuple[str, ...]:
 
 
 def matching_ids(globs: Sequence[str], *, engines: bool = False) -> tuple[str, ...]:
-    """Return the ids of the properties that `load_properties` loads; it imports none of them."""
-    ids = property_ids(engines=engines)
+    """Return the ids of the properties that `load_properties` loads; it imports them only to look for a family."""
+    installed, matching = installed_properties(engines=engines), set[str]()
     for glob in globs:
-        if not any(fnmatchcase(name, glob) for name in ids):
-            raise unknown_property_error("property", glob, ids)
-    return tuple(name for name in ids if not globs or any(fnmatchcase(name, glob) for glob in globs))
+        ids = {name for name in installed if fnmatchcase(name, glob)}
+        if not ids:
+            loaded = (load_property(name, installed) for name in installed)
+            family = glob.removesuffix(".*")
+            ids = {item.id for item in loaded if isinstance(item, Property) and item.family == family}
+        if not ids:
+            raise unknown_property_error("property", glob, installed)
+        matching |= ids
+    return tuple(name for name in installed if not globs or name in matching)
 
 
 def unknown_property_error(argument: str, name: str, ids: Iterable[str]) -> MisuseError:
@@ -468,7 +465,7 @@ def load_properties(globs: Sequence[str] = ("*",), *, engines: bool = False) -> 
     Parameters
     ----------
     globs : Sequence[str]
-        Patterns such as `patch.*`; none at all means all properties.
+        Patterns such as `patch.*`, or names of families such as `invariants`; none at all means all properties.
     engines : bool
         Also those that are asked of engines alone.
 

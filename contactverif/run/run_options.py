@@ -68,7 +68,7 @@ class RunOptions:
     properties: Annotated[
         tuple[str, ...],
         Option(
-            "Check only the properties whose id matches. Repeatable.",
+            "Check only the properties whose id matches, or those of a family. Repeatable.",
             "GLOB",
             ("--property", "-p"),
             setting="properties",
@@ -328,13 +328,17 @@ def _settings() -> dict[str, str]:
 
 def read_settings() -> RunOptions:
     """Read the settings of the project in the working folder; without such a table all is left to the command line."""
-    try:
-        file: Any = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not os.path.lexists(_FILE):
         return RunOptions()
-    except (OSError, ValueError) as error:
-        raise MisuseError(f"{_FILE}", " ".join(str(error).split()), "a file of settings that can be read") from None
-    table = file.get("tool", {}).get("contactverif", {})
+    from contactverif.isolation.file_reader import check_ordinary
+
+    needed = "a file of settings that can be read"
+    check_ordinary(_FILE, f"{_FILE}", needed)
+    try:
+        tool: Any = tomllib.loads(_FILE.read_text(encoding="utf-8")).get("tool", {})
+    except (OSError, ValueError, RecursionError) as error:
+        raise MisuseError(f"{_FILE}", " ".join(str(error).split()), needed) from None
+    table = tool.get("contactverif", {}) if isinstance(tool, dict) else tool
     if not isinstance(table, dict):
         raise MisuseError(f"{_TABLE} of {_FILE}", repr(table), f"a table [{_TABLE}]")
     return RunOptions(**_convert(table)) if table else RunOptions()

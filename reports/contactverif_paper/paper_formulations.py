@@ -7,7 +7,7 @@ from typing import Annotated
 from contactverif.contract.case import Case
 from contactverif.contract.property import Measurement
 from contactverif.contract.subject import Subject
-from contactverif.plugins.registry import the_formulation, the_property
+from contactverif.plugins.registry import the_property, the_subject
 from contactverif.run.judge import judge_case
 from contactverif_paper.paper_item import WORDS, Column
 
@@ -58,4 +58,4 @@ def measure(property_id: str, case: Case, formulation: PaperFormulation) -> Meas
 @cache
 def subject_of(formulation: PaperFormulation) -> Subject:
     """Load the formulation."""
-    return the_formulation(formulation.name)
+    return the_subject(formulation.name)

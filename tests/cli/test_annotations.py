@@ -1,7 +1,9 @@
 """A workflow of GitHub shows all that makes a run fail where the factory of the formulation stands."""
 
+import os
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -9,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from contactverif import Run, load_formulation, load_properties, verify
+from contactverif.cli import app as cli
+from contactverif.cli import console
 from contactverif.cli.annotations import annotate, factory_place
 from contactverif.contract.result import NotLoaded
 
@@ -78,6 +82,51 @@ def test_a_factory_stands_where_it_is_defined(project: Path, name: str, place: t
     """It is looked up through the imports of its package, of which nothing is imported."""
     assert factory_place(name) == place
     assert "mine" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda file: file.write_text("x = " + "(" * 100 + ")" * 100),
+        lambda file: file.write_text("x = " + "-" * 200_000 + "1"),
+        lambda file: file.write_text("x = 1\n" * (1 << 18)),
+        lambda file: file.write_bytes(b"\xff\0"),
+        os.mkfifo,
+        lambda file: file.symlink_to("/dev/zero"),
+        lambda file: file.symlink_to(file),
+        lambda file: file.symlink_to("/etc/hostname"),
+    ],
+)
+def test_a_source_that_cannot_be_read_ends_nothing(project: Path, spoil: Callable[[Path], object]) -> None:
+    (project / "mine" / "deep.py").unlink()
+    spoil(project / "mine" / "deep.py")
+    assert factory_place("nts") in (None, ("mine/deep.py", 1))
+
+
+@pytest.mark.parametrize("value", ["../..:!", "", "mine." + "x" * 300, ".".join("mine" * 2000)])
+def test_an_entry_point_that_names_no_module_has_no_place(
+    project: Path, monkeypatch: pytest.MonkeyPatch, value: str
+) -> None:
+    entries = [EntryPoint("nts", value, "formulations")]
+    monkeypatch.setattr("contactverif.cli.annotations.entry_points", lambda **_: entries)
+    assert factory_place("nts") is None
+
+
+@pytest.mark.parametrize("text", ["::error::a", "a\n \t::warning::b", "a\r::add-mask::c", "##[error]", "\u2003::a::b"])
+def test_nothing_that_a_plugin_prints_is_a_command(
+    text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    monkeypatch.setattr(console, "end_all", lambda: {text: text.encode()})
+    monkeypatch.setattr(sys, "argv", ["contactverif", "verify", text])
+    with pytest.raises(SystemExit):
+        cli.main()
+    console.print_plugin_output()
+    console.show(text)
+    sys.stdout.write(text)
+    for line in re.split("[\r\n]", "\n".join(capsys.readouterr())):
+        assert not line.strip().startswith("::")
+        assert "##[" not in line
 
 
 def test_a_factory_of_an_installed_package_stands_nowhere(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -114,6 +114,8 @@ def test_the_command_takes_them_and_a_known_failure_is_no_news(ask: Ask) -> None
         ("[tool.contactverif]\nprofiles = 'ci'", "found 'profiles'; needed a name that exists; the nearest: profile"),
         ("[tool.contactverif.known]\n'mirrors' = 'why'", "'mirrors'; needed a name that exists; the nearest: mirror"),
         ("[tool", "pyproject.toml: found "),
+        ("tool = 1", "tool.contactverif of pyproject.toml: found 1; needed a table"),
+        (f"x = {'[' * 1200}", "pyproject.toml: found maximum recursion depth exceeded"),
     ],
 )
 def test_wrong_settings_are_one_line(text: str, message: str) -> None:
@@ -121,6 +123,10 @@ def test_wrong_settings_are_one_line(text: str, message: str) -> None:
     with pytest.raises(MisuseError) as caught:
         RunOptions(names=("nts",)).with_settings()
     assert message in str(caught.value)
+    Path("pyproject.toml").unlink()
+    Path("pyproject.toml").symlink_to("/dev/zero")
+    with pytest.raises(MisuseError, match="which is a device; needed a file of settings"):
+        RunOptions(names=("nts",)).with_settings()
 
 
 @pytest.mark.usefixtures("with_boxes")

@@ -55,6 +55,17 @@ import pathlib, tempfile
 if pathlib.Path(tempfile.gettempdir(), "kernels", "forged").exists():
     raise RuntimeError("the one before has left something")
 """,
+    "i-blames-the-user": """
+import os, struct, msgspec
+
+frame = msgspec.msgpack.encode([["failure", 0, "misuse", "exception", ["--seed", "nothing", "a number"]]])
+for number in range(3, 64):
+    try:
+        os.write(number, struct.pack("<Q", len(frame)) + frame)
+    except OSError:
+        pass
+os._exit(0)
+""",
 }
 PROGRAM = """
 import sys
@@ -101,5 +112,6 @@ def test_every_name_is_there_whatever_the_others_do(tmp_path: Path, place: str) 
     if place == "box":
         assert any(item.startswith(("d-changes: PermissionError", "d-changes: OSError")) for item in items)
         assert "h-looks" in items
+    assert "i-blames-the-user: --seed: found nothing; needed a number" in items
     # It has limited the process whose copy it was in.
     assert any(item.startswith("f-limits: exit: import: its process ended") for item in items)

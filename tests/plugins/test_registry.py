@@ -9,6 +9,8 @@ import pytest
 
 from contactverif import MisuseError, Property, Subject, Traits
 from contactverif.contract.result import NotLoaded
+from contactverif.isolation.box import Box
+from contactverif.isolation.limits import Limits
 from contactverif.plugins import registry
 from contactverif.plugins.registry import (
     formulation_names,
@@ -72,7 +74,7 @@ def raising(*, penalty: float) -> Plugin:
 
 
 def question(name: str) -> Property:
-    return Property(name, "", "", (), lambda interface: None, lambda case, subject: None, lambda traits: None)  # type: ignore[arg-type, return-value]
+    return Property(name, "family", "", (), lambda interface: None, lambda case, subject: None, lambda traits: None)  # type: ignore[arg-type, return-value]
 
 
 IDS = ("balance.force", "patch.flat.solve", "patch.flat.transmission")
@@ -173,12 +175,9 @@ def test_options_are_read(text: str, options: dict[str, Any]) -> None:
         ("vts-me:n=0", ["n: found 0; needed at least 1"]),
         ("vts-me:penalty=4", ["option penalty", "the harness sets it"]),
         ("any:inner=nts", ["option inner", "the harness sets it"]),
-        ("needing", ["no order", "order=VALUE"]),
-        ("twice", ["found 'twice'", "twice/NAME"]),
         ("twice/", ["found ''"]),
         ("nts/vts-me", ["nts wraps nothing"]),
         ("vts-me:n=4/nts", ["option n", "found '4/nts'", "a whole number"]),
-        ("loads", ["no file", "file=VALUE"]),
         ("loads:file=a/b,node=4", ["'node'", "nearest: nodes"]),
         ("twice/vts-m", ["found 'vts-m'", "nearest: vts-me"]),
         ("twice/vts-me:n=0", ["n: found 0"]),
@@ -209,6 +208,9 @@ def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
         ("raising", "make: RuntimeError: no licence"),
         ("empty", "make: returned a object without a `residual`"),
         ("number", "the entry point gives a int; needed a factory"),
+        ("needing", "options of 'needing': found no order; needed order=VALUE"),
+        ("twice", "formulation: found 'twice'; needed a formulation that twice wraps: twice/NAME"),
+        ("loads", "options of 'loads': found no file; needed file=VALUE"),
         ("twice/raising", "raising: make: RuntimeError: no licence"),
         ("twice/number", "number: the entry point gives a int"),
     ],
@@ -225,6 +227,24 @@ def test_a_module_that_does_not_import_is_a_row(entries: dict[str, list[Entry]],
     reason = f"{type(error).__name__}: {error}"
     for item in (load_formulation("broken"), *load_properties(["broken"])):
         assert reason_of(item) == reason
+
+
+@pytest.mark.parametrize("name", ["vts\u2011ppt", "n\u0442s", "nts" + "\u0301" * 600, "n" * 201])
+def test_a_name_that_looks_like_another_is_not_loaded(entries: dict[str, list[Entry]], name: str) -> None:
+    entries[registry.FORMULATIONS].append(Entry(name, plain))
+    for item in (load_formulation(name) if len(name) < 200 else None, registry.load_with_defaults(name)):
+        assert item is None or "needed at most 200 characters" in reason_of(item)
+    with pytest.raises(MisuseError, match=r"found 'nts\\u2010ar'"):
+        load_formulation("nts\u2010ar")
+
+
+def test_an_entry_point_that_names_no_module_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "odd-1.0.dist-info").mkdir()
+    entry = "[contactverif.formulations]\nodd = ../../x:!!\n"
+    (tmp_path / "odd-1.0.dist-info" / "entry_points.txt").write_text(entry)
+    registry._with_store(Limits(box=Box()), "odd")
+    assert "AttributeError" in reason_of(load_formulation("odd"))
 
 
 def test_a_name_that_two_distributions_want_is_a_row(entries: dict[str, list[Entry]]) -> None:
@@ -249,11 +269,18 @@ def test_all_are_loaded_for_a_list() -> None:
 
 @pytest.mark.parametrize(
     ("globs", "ids"),
-    [([], IDS), (["patch.*"], IDS[1:]), (["patch.flat.t*", "balance.force", "balance.*"], IDS[::2])],
+    [
+        ([], IDS),
+        (["patch.*"], IDS[1:]),
+        (["patch.flat.t*", "balance.force", "balance.*"], IDS[::2]),
+        (["patch.flat.t*", "family"], IDS),  # A family has members that do not begin with its name.
+        (["family.*"], IDS),
+    ],
 )
 def test_properties_match_patterns(entries: dict[str, list[Entry]], globs: list[str], ids: tuple[str, ...]) -> None:
     assert tuple(item.id for item in load_properties(globs) if isinstance(item, Property)) == ids
-    assert sum(entry.loads for entry in entries[registry.PROPERTIES]) == len(ids)
+    imported = len(ids) * (1 + any(glob.startswith("family") for glob in globs))
+    assert sum(entry.loads for entry in entries[registry.PROPERTIES]) == imported
 
 
 @pytest.mark.usefixtures("entries")
