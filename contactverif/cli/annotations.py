@@ -7,8 +7,6 @@ References
 GitHub Docs, Workflow commands for GitHub Actions.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import os

@@ -1,7 +1,5 @@
 """The command line: it registers the commands and turns every error of a user into one line."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os
@@ -60,7 +58,7 @@ _OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {
 _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlier versions, now all --out.
 _STOPPED, _CLOSED_PIPE, _MISUSE = 130, 128 + signal.SIGPIPE, 2  # Exit statuses, as shells and typer have them.
 _MOST_COLUMNS = 10_000
-_COMMAND = re.compile(r"((?:^|[\r\n])[^\S\r\n]*:(?=:)|#(?=#\[))")  # What stands before the first colon is white space.
+_COMMAND = re.compile(r"((?:^|[\r\n])[^\S\r\n]*:(?=:)|#(?=#\[))")  # White space alone stands before the first colon.
 
 
 def _print_version(wanted: bool) -> None:

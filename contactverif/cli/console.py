@@ -1,7 +1,5 @@
 """The terminal: how wide it is, and how text is printed, without a control character of a plugin or a file."""
 
-from __future__ import annotations
-
 import os
 import sys
 import textwrap

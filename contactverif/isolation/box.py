@@ -8,8 +8,6 @@ A control group limits all of its processes together, where this user may make o
 The temporary files of plugins without a box lie in a folder that goes with the judge's process or with the next one.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -4,8 +4,6 @@ The libraries that read netCDF and mesh files are large, and a damaged file can 
 for all memory. Rule: this process never opens the file with such a library, and checks the bytes that it gets.
 """
 
-from __future__ import annotations
-
 import contextlib
 import faulthandler
 import importlib

@@ -5,8 +5,6 @@ trip. What the judge has sent stays there until it is pushed out. A process that
 question.
 """
 
-from __future__ import annotations
-
 from collections import Counter, OrderedDict
 from collections.abc import Mapping
 from math import inf

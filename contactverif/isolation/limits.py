@@ -1,7 +1,5 @@
 """The limits of a child process, and the box that it may be in."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Each call is a greenlet of the calling thread: to change from one to another tak
 belongs to a thread, such as a factor of SuperLU, serves all of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any, Generic, TypeVar

@@ -4,8 +4,6 @@ Rule: whatever the process does, a question ends: with a reply, or with an error
 Nothing of it is left behind.
 """
 
-from __future__ import annotations
-
 import atexit
 import ctypes
 import os
