@@ -30,17 +30,9 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.scene import Scene
 from contactverif.problems import hertz
 from contactverif.problems.disk import DiskProblem, disk_on_foundation
+from contactverif_paper import paper_formulations as paper
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_round_ticks
-from contactverif_paper.paper_formulations import (
-    NTS_AR,
-    REFERENCE_AREAS,
-    VTS_G,
-    VTS_ME,
-    VTS_PPT,
-    Formulations,
-    PaperFormulation,
-    subject_of,
-)
+from contactverif_paper.paper_formulations import Formulations, PaperFormulation, subject_of
 from contactverif_paper.paper_item import Agreement, Column, Item, PageTable, PaperFigure, Statement, variables_of
 from contactverif_paper.patch_tests import edges_of
 from contactverif_reports.html.pages import number
@@ -116,7 +108,7 @@ def steps_until_energy(energies: FloatArray) -> int:
 
 
 # Figs. 37 and 38, and the iterations.
-FORMULATIONS = (NTS_AR, VTS_G, VTS_ME, VTS_PPT)
+FORMULATIONS = (paper.NTS_AR, paper.VTS_G, paper.VTS_ME, paper.VTS_PPT)
 PRINTED_PEAK, PRINTED_ITERATIONS = 1.61e6, 4
 PEAK_TOLERANCE = 0.03
 TOUCHING = 1e-2  # The depth of the disk in the other first guess, over what is about right.
@@ -342,7 +334,7 @@ class Difference:
 
 
 def _compute_differences() -> tuple[Difference, ...]:
-    pairs = ([solve_disk(row, refine=refine) for row in (VTS_PPT, VTS_ME)] for refine in MESHES.values())
+    pairs = ([solve_disk(row, refine=refine) for row in (paper.VTS_PPT, paper.VTS_ME)] for refine in MESHES.values())
     return tuple(Difference.between(*pair) for pair in pairs)
 
 
@@ -404,8 +396,8 @@ FIG_39 = Item(
 
 
 # What lies between the largest pressure and that of Hertz.
-PEAK_FORMULATIONS = (VTS_ME, VTS_PPT, REFERENCE_AREAS)
-EXPLAINED = (VTS_ME, REFERENCE_AREAS)
+PEAK_FORMULATIONS = (paper.VTS_ME, paper.VTS_PPT, paper.REFERENCE_AREAS)
+EXPLAINED = (paper.VTS_ME, paper.REFERENCE_AREAS)
 _REFINEMENTS = (1, 2, 3)
 SLOPES, SIZES = (1.0, 0.5, 0.25), (0.5, 1.0, 2.0)
 EXCESS = "largest pressure over that of Hertz on springs, less 1"
@@ -453,7 +445,7 @@ def _compute_peaks() -> _PeakStudy:
         slope=SLOPES,
         excess_over_slopes=slopes,
         foundation=SIZES,
-        excess_over_sizes=np.array([solve_disk(VTS_ME, problem).excess for problem in resized]),
+        excess_over_sizes=np.array([solve_disk(paper.VTS_ME, problem).excess for problem in resized]),
         winkler=PAPER.winkler_contact().peak,
     )
 

@@ -19,22 +19,11 @@ from contactverif.contract.case import Case
 from contactverif.contract.schema import Group
 from contactverif.oracle.flat_answers import uniform_pressure_weights_exact
 from contactverif.problems.named_states import named_case
-from contactverif_paper.paper_formulations import (
-    BALANCED,
-    MORTAR,
-    NTS,
-    NTS_AR,
-    STS,
-    VIRTUAL,
-    VTS_ME,
-    VTS_PPT,
-    PaperFormulation,
-    name_columns,
-    subject_of,
-)
+from contactverif_paper import paper_formulations as paper
+from contactverif_paper.paper_formulations import PaperFormulation, name_columns, subject_of
 from contactverif_paper.paper_item import Agreement, Cell, Column, PageTable, Statement, variables_of
 
-FORMULATIONS = (NTS, NTS_AR, VTS_ME, VTS_PPT, BALANCED, STS, MORTAR)
+FORMULATIONS = (paper.NTS, paper.NTS_AR, paper.VTS_ME, paper.VTS_PPT, paper.BALANCED, paper.STS, paper.MORTAR)
 _LARGEST_DENOMINATOR = 60
 _ROUNDINGS = 256  # A force is the sum of a few dozen terms.
 Fractions = tuple[Fraction, ...]
@@ -164,7 +153,7 @@ def _forces(case: Case, formulation: PaperFormulation, slave: IntArray, master: 
     pairing = plugin.pair(case.interface, case.z)
     forces = -plugin.residual(case.interface, pairing, case.z).reshape(-1, 2)  # They push the slave upwards.
     at_points = np.zeros(0)
-    if formulation in VIRTUAL:
+    if formulation in paper.VIRTUAL:
         points = plugin.contact_points(case.interface, pairing, case.z)
         at_points = (points.pressure * points.weight)[np.argsort(points.position[:, 0])]
     scale, sides = float(np.abs(forces).sum()), (forces[slave, 1], -forces[master, 1], at_points)

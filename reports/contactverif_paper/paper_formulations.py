@@ -34,7 +34,7 @@ MORTAR = PaperFormulation("mortar", "mortar", 5)
 DUAL = PaperFormulation("dual mortar", "mortar-dual", 3)
 CHEN_HISADA = PaperFormulation("Chen–Hisada", "chen-hisada", 1)
 REFERENCE_AREAS = PaperFormulation("VTS-ME, reference areas", "vts-me:area=reference", 1)
-
+ALL = (NTS, NTS_AR, TWO_PASS, VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED, CHEN_HISADA, STS, MORTAR, DUAL)
 # The formulations with virtual slave nodes; a figure shows their pressures at these nodes.
 VIRTUAL = (VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED)
 

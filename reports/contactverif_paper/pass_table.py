@@ -12,28 +12,27 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
-from contactverif_paper.paper_formulations import (
-    BALANCED,
-    BASIC,
-    CHEN_HISADA,
-    DUAL,
-    MORTAR,
-    NTS,
-    NTS_AR,
-    STS,
-    TWO_PASS,
-    VTS_G,
-    VTS_ME,
-    VTS_PPT,
-    Formulations,
-    PaperFormulation,
-)
+from contactverif_paper import paper_formulations as paper
+from contactverif_paper.paper_formulations import Formulations, PaperFormulation
 from contactverif_paper.paper_item import WORDS, Agreement, Cell, Column, Item, PageTable, Statement
 from contactverif_paper.patch_tests import FAILURE, PASSES, PRINTED_COLUMN, SILENT, STRESS_ERROR, moderate_error
 from contactverif_reports.html.pages import number
 
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
-FORMULATIONS = (NTS, NTS_AR, TWO_PASS, VTS_G, VTS_ME, BASIC, VTS_PPT, BALANCED, CHEN_HISADA, STS, MORTAR, DUAL)
+FORMULATIONS = (
+    paper.NTS,
+    paper.NTS_AR,
+    paper.TWO_PASS,
+    paper.VTS_G,
+    paper.VTS_ME,
+    paper.BASIC,
+    paper.VTS_PPT,
+    paper.BALANCED,
+    paper.CHEN_HISADA,
+    paper.STS,
+    paper.MORTAR,
+    paper.DUAL,
+)
 SCENES: Mapping[str, str] = {  # {scene: head of its column}
     "a1": "A1",
     "a2-uniform": "A2, uniform mesh",
@@ -46,12 +45,12 @@ SCENES: Mapping[str, str] = {  # {scene: head of its column}
 }
 _NORMAL, _NON_MATCHING = ("a1", "a2-uniform", "a2-graded"), ("b", "c", "example-1", "example-1bis")
 PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # What the paper says, by scene; else it is silent.
-    NTS: dict.fromkeys((*_NORMAL, *_NON_MATCHING), FAILURE),
-    NTS_AR: dict.fromkeys(_NORMAL, PASSES) | dict.fromkeys(_NON_MATCHING, FAILURE),
-    TWO_PASS: dict.fromkeys(_NON_MATCHING, FAILURE),
-    VTS_ME: dict.fromkeys(("b", "example-1"), PASSES) | dict.fromkeys(("c", "example-1bis"), FAILURE),
-    VTS_PPT: dict.fromkeys(("c", "example-1bis"), PASSES),
-    BASIC: {"c": PASSES},
+    paper.NTS: dict.fromkeys((*_NORMAL, *_NON_MATCHING), FAILURE),
+    paper.NTS_AR: dict.fromkeys(_NORMAL, PASSES) | dict.fromkeys(_NON_MATCHING, FAILURE),
+    paper.TWO_PASS: dict.fromkeys(_NON_MATCHING, FAILURE),
+    paper.VTS_ME: dict.fromkeys(("b", "example-1"), PASSES) | dict.fromkeys(("c", "example-1bis"), FAILURE),
+    paper.VTS_PPT: dict.fromkeys(("c", "example-1bis"), PASSES),
+    paper.BASIC: {"c": PASSES},
 }
 
 

@@ -14,17 +14,9 @@ from contactverif.mechanics import newton
 from contactverif.mechanics.newton import End
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance
+from contactverif_paper import paper_formulations as paper
 from contactverif_paper.force_transmission import PrintedForces
-from contactverif_paper.paper_formulations import (
-    NTS,
-    NTS_AR,
-    TWO_PASS,
-    VTS_ME,
-    VTS_PPT,
-    PaperFormulation,
-    name_columns,
-    subject_of,
-)
+from contactverif_paper.paper_formulations import PaperFormulation, name_columns, subject_of
 from contactverif_paper.paper_item import WORDS, Agreement, Column, Item, Statement
 from contactverif_paper.patch_tests import (
     FIVE,
@@ -91,7 +83,7 @@ CASE_B = patch_item(
         "Fig. 16",
         "NTS hands wrong forces to the master although those on the slave are right; VTS-ME hands over the right ones",
         _EXACT_B,
-        {NTS_AR: "5/3 10/3 3 2 2", VTS_ME: _EXACT_B},
+        {paper.NTS_AR: "5/3 10/3 3 2 2", paper.VTS_ME: _EXACT_B},
     ),
     text="In Fig. 16 the paper’s “NTS” starts from the right slave forces: that is NTS-AR.",
 )
@@ -109,9 +101,9 @@ class _TwoPasses:
 def _compute_passes() -> _TwoPasses:
     departures = patch_solution(_PATCH_B).departures
     return _TwoPasses(
-        (departures[NTS_AR], departures[TWO_PASS]),
-        (moderate_error(NTS_AR, "b"), moderate_error(TWO_PASS, "b")),
-        stiffness_limit(_PATCH_B, lambda departure: departure[TWO_PASS] >= departure[NTS_AR]),
+        (departures[paper.NTS_AR], departures[paper.TWO_PASS]),
+        (moderate_error(paper.NTS_AR, "b"), moderate_error(paper.TWO_PASS, "b")),
+        stiffness_limit(_PATCH_B, lambda departure: departure[paper.TWO_PASS] >= departure[paper.NTS_AR]),
     )
 
 
@@ -156,12 +148,12 @@ def _compute_ends() -> _Ends:
     ends = np.zeros((len(SCENES), len(STIFFNESS)), dtype=np.int64)
     for row, column in np.ndindex(ends.shape):
         scene = catalogue.make_scene(SCENES[row], penalty=STIFFNESS[column] * YOUNG)
-        ends[row, column] = newton.solve(scene, subject_of(VTS_ME).for_case(scene.case())).end
+        ends[row, column] = newton.solve(scene, subject_of(paper.VTS_ME).for_case(scene.case())).end
     return _Ends(ends)
 
 
 def _convergence_statement(tests: PatchTests) -> Statement:
-    curve = tests.patches[0].curves[VTS_ME]
+    curve = tests.patches[0].curves[paper.VTS_ME]
     printed, beside = tests.numbers.end == End.CONVERGED
     result = f"at ε̂ = {PATCH_C.stiffness:g} × E Newton’s method ends: {curve.end}"
     if not printed.all():
@@ -193,7 +185,7 @@ CASE_C = patch_item(
         "Fig. 20",
         "NTS and VTS-ME hand wrong forces to the master; VTS-PPT hands over the right ones",
         _EXACT_C,
-        {NTS_AR: "5/3 10/3 7/3 8/3 2", VTS_ME: "3/2 3 17/6 10/3 4/3", VTS_PPT: _EXACT_C},
+        {paper.NTS_AR: "5/3 10/3 7/3 8/3 2", paper.VTS_ME: "3/2 3 17/6 10/3 4/3", paper.VTS_PPT: _EXACT_C},
     ),
     study=Study("vts_me", _compute_ends, _convergence_statement, {"figure": "Figs. 21, 22"}),
 )
@@ -239,7 +231,7 @@ EXAMPLE_1BIS = patch_item(
 
 UNEQUAL = 10.0  # The stiffness of the other foundation over that of the punch.
 _SETUPS = (_PATCH_1, _PATCH_1BIS)
-_COMPARED = (NTS_AR, NTS, TWO_PASS)
+_COMPARED = (paper.NTS_AR, paper.NTS, paper.TWO_PASS)
 _UNEQUAL = "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of the stress, and tolerance"
 
 
@@ -265,9 +257,12 @@ def _compute_examples() -> _Section71:
     scene = catalogue.make_scene("example-1bis", ratio=UNEQUAL)
     return _Section71(
         tuple(tuple(row[formulation] for formulation in _COMPARED) for row in departures),
-        tuple(stiffness_limit(setup, lambda row: row[NTS_AR] <= min(row[NTS], row[TWO_PASS])) for setup in _SETUPS),
-        (moderate_error(NTS_AR, "example-1"), moderate_error(TWO_PASS, "example-1")),
-        (moderate_error(VTS_PPT, "example-1bis", UNEQUAL), condition_tolerance(scene, scene.penalty)),
+        tuple(
+            stiffness_limit(setup, lambda row: row[paper.NTS_AR] <= min(row[paper.NTS], row[paper.TWO_PASS]))
+            for setup in _SETUPS
+        ),
+        (moderate_error(paper.NTS_AR, "example-1"), moderate_error(paper.TWO_PASS, "example-1")),
+        (moderate_error(paper.VTS_PPT, "example-1bis", UNEQUAL), condition_tolerance(scene, scene.penalty)),
     )
 
 

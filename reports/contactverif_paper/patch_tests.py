@@ -26,6 +26,7 @@ from contactverif.mechanics import newton
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.studies import solved_scenes
+from contactverif_paper import paper_formulations as paper
 from contactverif_paper.figure_style import (
     LETTERS,
     REFERENCE_LINE,
@@ -37,17 +38,7 @@ from contactverif_paper.figure_style import (
     use_round_ticks,
 )
 from contactverif_paper.force_transmission import ForceTable, PrintedForces
-from contactverif_paper.paper_formulations import (
-    NTS,
-    NTS_AR,
-    TWO_PASS,
-    VIRTUAL,
-    VTS_ME,
-    VTS_PPT,
-    PaperFormulation,
-    name_columns,
-    subject_of,
-)
+from contactverif_paper.paper_formulations import PaperFormulation, name_columns, subject_of
 from contactverif_paper.paper_item import (
     WORDS,
     Agreement,
@@ -69,9 +60,9 @@ _BAR = 10  # The length of a colour bar beside a row of panels over its width.
 _ARROW = 0.12  # Length of an arrow of pressure over the height of a body.
 _STIFFNESS_RANGE = 1e-2, 1e2  # ε̂ over E, per unit of length: where `stiffness_limit` searches.
 
-TWO = (NTS, NTS_AR)
-FOUR = (*TWO, TWO_PASS, VTS_ME)
-FIVE = (*FOUR, VTS_PPT)
+TWO = (paper.NTS, paper.NTS_AR)
+FOUR = (*TWO, paper.TWO_PASS, paper.VTS_ME)
+FIVE = (*FOUR, paper.VTS_PPT)
 
 PASSES, FAILURE, SILENT = 1, 0, -1  # What the paper says of a patch test.
 PRINTED_COLUMN = Column(
@@ -211,7 +202,7 @@ def moderate_error(formulation: PaperFormulation, scene_name: str, ratio: float 
 
 def _curve(formulation: PaperFormulation, solved: SolvedScene, solution: Solution, origin: float) -> _Curve:
     """Take pressures at the virtual slave nodes if there are any, else nodal forces over the nodes' shares (Eq. 3)."""
-    at_points = solution.points is not None and formulation in VIRTUAL
+    at_points = solution.points is not None and formulation in paper.VIRTUAL
     if solution.points is not None and at_points:
         x, _ = solved.points_along(solution.points)
         pressure = solution.points.pressure

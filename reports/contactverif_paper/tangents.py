@@ -35,18 +35,10 @@ from contactverif.mechanics.newton import Trace
 from contactverif.mechanics.system import System
 from contactverif.problems import catalogue
 from contactverif.studies.comparison import make_state, measure_costs
+from contactverif_paper import paper_formulations as paper
 from contactverif_paper.example_2 import steps_until_energy
 from contactverif_paper.figure_style import REFERENCE_LINE, add_legend, line_style, new_panels, use_decades
-from contactverif_paper.paper_formulations import (
-    BASIC,
-    STS,
-    VTS_ME,
-    VTS_PPT,
-    Formulations,
-    PaperFormulation,
-    measure,
-    subject_of,
-)
+from contactverif_paper.paper_formulations import Formulations, PaperFormulation, measure, subject_of
 from contactverif_paper.paper_item import (
     WORDS,
     Agreement,
@@ -62,7 +54,7 @@ from contactverif_paper.paper_item import (
 from contactverif_reports.html.pages import number
 
 # Fig. 30 and Section 6.1.
-FORMULATIONS = (VTS_ME, BASIC, VTS_PPT)
+FORMULATIONS = (paper.VTS_ME, paper.BASIC, paper.VTS_PPT)
 YOUNG, PRESSURE = 1e4, 100.0
 RATIOS = (1.0, 0.5)  # E of the master over E of the slave.
 MATERIALS = ("equal materials", "master half as stiff as the slave")
@@ -177,9 +169,9 @@ def _history(formulation: PaperFormulation, ratio: float) -> _History:
 
 def _rate(stiffness: float) -> tuple[float, float]:
     """Return (spectral radius, observed rate) of the basic version."""
-    trace = _solve(BASIC, 1.0, stiffness)
+    trace = _solve(paper.BASIC, 1.0, stiffness)
     q, case = trace.solution, trace.scene.case()
-    systems = [System(trace.scene, subject_of(row).for_case(case)) for row in (BASIC, VTS_PPT)]
+    systems = [System(trace.scene, subject_of(row).for_case(case)) for row in (paper.BASIC, paper.VTS_PPT)]
     basic, consistent = (dense(system.matrix(q, system.pair(q))[0]) for system in systems)
     iteration = np.eye(len(q)) - np.linalg.solve(basic, consistent)
     radius = float(np.abs(np.linalg.eigvals(iteration)).max())
@@ -187,10 +179,10 @@ def _rate(stiffness: float) -> tuple[float, float]:
 
 
 def _convergence_statements(convergence: Convergence) -> Iterator[Statement]:
-    counts, materials = convergence.counts(BASIC), f"with {MATERIALS[0]} and with the {MATERIALS[1]}"
+    counts, materials = convergence.counts(paper.BASIC), f"with {MATERIALS[0]} and with the {MATERIALS[1]}"
     by_rule = "; ".join(f"{rule}: {', '.join(map(str, row))}" for rule, row in zip(RULES, counts.tolist(), strict=True))
     # The bounds of the residual between which a stopping rule gives the printed number of iterations.
-    residuals = [row[FORMULATIONS.index(BASIC)].all_residuals for row in convergence.histories]
+    residuals = [row[FORMULATIONS.index(paper.BASIC)].all_residuals for row in convergence.histories]
     bounds = [(float(each[PRINTED_ITERATIONS]), float(each[:PRINTED_ITERATIONS].min())) for each in residuals]
     possible = all(low < high for low, high in bounds)
     words_ = " or ".join(
@@ -206,7 +198,7 @@ def _convergence_statements(convergence: Convergence) -> Iterator[Statement]:
         "fig30",
         f"Newton’s method stops when the largest residual is below a bound {words_}" if possible else "",
     )
-    quick = {row.legend: convergence.counts(row)[0].tolist() for row in (VTS_ME, VTS_PPT)}
+    quick = {row.legend: convergence.counts(row)[0].tolist() for row in (paper.VTS_ME, paper.VTS_PPT)}
     slow = counts[0]
     quick_words = "; ".join(f"{legend} {', '.join(map(str, row))}" for legend, row in quick.items())
     yield Statement(
@@ -217,7 +209,7 @@ def _convergence_statements(convergence: Convergence) -> Iterator[Statement]:
         Agreement.decide(max(map(max, quick.values())) <= 5 < 2 * 5 < slow.min()),
         "fig30",
     )
-    basic, radius = convergence.histories[0][FORMULATIONS.index(BASIC)], convergence.radius
+    basic, radius = convergence.histories[0][FORMULATIONS.index(paper.BASIC)], convergence.radius
     apart = float(np.nanmax(np.abs(convergence.rate / radius - 1)))
     yield Statement(
         "Section 6.1",
@@ -267,7 +259,7 @@ def _plot_convergence(convergence: Convergence) -> Figure:
     panels[0].set_ylabel("largest residual (force)")
     rates = panels[2]
     rates.plot(STIFFNESS, convergence.radius, **REFERENCE_LINE)
-    rates.plot(STIFFNESS, convergence.rate, **line_style(BASIC, 1) | {"linestyle": "none"})
+    rates.plot(STIFFNESS, convergence.rate, **line_style(paper.BASIC, 1) | {"linestyle": "none"})
     rates.set_xscale("log")
     rates.xaxis.set_minor_locator(NullLocator())
     rates.set_ylim(0, None)
@@ -299,7 +291,7 @@ FIG_30 = Item(
 
 
 # Section 6.2.
-TANGENT_FORMULATIONS = (VTS_ME, BASIC, VTS_PPT, STS)
+TANGENT_FORMULATIONS = (paper.VTS_ME, paper.BASIC, paper.VTS_PPT, paper.STS)
 SCENE = "example-1bis"
 OPTIONS = {"ratio": 0.5, "pressure": 100.0, "penalty": 1e4, "lowered": 0.0, "sides": "free"}  # Here ε̂ = E.
 DIRECTIONS = 8
@@ -348,7 +340,7 @@ def _tangent_row(formulation: PaperFormulation) -> tuple[float, float, float, in
 
 
 def _tangent_statements(result: _Tangents) -> Iterator[Statement]:
-    me, basic, ppt = (TANGENT_FORMULATIONS.index(row) for row in (VTS_ME, BASIC, VTS_PPT))
+    me, basic, ppt = (TANGENT_FORMULATIONS.index(row) for row in (paper.VTS_ME, paper.BASIC, paper.VTS_PPT))
     yield Statement(
         "Section 6.2",
         "with the consistent tangent VTS-PPT converges quadratically",
@@ -383,7 +375,7 @@ TERM_FORMULATIONS = (
     PaperFormulation("VTS-PPT", "vts-ppt:n=1"),
     PaperFormulation("segment-to-segment", "sts"),
 )
-TIMED = (VTS_ME, VTS_PPT, STS)
+TIMED = (paper.VTS_ME, paper.VTS_PPT, paper.STS)
 PRINTED_TERMS = 392  # The paper's count for the exact tangent of segment-to-segment.
 MASTERS: Mapping[str, tuple[tuple[float, float], ...]] = {  # {head of a column: nodes of the master}
     "1 segment": ((2.3, 0.02), (-0.4, -0.03)),
@@ -476,7 +468,7 @@ def _nonzeros(coefficients: FloatArray) -> int:
 
 def _cost_statements(section: _Section63) -> Iterator[Statement]:
     terms, cost, result = section.terms.terms, section.cost, section.tangents
-    row = TANGENT_FORMULATIONS.index(STS)
+    row = TANGENT_FORMULATIONS.index(paper.STS)
     yield Statement(
         "Section 6.3",
         f"an exact tangent of a segment-to-segment formulation is practically unfeasible, with up to {PRINTED_TERMS} "
@@ -498,7 +490,7 @@ def _cost_statements(section: _Section63) -> Iterator[Statement]:
         Agreement.decide(bool(holds.any()), always=bool(holds.all())),
         condition=f"the area of competence lies over {', '.join(heads)}",
     )
-    ratios = cost.entries[TIMED.index(VTS_PPT)] / cost.entries[TIMED.index(VTS_ME)]
+    ratios = cost.entries[TIMED.index(paper.VTS_PPT)] / cost.entries[TIMED.index(paper.VTS_ME)]
     ratio_words = ", ".join(f"{ratio:.2f} ({head})" for head, ratio in zip(MESH_RATIOS, ratios, strict=True))
     yield Statement(
         "Section 6.3",
