@@ -5,8 +5,8 @@ Its tangent is a complex step through these lines (`local_derivatives`), so it s
 
 from typing import Any
 
-from contactverif_surfaces.cell_methods import CellSprings
 from contactverif_surfaces.cell_points import SURFACE_TRAITS, CellPoints, SlaveView, cross_plane
+from contactverif_surfaces.face_methods import CellSprings
 
 
 def centre_points(view: SlaveView, codes: Any) -> CellPoints:

@@ -5,8 +5,8 @@ the pressures: at the points themselves (`segment_to_segment`), at slave nodes f
 at slave nodes from weighted gaps (`mortar_methods`); `two_half_passes` weighs gaps on both surfaces and hands no force
 from one body to the other.
 
-There are two writers of tangents. `cell_frame` and `node_rows` add up twelve numbers a row in the frame of a slave that
-looks along its own normal. `shape_rows` takes any directions and half passes, in the global frame, at 0.64 of that
+There are two writers of tangents. `cell_frame` adds up twelve numbers a row in the frame of a slave that looks
+along its own normal. `shape_rows` takes any directions and half passes, in the global frame, at 0.64 of that
 speed. Tests hold both against a complex step (`tests/plugins/test_every_formulation.py`).
 
 Of all factories `penalty` is the stiffness ε̂ > 0, force per length per length of penetration; with multipliers it is

@@ -30,10 +30,9 @@ from contactverif.geometry.projection import (
     node,
     search_tree,
 )
-from contactverif_mortar.cell_frame import ForcesAndTangent
+from contactverif_mortar.cell_frame import ForcesAndTangent, NodeState, node_rows, weigh
 from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, C, Cells, Quadrature, forces, near, report_points
 from contactverif_mortar.node_factors import group_nodes
-from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 
 N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure × a shape function has degree 2.
 

@@ -20,10 +20,9 @@ from contactverif.contract.formulation import ContactPoints, Pairing, check_pena
 from contactverif.contract.interface import Interface, join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, zero_matrix
-from contactverif_mortar.cell_frame import ForcesAndTangent
+from contactverif_mortar.cell_frame import ForcesAndTangent, NodeState, node_rows, weigh
 from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Quadrature, near, report_nodes
 from contactverif_mortar.node_factors import Factors, NodeRows, RowGroups, check_product, group_nodes
-from contactverif_mortar.node_rows import NodeState, node_rows, weigh
 from contactverif_mortar.shape_rows import (
     Weighted,
     add_shaped_rows,

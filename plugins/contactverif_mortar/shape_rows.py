@@ -10,7 +10,7 @@ segment. With c̄ the mean of c over that part and v its variance these are
 segment; in the middle of a segment κ grows there like 1/length, as biorthogonality wants. The weighted gap of a node is
 G_j = ∫φ_j g / ∫φ_j over all that is covered, φ = N or ψ, and ∫φ_j = ∫N_j in both cases.
 
-The rows of the factors are those of `node_rows`; the Δ of the points come from `cell_geometry`, in the global frame and
+The rows of the factors are those of `cell_frame`; the Δ of points come from `cell_geometry`, in the global frame and
 for up to six local nodes. With F = w p and ω the turn of the normal, the rows N_k of the local nodes that are pushed
 have
 
@@ -30,6 +30,7 @@ from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, IntArray
 from contactverif.contract.interface import Interface
 from contactverif.geometry.block_rows import Fields, NumberArray, add_block, find_entry
+from contactverif_mortar.cell_frame import NodeState, add_chains
 from contactverif_mortar.cell_geometry import D_C, D_GAP, D_WEIGHT, D_XI, OMEGA
 from contactverif_mortar.integration_cells import (
     GAP,
@@ -44,7 +45,6 @@ from contactverif_mortar.integration_cells import (
     forces,
 )
 from contactverif_mortar.node_factors import NodeRows, RowGroups
-from contactverif_mortar.node_rows import NodeState, add_chains
 
 PIECE = 4096  # Points.
 # The smallest covered share of a node's own length that counts. Below it the node would carry less than the roundoff of

@@ -30,7 +30,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing, check_coun
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
-from contactverif_mortar.cell_frame import ForcesAndTangent
+from contactverif_mortar.cell_frame import ForcesAndTangent, NodeState
 from contactverif_mortar.integration_cells import (
     AREAS,
     CELL_TRAITS,
@@ -43,7 +43,6 @@ from contactverif_mortar.integration_cells import (
     report_nodes,
 )
 from contactverif_mortar.node_factors import RowGroups, group_nodes
-from contactverif_mortar.node_rows import NodeState
 from contactverif_mortar.shape_rows import Weighted, add_shaped_rows, divide_covered, own_lengths, weigh_points
 
 STEEPEST = -0.5  # The cosine between two segments that see each other; −1 where they are parallel.

@@ -2,8 +2,7 @@
 
 `face_search` decides which pairs of faces make a cell and what its corners are, as integers. `cell_points` computes
 every real number of a cell from the positions of its nodes. A method is a rule for the pressures: at points of cells,
-at slave nodes from weighted gaps or at quarters of slave faces (`cell_methods`), or at slave nodes themselves
-(`nodes_on_faces`).
+at slave nodes from weighted gaps, at quarters of slave faces, or at slave nodes themselves (`face_methods`).
 
 Of all factories `penalty` is the stiffness ε̂ > 0, force per area per length of penetration; of `nts_3d` it is ε > 0,
 force per length.
@@ -13,8 +12,7 @@ derivative of the same lines, by a complex step in the nodes of one cell. One me
 (`centre_springs`).
 """
 
-from contactverif_surfaces.cell_methods import mortar_3d, sts_3d, vts_ppt_3d
 from contactverif_surfaces.centre_springs import vts_cell_3d
-from contactverif_surfaces.nodes_on_faces import nts_3d, nts_ar_3d
+from contactverif_surfaces.face_methods import mortar_3d, nts_3d, nts_ar_3d, sts_3d, vts_ppt_3d
 
 __all__ = ["mortar_3d", "nts_3d", "nts_ar_3d", "sts_3d", "vts_cell_3d", "vts_ppt_3d"]

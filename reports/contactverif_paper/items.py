@@ -10,24 +10,24 @@ from typing import Any
 
 from contactverif.plugins.provenance import collect_repeatable_facts
 from contactverif.run.scheduler import Job, Scheduler
-from contactverif_paper import appendix_a, example_2, lagrange_multipliers, pass_table, patch_cases, tangents
+from contactverif_paper import appendix_a, example_2, lagrange_multipliers, pass_table, patch_tests, tangents
 from contactverif_paper.paper_item import Item, ItemResult, Paper, Progress
 
 ITEMS: tuple[Item, ...] = (
     pass_table.ITEM,
-    patch_cases.CASE_A1,
-    patch_cases.CASE_A2,
-    patch_cases.CASE_B,
-    patch_cases.SECTION_5_1_3,
-    patch_cases.CASE_C,
+    patch_tests.CASE_A1,
+    patch_tests.CASE_A2,
+    patch_tests.CASE_B,
+    patch_tests.SECTION_5_1_3,
+    patch_tests.CASE_C,
     tangents.FIG_30,
     tangents.SECTION_6_2,
     tangents.SECTION_6_3,
     lagrange_multipliers.INF_SUP,
     lagrange_multipliers.LAGRANGE_MULTIPLIERS,
-    patch_cases.EXAMPLE_1,
-    patch_cases.EXAMPLE_1BIS,
-    patch_cases.SECTION_7_1,
+    patch_tests.EXAMPLE_1,
+    patch_tests.EXAMPLE_1BIS,
+    patch_tests.SECTION_7_1,
     example_2.EXAMPLE_2,
     example_2.FIG_39,
     example_2.PEAK,

@@ -17,7 +17,7 @@ from contactverif_paper import (
     appendix_a,
     lagrange_multipliers,
     paper_formulations,
-    patch_cases,
+    patch_tests,
     tangents,
 )
 from contactverif_paper.example_2 import mesh_lines, thin_out
@@ -26,7 +26,6 @@ from contactverif_paper.items import ITEMS, compute, steps
 from contactverif_paper.paper_formulations import subject_of
 from contactverif_paper.paper_item import Agreement, Column, Item, PageTable, PaperFigure, Statement
 from contactverif_paper.paper_page import tree_of, write
-from contactverif_paper.patch_tests import YOUNG
 
 # --- A new item is one registration ------------------------------------------------------------------------------
 
@@ -108,8 +107,8 @@ def test_case_a2_is_as_wide_as_the_printed_axis(name: str) -> None:
 
 def test_vts_me_cycles_on_case_c_and_converges_beside_it() -> None:
     ends = {}
-    for name in patch_cases.SCENES:
-        scene = catalogue.make_scene(name, penalty=patch_cases.PATCH_C.stiffness * YOUNG)
+    for name in patch_tests.SCENES:
+        scene = catalogue.make_scene(name, penalty=patch_tests.PATCH_C.stiffness * patch_tests.YOUNG)
         ends[name] = newton.solve(scene, subject_of(paper_formulations.VTS_ME).for_case(scene.case())).end
     assert ends == {"c": End.CYCLE, "c-prime": End.CONVERGED}
 
