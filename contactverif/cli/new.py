@@ -3,8 +3,6 @@
 Rule: a project appears whole or not at all, under a name that nothing else has.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import keyword

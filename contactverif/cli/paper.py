@@ -1,7 +1,5 @@
 """The work of `paper`: the reference paper's tables and figures, computed again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from contactverif.cli.console import echo

@@ -4,8 +4,6 @@ On one segment a side every place is an end and all ratios are the same. Here no
 inside the master, and no two segments are alike, so that each mistake has a pattern of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise

@@ -5,8 +5,6 @@ segment's own normal n and tangent t: the material part is as large for every g 
 and of the length of a segment grow like g and stand in n–t or t–n.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -1,7 +1,5 @@
 """The numbers of a case beside the tolerance that they make, for a reader who asks why a case fails."""
 
-from __future__ import annotations
-
 import ast
 import operator
 import re

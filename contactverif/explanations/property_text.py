@@ -1,7 +1,5 @@
 """The text that explains a property: what it asks, why, what it measures, its tolerance, and its known failures."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterable, Sequence

@@ -4,8 +4,6 @@ Each failure is a file of arrays, without anything that reading could run. It be
 of a property. A failure goes once its property passes, or has other code.
 """
 
-from __future__ import annotations
-
 import os
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence

@@ -3,8 +3,6 @@
 Whatever a plugin does is an outcome. What the harness or a property does wrong is an exception.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace

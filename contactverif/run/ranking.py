@@ -4,8 +4,6 @@ A property has a low rank if few others catch the wrong formulations that it cat
 integrate along arcs, stand behind the others, because a reader can follow a few springs, and hardly a solution.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import partial
 

@@ -4,8 +4,6 @@ It tells how far a store, or the report of a stranger, can be believed. The shar
 seed of the run, so that it cannot be known beforehand.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial

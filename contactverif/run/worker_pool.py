@@ -4,8 +4,6 @@ Ctrl-C goes to the parent alone, which ends the workers. If the parent is killed
 imports no numpy, so that the server of processes is started first and imports while the parent does.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -7,8 +7,6 @@ what the harness asks, so that no plugin tells them. Seconds are those of the pl
 call itself, without the checks of the harness and without the way there.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Callable, Collection, Sequence
 from contextlib import nullcontext

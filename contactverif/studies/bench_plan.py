@@ -4,8 +4,6 @@ Every problem has the exact solution of its own penalty, so that a soft penalty 
 give equal results but for seconds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,7 +1,5 @@
 """The bench: all cells of a plan, in one process of each formulation after another, with a journal that survives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace

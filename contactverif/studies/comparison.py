@@ -6,8 +6,6 @@ checked in it. Of many turns the fastest counts, because whatever disturbs a mac
 is timed, without the checks of the harness, which would make fast and slow ones alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import nan

@@ -3,8 +3,6 @@
 Rule: a solution that did not converge is a result too, with its end; a mistake of a plugin becomes one line of text.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@
 Several decorators on one test add up. Nothing that takes long is imported here: every run of pytest loads this file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 

@@ -3,8 +3,6 @@
 A check that fails shows the promise, the numbers, a mesh that fails, and a command that repeats it.
 """
 
-from __future__ import annotations
-
 import os
 import shlex
 import textwrap

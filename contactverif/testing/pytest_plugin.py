@@ -4,8 +4,6 @@ Rule: every pytest run of a user who has installed contactverif loads this file.
 before a marked test is collected.
 """
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Iterator
 from typing import Any

@@ -3,8 +3,6 @@
 A reason is printed in the table; it is an empty string where the question can be asked.
 """
 
-from __future__ import annotations
-
 from contactverif.contract.traits import Traits
 
 

@@ -11,8 +11,6 @@ slave node stands over a master node, and there only, is no choice.
 `docs/concepts/tolerances.md` explains kinks and the verdict `undecided`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -6,8 +6,6 @@ in all `VARIANTS`. Rules for the next editor: nothing is solved here, a failed s
 no number is averaged before it is stored.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum

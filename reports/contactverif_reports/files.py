@@ -1,7 +1,5 @@
 """A file is written whole or not at all: to a temporary name in the same folder, then renamed."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator, Sequence
