@@ -128,7 +128,7 @@ def verify(
             shrink=shrink,
             progress=progress,
             executor=executor,
-            keep_going=keep_going,
+            stop="never" if keep_going else "foundation",
         )
     finally:
         if limits is not None:

@@ -61,7 +61,7 @@ def verify(
         Takes(
             [
                 *("names", "engines", "every", "properties", SAMPLING, "out", "pictures", "known", "keep_going"),
-                *("last_failed", "memory", PLACE, "jobs", ISOLATION),
+                *("exit_first", "quick", "last_failed", "memory", PLACE, "jobs", ISOLATION),
             ]
         ),
     ],

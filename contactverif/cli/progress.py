@@ -21,19 +21,25 @@ from rich.text import Text
 from contactverif.cli.console import QuietConsole
 from contactverif.contract.errors import one_line
 from contactverif.run import scheduler
-from contactverif.run.judge import SLOW_CALL
 from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
 _BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
+_LONG_CASE = 10.0  # Seconds of a case that is worth a word.
 _PAUSE = 5.0  # Seconds between two lines about the whole, where there is no terminal.
 
 
 class _TimeColumn(TimeElapsedColumn):
-    """The time that is left, where there is a guess, else the time since the start."""
+    """The time of a case that takes long, or the time that is left, where there is a guess, or that since the start."""
 
     def render(self, task: Task) -> Text:
-        return Text(task.fields["left"]) if task.fields["left"] else super().render(task)
+        words = _patience(monotonic() - task.fields["since"]) or task.fields["left"]
+        return Text(words) if words else super().render(task)
+
+
+def _patience(seconds: float) -> str:
+    """Return for how long a case runs, if that is long."""
+    return f"this case since {seconds:.0f} s" if seconds >= _LONG_CASE else ""
 
 
 class Bar:
@@ -54,7 +60,8 @@ class Bar:
         self._task: TaskID | None = None
         self._interrupted = False
         self._of_run: scheduler.RunProgress | None = None
-        self._next_line = monotonic() + _PAUSE
+        self._last, self._since = "", monotonic()  # The last step, and when it was new.
+        self._next_line = self._since + _PAUSE
         self._previous_handler: Any = None
 
     def __enter__(self) -> Bar:
@@ -83,13 +90,16 @@ class Bar:
             result = row.result, STYLES.get(row.result, PLAIN_STYLE)
             behind = f"{judged}{f': {row.reason}' if row.reason else ''}"
             self._print(Text.assemble(f"{row.formulation} {row.property_id}: ", result, behind))
-        if (step.first_seconds or 0.0) >= SLOW_CALL:
-            self._print(Text(f"{step.formulation}: a pairing and a residual take {step.first_seconds:.2g} s"))
+        if step.remark:
+            self._print(Text(step.remark))
+            return
         words = f"{f'{step.formulation} {step.property_id}'.rstrip()}: {step.phase} {step.count}/{step.planned}"
         if self._of_run is None:
             self.update(words, 0, None)
         else:
-            self.update(words, self._of_run.finished, self._of_run.planned, left=_time_left(self._of_run))
+            seconds = self._of_run.seconds_left
+            left = "" if seconds is None else f"{scheduler.in_words(seconds)} left"
+            self.update(words, self._of_run.finished, self._of_run.planned, left)
 
     def _print(self, line: Text) -> None:
         try:
@@ -107,27 +117,19 @@ class Bar:
         """
         if self._interrupted:
             raise KeyboardInterrupt
+        now = monotonic()
+        if description != self._last:
+            self._last, self._since = description, now
         if self._progress.disable:
-            if monotonic() >= self._next_line:
-                self._next_line = monotonic() + _PAUSE
-                total = (
-                    "" if n_planned is None else f"; {n_finished:,} of some {n_planned:,} in all{left and f', {left}'}"
-                )
-                self._print(Text(f"{description}{total}", style=PLAIN_STYLE))
+            if now >= self._next_line:
+                self._next_line = now + _PAUSE
+                total = "" if n_planned is None else f"; {n_finished:,} of some {n_planned:,} in all"
+                parts = f"{description}{total}", left, _patience(now - self._since)
+                self._print(Text(", ".join(filter(None, parts)), style=PLAIN_STYLE))
             return
         if self._task is None:
-            self._task = self._progress.add_task(description, left=left)
+            self._task = self._progress.add_task("", left=left, since=self._since)
+        description = one_line(description, _LONGEST)
         self._progress.update(
-            self._task, description=one_line(description, _LONGEST), completed=n_finished, total=n_planned, left=left
+            self._task, description=description, completed=n_finished, total=n_planned, left=left, since=self._since
         )
-
-
-def _time_left(progress: scheduler.RunProgress) -> str:
-    """Return the time that a run still takes, which is a guess; empty if nothing is measured yet."""
-    seconds = progress.seconds_left
-    if seconds is None:
-        return ""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2.0 * size:
-            return f"about {seconds / size:.0f} {unit} left"
-    return f"about {seconds:.0f} s left"

@@ -28,7 +28,7 @@ from contactverif.contract.case import Case
 from contactverif.contract.counterexample import case_id, failing_examples
 from contactverif.contract.errors import MisuseError, name_line, one_line
 from contactverif.contract.interface import Interface
-from contactverif.contract.property import Property
+from contactverif.contract.property import LAST_TURN, Property
 from contactverif.contract.result import NotLoaded, Run
 from contactverif.contract.subject import Subject
 from contactverif.isolation.box import why_no_box
@@ -149,6 +149,12 @@ class Job:
         """Load the formulations, in the workers where there are any, and the properties meanwhile."""
         loaders = begin_loading(self.options.names, self.limits(), executor)
         questions = load_properties(self.options.properties, engines=True)
+        if self.options.quick:  # What does not load is told.
+            asked = [each for each in questions if isinstance(each, NotLoaded) or each.turn < LAST_TURN]
+            if not asked:
+                words = f"{len(questions)} properties, none of them of the first round"
+                raise MisuseError("--quick", words, "no --property, or -p 'balance.*'")
+            questions = asked
         return Plugins([load() for load in loaders], questions)
 
     def limits(self) -> Limits | None:
@@ -159,7 +165,8 @@ class Job:
     def run_options(self, **others: Any) -> dict[str, Any]:
         """Return the options of `contactverif.run.run.run`, and others beside them."""
         options = self.options
-        of_run = {"profile": options.size, "known": options.known, "keep_going": options.keep_going}
+        stop = "failure" if options.exit_first else "never" if options.keep_going else "foundation"
+        of_run = {"profile": options.size, "known": options.known, "stop": stop}
         return others | of_run | {"place": self.place, "shrink": options.shrink or "one"}
 
     @property

@@ -345,7 +345,7 @@ class Property(PropertyInfo):
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
     turn : int
-        The turn among the properties that are asked first, from 0 on: cheap ones, of which one fails for most mistakes.
+        The turn in the first round of a run, from 0 on: cheap properties, of which one fails for most mistakes.
     restarts : bool
         A second process of the formulation is asked, too. It starts once if one process judges all cases.
     question : str

@@ -98,6 +98,11 @@ class RemoteSubject(Subject):
         return RemoteSubject(replace(self.remote, second=True))
 
 
+def in_one_process(subject: Subject) -> Subject:
+    """Return a formulation as one that is not started a second time."""
+    return Subject(subject.name, subject.remote) if isinstance(subject, RemoteSubject) else subject
+
+
 class RemoteEngine(_Remote[EngineTraits]):
     """An engine."""
 

@@ -1,9 +1,10 @@
 """The driver of a run: it checks every property of some formulations.
 
-Each formulation is called once before anything else, and properties that state a turn are asked first. The cases of a
-strategy are drawn once for all formulations and all properties that have it, they are judged, and what failed is
-shrunk. Properties that solve bodies come last. All planned cases of a row are judged before one is shrunk, so that a
-failure ends nothing early. What the store has is not judged again, and a block is not drawn if the store has all of it.
+Each formulation is called once before anything else. A first round asks cheap properties about a few cases, so that a
+person who waits sees what is wrong within seconds. Then the cases of a strategy are drawn once for all formulations and
+all properties that have it, they are judged, and what failed is shrunk. Properties that solve bodies come last. All
+planned cases of a row are judged before one is shrunk, so that a failure ends nothing early. What the store or the
+first round has is not judged again, and a block is not drawn if the store has all of it.
 """
 
 from __future__ import annotations
@@ -17,22 +18,22 @@ from functools import partial
 from itertools import chain, islice, product
 from operator import attrgetter
 from time import perf_counter
-from typing import TypeVar, get_args
+from typing import Literal, TypeVar, get_args
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SEGMENT, Interface
-from contactverif.contract.property import Outcome, Property, Verdict
+from contactverif.contract.property import LAST_TURN, Outcome, Property, Verdict
 from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
 from contactverif.diagnosis.diagnose import diagnose
-from contactverif.isolation.remote import has_process, places
+from contactverif.isolation.remote import has_process, in_one_process, places
 from contactverif.plugins.provenance import collect_provenance
 from contactverif.plugins.registry import unknown_property_error
 from contactverif.run import judge
 from contactverif.run.failure_memory import Failures
-from contactverif.run.profiles import Profile, Shrink, profile_named
+from contactverif.run.profiles import FIRST_CASES, Profile, Shrink, profile_named
 from contactverif.run.ranking import first_failure, wrong_rows
 from contactverif.run.recheck import recheck_store
 from contactverif.run.rows import (
@@ -46,7 +47,7 @@ from contactverif.run.rows import (
     row_of_case,
     shrink_case,
 )
-from contactverif.run.scheduler import CaseChunk, Job, Progress, RunProgress, Scheduler
+from contactverif.run.scheduler import CaseChunk, Job, Progress, RunProgress, Scheduler, in_words
 from contactverif.run.store import WITNESS, Store
 from contactverif.sampling import draw
 from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, PlannedCases, Sampling
@@ -55,6 +56,7 @@ CHUNK = 25  # The number of drawn cases that are judged in one job.
 LIST_CHUNK = 5  # The same for named cases, which are often slower.
 _FACE_NAMES = {2: "segments in the plane", 3: "triangles in space", 4: "quadrilaterals in space"}
 _Kind = TypeVar("_Kind")
+Stop = Literal["never", "foundation", "failure"]
 _Key = tuple[str, str]  # A formulation, and the id of a property.
 
 
@@ -79,12 +81,14 @@ def run(
     progress: Callable[[Progress], None] | None = None,
     executor: Executor | None = None,
     store: Store | None = None,
-    keep_going: bool = True,
+    stop: Stop = "never",
 ) -> Run:
     """Check every property of every formulation, and return a row for each of both.
 
     Subjects and properties are as the registry loads them: one that did not load is reported and fails the run.
-    `examples` and `seed` overrule those of the profile; the other options are those of `contactverif.verify`.
+    `examples` and `seed` overrule those of the profile. A formulation is asked nothing more if the first rows show that
+    it is wrong altogether (`stop` "foundation"), or all are once any row is wrong ("failure"). The other options are
+    those of `contactverif.verify`.
     `progress` is called after every case, with an executor after every job. The executor may be any whose workers are
     processes, such as one of loky or dask; None for this process. The results are the same but for seconds.
 
@@ -112,7 +116,7 @@ def run(
         store or Store(),
         known=known,
         shrink=shrink,
-        keep_going=keep_going,
+        stop=stop,
     )
     not_loaded = tuple(_of_kind(NotLoaded, (*subjects, *properties)))
     try:
@@ -182,7 +186,7 @@ class Driver:
         known: Mapping[str, str] | None = None,
         share: tuple[int, int] | None = None,
         shrink: Shrink = "new",
-        keep_going: bool = True,
+        stop: Stop = "never",
     ) -> None:
         _check_once("formulation", map(attrgetter("name"), subjects))
         _check_once("property", map(attrgetter("id"), questions))
@@ -191,10 +195,14 @@ class Driver:
         self._subjects, self._questions, self._sampling, self._store = subjects, questions, sampling, store
         self._scheduler, self._report = scheduler, scheduler.report
         self._known = known or {}
-        self._share, self._shrink, self._keep_going = share, shrink, keep_going
+        self._share, self._shrink, self._stop = share, shrink, stop
         self._rows: dict[_Key, OpenRow | Row] = {}
+        self._first_calls: dict[str, float] = {}  # {formulation: seconds of a pairing and a residual}
+        self._first: dict[_Key, dict[int, Outcome]] = {}  # The outcomes of the first round.
+        self._first_wrong: list[Row] = []
+        self._whole: _Key | None = None  # The row that is judged although its formulation is asked nothing more.
         # Properties with the same cases. Those that state a turn come first, and those that solve bodies last: they
-        # take long, and a person waits for the first row.
+        # take long.
         self._groups: dict[tuple[str, bool], list[Property]] = {}
         self._variants: dict[_Key, Property] = {}  # What each formulation is asked: with cases in the plane or space.
         for question in sorted(questions, key=attrgetter("bodies", "turn")):
@@ -214,13 +222,17 @@ class Driver:
         with closing(self._store):
             self.call_first()
             recheck_store(self._store, self._subjects, self._questions, sampling, self._scheduler)
-            if not self._keep_going:
+            if self._stop == "foundation":
                 self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
                 pairs = product(self._subjects, self._questions)
                 lacking = (subject.name for subject, question in pairs if lacks_witness(subject, question, sampling))
                 self._stopped |= dict.fromkeys(lacking, "the traits state a failure without a witness")
             work(self._earlier_failures())
-            if not self._keep_going:
+            if self._share is None and (self._stop == "failure" or self._scheduler.is_watched):
+                self._ask_first_round()
+            if self._stop == "failure":
+                self._work_to_first_failure()
+            elif self._stop == "foundation":
                 # All jobs of these properties end before it is known who is asked more, so that it depends on no clock.
                 if any(question.role == "foundation" for question in self._questions):
                     work(chain.from_iterable(self._parts_of_next()))
@@ -233,9 +245,9 @@ class Driver:
 
     def call_first(self) -> None:
         """Call each formulation for the first time. Jobs that follow carry the answers to other processes."""
-        self._scheduler.work(self._first_calls())
+        self._scheduler.work(self._call_each())
 
-    def _first_calls(self) -> Iterator[Job]:
+    def _call_each(self) -> Iterator[Job]:
         needs: frozenset[str] = frozenset().union(*(question.needs for question in self._questions))
         for subject in self._subjects:
             before = Progress(subject.name, "", "first call (compiles)", 0, 1)
@@ -245,7 +257,71 @@ class Driver:
     def _note_first(self, before: Progress, subject: Subject, first: judge.FirstCall) -> None:
         subject.first_answers = subject.first_answers or first.answers  # In a second run the process is warm.
         self._opposite_signs |= {subject.name} if first.opposite_sign else set()
-        self._report(replace(before, count=1, first_seconds=first.seconds))
+        self._first_calls[subject.name] = first.seconds or 0.0
+        self._report(replace(before, count=1))
+
+    def _ask_first_round(self) -> None:
+        """Ask the properties that state a turn about the first of their planned cases, and show at once what is wrong.
+
+        One of these cheap properties fails for most mistakes, and a person need not wait for all that takes long.
+        """
+        cases: dict[str, tuple[Case, ...]] = {}
+        self._scheduler.work(self._first_round(cases))
+        kinds = {kind for question in self._questions if question.id in cases for kind in question.kinds}
+        seen = {case.kind for each in cases.values() for case in each if case.kind}
+        words = f"first round: {len(cases)} of {len(self._questions)} properties, {FIRST_CASES} cases each"
+        words += f", of {len(seen)} of {len(kinds)} kinds" if kinds else ""
+        words += f"; {len(self._first_wrong) or 'none'} wrong{self._meter.price(self._first_calls)}"
+        if cases:
+            self._report(Progress("", "", "first round", 1, 1, remark=words))
+
+    def _first_round(self, asked: dict[str, tuple[Case, ...]]) -> Iterator[Job]:
+        """Yield the jobs of the first round, and note the cases that each property is asked about."""
+        variants = [each for each in dict.fromkeys(self._variants.values()) if each.turn < LAST_TURN]
+        for question, subject in product(sorted(variants, key=attrgetter("turn")), self._subjects):
+            key, source = (subject.name, question.id), self._sampling.source(question)
+            if question is not self._variants[key] or subject.name in self._stopped or source is None:
+                continue
+            row = open_row(subject, question, source, self._known.get(question.id, ""), self._sampling)
+            # A tangent takes a hundred calls.
+            count = min(1 if "tangent" in question.needs else FIRST_CASES, self._sampling.examples)
+            cases = draw.draw_first(source, self._sampling.key(question), count)
+            if isinstance(row, Row) or not cases or self._store.outcomes(subject.name, question.info, 0, count):
+                continue
+            asked[question.id], chunk = cases, CaseChunk(cases, 0)
+            row.expect({0: chunk}, planned=self._sampling.examples, last=True)
+            before = Progress(*key, "first round", 0, count)
+            note = partial(self._note_first_cases, row, before)
+            if question.restarts:  # The second process takes a second to start: the whole row has it.
+                yield Job(judge_cases, (question, in_one_process(subject), chunk, None, {}), note, before)
+            else:
+                yield Job(judge_cases, (question, subject, chunk, self._store.writer(*key, 0), {}), note, before)
+
+    def _note_first_cases(self, row: OpenRow, before: Progress, judged: tuple[Sequence[Outcome], str]) -> None:
+        key, outcomes = (row.subject.name, row.question.id), judged[0]
+        self._meter.measure(row.question.id, outcomes)
+        if not row.question.restarts:
+            self._first[key] = dict(enumerate(outcomes))
+        row.add(0, outcomes)
+        row.judge(on_scene=False)
+        if row.row.verdict in (Verdict.FAIL, Verdict.CRASHED) and row.row.result is not Result.FAILS_AS_STATED:
+            self._first_wrong.append(row.row)
+            self._report(replace(before, count=before.planned, row=row.row))
+
+    def _work_to_first_failure(self) -> None:
+        """Judge until a row is wrong; a run asks nothing more then. One of the first round is judged whole.
+
+        All jobs of some properties end before the row is chosen, so that it depends on no clock.
+        """
+        rows = [row for row in self._first_wrong if row.unexpected]
+        rows.sort(key=lambda row: next(each.turn for each in self._questions if each.id == row.property_id))
+        while self._groups and not rows:
+            self._scheduler.work(chain.from_iterable(self._parts_of_next()))
+            rows = wrong_rows(row.row for row in self._open_rows())
+        for row in rows[:1]:
+            self._whole = row.formulation, row.property_id
+            reason = f"{' '.join(self._whole)} is wrong (-x)"
+            self._stopped |= {subject.name: reason for subject in self._subjects}
 
     def _earlier_failures(self) -> Iterator[Job]:
         """Yield the jobs to judge what failed in earlier runs; none of them counts among the planned cases."""
@@ -348,7 +424,8 @@ class Driver:
             key = subject.name, question.id
             if question is not self._variants[key]:
                 continue
-            known, stopped = self._known.get(question.id, ""), self._stopped.get(subject.name, "")
+            known = self._known.get(question.id, "")
+            stopped = self._stopped.get(subject.name, "") if key != self._whole else ""
             self._rows[key] = row = open_row(subject, question, source, known, self._sampling, stopped)
             if isinstance(row, OpenRow):
                 opened.append(row)
@@ -411,6 +488,7 @@ class Driver:
         """Yield the job to judge the cases of a chunk that are not judged yet."""
         name, question = row.subject.name, row.question
         stored = self._store.outcomes(name, question.info, chunk.first, chunk.count)
+        stored |= self._first.get((name, question.id), {}) if chunk.first == 0 else {}
         if len(stored) == chunk.count:
             yield from self._add(row, chunk.first, [stored[place] for place in range(chunk.count)])
         else:
@@ -532,8 +610,8 @@ def _in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[Case
 # ---------------------------------------------------------------------------------------------------------------------
 # How far the run is
 
-_SHARE = 0.05  # The share of the cases that must be judged before anything is guessed: the first property is dear.
 _LIST = 8  # Cases of a list that is not made yet: making all of them takes a second.
+_FEW = 10  # Cases of a property in a short run.
 # Seconds of a case over those of a drawn one that solves no bodies, of VTS-PPT: {(solves bodies, is in a list): ratio}.
 # They count only until the first cases of that kind are measured.
 _COSTS = {(False, False): 1.0, (False, True): 0.7, (True, False): 2.7, (True, True): 8.6}
@@ -545,7 +623,7 @@ class RunMeter:
     def __init__(self, variants: Mapping[_Key, Property], subjects: Sequence[Subject], sampling: Sampling) -> None:
         self._kinds: dict[str, tuple[bool, bool]] = {}
         self._planned: dict[_Key, int] = {}
-        self._cases, self._seconds = Counter[tuple[bool, bool]](), defaultdict[tuple[bool, bool], float](float)
+        self._cases, self._seconds = Counter[str](), defaultdict[str, float](float)  # Of each property.
         self._started: float | None = None
         subject_of = {subject.name: subject for subject in subjects}
         for (name, id_), question in variants.items():
@@ -558,27 +636,46 @@ class RunMeter:
 
     def measure(self, property_id: str, outcomes: Iterable[Outcome]) -> None:
         """Note what cases have cost that were judged just now."""
-        for outcome in outcomes:
-            self._cases[self._kinds[property_id]] += 1
-            self._seconds[self._kinds[property_id]] += outcome.seconds
+        if self._started is None:  # First calls, which may compile, say nothing about the cases.
+            self._started = perf_counter() - sum(outcome.seconds for outcome in outcomes)
+        self._cases[property_id] += len(outcomes)
+        self._seconds[property_id] += sum(outcome.seconds for outcome in outcomes)
 
     def read(self, rows: Mapping[_Key, OpenRow | Row]) -> RunProgress:
         """Return how far a run with these rows is, in which others may still be missing."""
-        now = perf_counter()
-        if self._started is None:  # First calls, which may compile, say nothing about the cases.
-            self._started = now
-        finished, planned, left = 0, 0, Counter[tuple[bool, bool]]()
+        finished, planned, left = 0, 0, Counter[str]()
         for key, count in self._planned.items():
             row = rows.get(key)
             if isinstance(row, Row):
                 continue
             n_finished, n_cases = (0, count) if row is None else (row.n_finished, row.planned or count)
             finished, planned = finished + n_finished, planned + n_cases
-            left[self._kinds[key[1]]] += n_cases - n_finished
+            left[key[1]] += n_cases - n_finished
+        return RunProgress(finished, planned, self._seconds_of(left))
+
+    def price(self, calls: Mapping[str, float]) -> str:
+        """Return what a run costs in which an evaluation, {formulation: its seconds}, is slow; empty if none is."""
+        whole, few = Counter[str](), Counter[str]()
+        for (_, id_), count in self._planned.items():
+            whole[id_] += count
+            few[id_] += count if self._kinds[id_][1] else min(count, _FEW)
+        slowest, times = max(calls, key=calls.__getitem__, default=""), (self._seconds_of(whole), self._seconds_of(few))
+        if calls.get(slowest, 0.0) < judge.SLOW_CALL or times[0] is None or times[1] is None:
+            return ""
+        words = f". An evaluation of {slowest} takes {calls[slowest]:.2g} s: the whole takes {in_words(times[0])}"
+        return f"{words}, with --examples {_FEW} {in_words(times[1])}" if whole != few else words
+
+    def _seconds_of(self, cases: Mapping[str, int]) -> float | None:
+        """Return the seconds that cases of each property will take, which is a guess; None if nothing is measured."""
         measured = sum(self._seconds.values())
-        if finished <= _SHARE * planned or not measured:
-            return RunProgress(finished, planned, None)
-        unit = measured / sum(_COSTS[kind] * count for kind, count in self._cases.items())
-        costs = {kind: self._seconds[kind] / count for kind, count in self._cases.items()}
-        ahead = sum(count * costs.get(kind, _COSTS[kind] * unit) for kind, count in left.items())
-        return RunProgress(finished, planned, ahead * (now - self._started) / measured)
+        if not measured or self._started is None:
+            return None
+        counts, seconds = Counter[tuple[bool, bool]](), defaultdict[tuple[bool, bool], float](float)
+        for id_, count in self._cases.items():
+            counts[self._kinds[id_]] += count
+            seconds[self._kinds[id_]] += self._seconds[id_]
+        unit = measured / sum(_COSTS[kind] * count for kind, count in counts.items())
+        costs = {kind: seconds[kind] / counts[kind] if counts[kind] else cost * unit for kind, cost in _COSTS.items()}
+        own = {id_: self._seconds[id_] / count for id_, count in self._cases.items() if count}
+        ahead = sum(count * own.get(id_, costs[self._kinds[id_]]) for id_, count in cases.items())
+        return ahead * (perf_counter() - self._started) / measured

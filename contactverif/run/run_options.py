@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 from contactverif.contract.errors import MisuseError
-from contactverif.run.profiles import Profile, Shrink, profile_named
+from contactverif.run.profiles import FIRST_CASES, Profile, Shrink, profile_named
 
 if TYPE_CHECKING:
     from contactverif.isolation.limits import Limits
@@ -122,6 +122,12 @@ class RunOptions:
             "answers that depend on earlier calls."
         ),
     ] = False
+    exit_first: Annotated[
+        bool, Option("Stop at the first row that is wrong, and ask nothing more.", flags=("--exitfirst", "-x"))
+    ] = False
+    quick: Annotated[bool, Option("Ask the first round alone: cheap properties, 5 cases each.", flags=("--quick",))] = (
+        False
+    )
     last_failed: Annotated[
         bool, Option("Ask nothing but the cases that failed in earlier runs, which `.contactverif` keeps.")
     ] = False
@@ -231,7 +237,8 @@ class RunOptions:
         """
         from contactverif.plugins.registry import has_engine, matching_ids
 
-        size = profile_named(self.profile or "dev").resolve(examples=self.examples, seed=self.seed, fresh=fresh_seed)
+        examples = FIRST_CASES if self.quick and self.examples is None else self.examples
+        size = profile_named(self.profile or "dev").resolve(examples=examples, seed=self.seed, fresh=fresh_seed)
         isolation, opened = self.settled_isolation()
         return replace(
             self,

@@ -34,7 +34,7 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote import code_files, note_code_files, start_process
 from contactverif.plugins.registry import installed_properties, load_property, load_subject, start_loading
 
-Phase = Literal["first call (compiles)", "asking again", "drawing", "judging", "diagnosis", "shrinking"]
+Phase = Literal["first call (compiles)", "asking again", "first round", "drawing", "judging", "diagnosis", "shrinking"]
 _SILENCE = 5.0  # Seconds after which the last step is reported once more, to show that the run goes on.
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
@@ -59,6 +59,14 @@ class RunProgress:
     seconds_left: float | None  # None as long as nothing is measured.
 
 
+def in_words(seconds: float) -> str:
+    """Return a guessed time with a unit that suits it."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"about {seconds / size:.0f} {unit}"
+    return f"about {seconds:.0f} s"
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """The progress of a run with one property of one formulation, named as on the command line.
@@ -73,7 +81,7 @@ class Progress:
     planned: int
     row: Row | None = None  # The row, once all its cases are judged.
     of_run: RunProgress | None = field(default=None, compare=False)  # How far the run is, with some steps.
-    first_seconds: float | None = None  # Seconds of a pairing and a residual, once the formulation is warm.
+    remark: str = ""  # A sentence about the run, once it is known.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +112,7 @@ class Scheduler:
         if isinstance(executor, ThreadPoolExecutor):  # Hypothesis does not allow threads.
             raise MisuseError("executor", "a ThreadPoolExecutor", "one with processes, such as ProcessPoolExecutor")
         self._executor, self._report = executor, report
+        self.is_watched = report is not None
         n_workers = int(getattr(executor, "_max_workers", _FURTHER_WORKERS))
         self._takes_part = subject is not None
         self._limit = 1 if executor is None else (4 if self._takes_part else 2) * n_workers

@@ -129,6 +129,12 @@ def draw_block(
     return PlannedCases(tuple(draw.case for draw in draws), short, short or end == examples)
 
 
+def draw_first(source: CaseSource, seed: str, count: int) -> tuple[Case, ...]:
+    """Return so many of the first planned cases; none of a finite list, or where hypothesis' engine draws."""
+    draws = None if isinstance(source, tuple) else _draw_block(source, seed, count, 0)
+    return tuple(draw.case for draw in draws or ())
+
+
 def draws_blocks(source: CaseSource, *, seed: str, examples: int) -> bool:
     """Return whether cases are drawn block by block; otherwise the first block has all cases."""
     return not isinstance(source, tuple) and _draw_block(source, seed, examples, 0) is not None

@@ -80,6 +80,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
 @_define(
     id="balance.moment",
     rank=230,
+    turn=1,
     quantities=(MOMENT_IMBALANCE,),
     promise=lambda traits: traits.promises.conserves_moment,
 )

@@ -231,7 +231,7 @@ _define = partial(
 @_define(
     id="unilateral",
     rank=60,
-    turn=2,
+    turn=5,
     quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH),
     asks=WITH_BARRIER,
 )
@@ -363,6 +363,7 @@ def _pull_of_points(state: FrozenState) -> tuple[float, float] | None:
 @_define(
     id="nodal-push",
     rank=110,
+    turn=4,
     quantities=(PULL_OF_NODE,),
     promise=lambda traits: traits.promises.nodes_push,
     usual_undecided=0.002,

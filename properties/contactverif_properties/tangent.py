@@ -345,7 +345,7 @@ _define = partial(
 @_define(
     id="tangent.sparsity",
     rank=30,
-    turn=5,
+    turn=9,
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
 )

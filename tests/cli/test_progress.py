@@ -44,11 +44,17 @@ def test_the_time_left_has_a_unit_that_suits_it(
     assert capsys.readouterr().err.endswith(f"{words}\n")
 
 
-def test_a_slow_formulation_is_told_what_a_call_costs(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
-    for name, seconds in (("fast", 0.001), ("slow", 0.25)):
-        bar.show_progress(Progress(name, "", "first call (compiles)", 1, 1, first_seconds=seconds))
-    lines = capsys.readouterr().err.splitlines()
-    assert [line for line in lines if "take" in line] == ["slow: a pairing and a residual take 0.25 s"]
+def test_a_case_that_takes_long_is_told(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(7):
+        bar.show_progress(step(4, 81.0))
+    assert [line.rpartition(", ")[2] for line in capsys.readouterr().err.splitlines()] == [
+        *("about 81 s left", "about 81 s left", "this case since 15 s"),
+    ]
+
+
+def test_a_remark_is_a_line_of_its_own(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
+    bar.show_progress(Progress("", "", "first round", 1, 1, remark="first round: 3 wrong"))
+    assert capsys.readouterr().err == "first round: 3 wrong\n"
 
 
 def test_work_without_rows_has_such_lines_too(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:

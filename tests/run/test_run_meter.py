@@ -34,9 +34,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def meter_of(*questions: Property) -> RunMeter:
-    meter = RunMeter({("mine", question.id): question for question in questions}, [subject()], Sampling(100, 1))
-    meter.read({})  # The run begins.
-    return meter
+    return RunMeter({("mine", question.id): question for question in questions}, [subject()], Sampling(100, 1))
 
 
 def outcomes(count: int, seconds: float) -> list[Outcome]:
@@ -54,28 +52,35 @@ def rows_judged(count: int) -> dict[tuple[str, str], Any]:
 
 def test_what_is_left_takes_as_long_as_what_was_before(clock: Clock) -> None:
     meter = meter_of(ZERO)
-    meter.measure(ZERO.id, outcomes(20, 1.0))
-    clock.now = 10.0  # Two processes.
+    clock.now = 10.0
+    for _ in range(2):  # Two processes.
+        meter.measure(ZERO.id, outcomes(10, 1.0))
     progress = meter.read(rows_judged(20))
     assert (progress.finished, progress.planned, progress.seconds_left) == (20, 100, pytest.approx(40.0))
 
 
 def test_cases_that_solve_bodies_count_for_more_until_they_are_measured(clock: Clock) -> None:
     meter = meter_of(ZERO, SOLVED)
-    meter.measure(ZERO.id, outcomes(100, 1.0))
     clock.now = 100.0
+    meter.measure(ZERO.id, outcomes(100, 1.0))
     guess = meter.read(rows_judged(100)).seconds_left
     assert guess == pytest.approx(100 * driver._COSTS[True, False])
-    meter.measure(SOLVED.id, outcomes(1, 7.0))
     clock.now = 107.0
+    meter.measure(SOLVED.id, outcomes(1, 7.0))
     assert meter.read(rows_judged(100)).seconds_left == pytest.approx(700.0)
 
 
-def test_a_few_cases_are_no_measure(clock: Clock) -> None:
-    meter = meter_of(ZERO)
-    meter.measure(ZERO.id, outcomes(4, 1.0))
-    clock.now = 4.0
-    assert meter.read(rows_judged(4)).seconds_left is None
+def test_a_property_costs_what_its_own_cases_have_cost(clock: Clock) -> None:
+    meter = meter_of(ZERO, replace(ZERO, id="dear"))
+    assert meter.read({}).seconds_left is None
+    clock.now = 50.0
+    meter.measure("dear", outcomes(5, 10.0))
+    clock.now = 55.0
+    meter.measure(ZERO.id, outcomes(5, 1.0))
+    assert meter.read({}).seconds_left == pytest.approx(1100.0)
+    price = meter.price({"mine": 0.4})
+    assert price == ". An evaluation of mine takes 0.4 s: the whole takes about 18 min, with --examples 10 about 110 s"
+    assert meter.price({"mine": 0.001}) == ""
 
 
 def test_at_the_end_of_a_run_all_cases_are_judged_and_nothing_is_left() -> None:

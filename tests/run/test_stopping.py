@@ -10,7 +10,7 @@ import contactverif_nts
 from contactverif.contract.result import Result, Run
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Promises, Traits
-from contactverif.run.run import run
+from contactverif.run.run import Stop, run
 from contactverif_nts import nts
 
 FAILS = Promises(conserves_force=False)
@@ -41,11 +41,14 @@ MISTAKES: Mapping[str, tuple[Callable[[int, Any], Any], str]] = {
 }
 
 
-def judge_few(name: str, *, known: str = "", keep_going: bool = False, ids: tuple[str, ...] = IDS) -> Run:
+STOPS: tuple[tuple[Stop, Result], ...] = (("foundation", Result.OMITTED), ("never", Result.PASS))
+
+
+def judge_few(name: str, *, known: str = "", stop: Stop = "foundation", ids: tuple[str, ...] = IDS) -> Run:
     subject = Subject(name, lambda *, penalty: Wrong(MISTAKES[name][0], penalty))
     reasons = {known: "known"} if known else {}
     questions = [load_property(id_) for id_ in ids]
-    return run([subject], questions, examples=4, seed=1, known=reasons, keep_going=keep_going, shrink="none")
+    return run([subject], questions, examples=4, seed=1, known=reasons, stop=stop, shrink="none")
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -60,7 +63,7 @@ def test_what_follows_from_the_first_answers_is_left_out(name: str) -> None:
 
 @pytest.mark.parametrize("name", MISTAKES)
 def test_everything_is_asked_if_the_user_wants_that(name: str) -> None:
-    assert not [row for row in judge_few(name, keep_going=True).rows if row.omitted]
+    assert not [row for row in judge_few(name, stop="never").rows if row.omitted]
 
 
 def test_a_known_failure_stops_nothing() -> None:
@@ -76,10 +79,10 @@ def test_traits_that_name_no_witness_are_told_before_anything_is_asked() -> None
     """The person mends the traits first; what else there is would have to be asked again."""
     questions = [load_property(id_) for id_ in IDS]
     unproven = Subject("mine", lambda *, penalty: Changed(nts(penalty=penalty), traits=Traits(FAILS)))
-    for keep_going, others in ((False, Result.OMITTED), (True, Result.PASS)):
+    for stop, others in STOPS:
         rows = {
             row.property_id: row
-            for row in run([unproven], questions, examples=4, seed=1, keep_going=keep_going, shrink="none").rows
+            for row in run([unproven], questions, examples=4, seed=1, stop=stop, shrink="none").rows
         }
         assert rows["balance.force"].result is Result.WRONG_TRAITS
         assert "witness" in rows["balance.force"].reason

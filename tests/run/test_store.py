@@ -200,12 +200,12 @@ def test_a_block_that_is_judged_is_not_drawn(monkeypatch: pytest.MonkeyPatch, tm
 
 def test_a_run_that_is_stopped_says_how_far_each_row_is() -> None:
     def interrupt(step: Progress) -> None:
-        if (step.formulation, step.property_id, step.count) == ("vts-ppt", "patch.flat.transmission", 28):
+        if (step.formulation, step.property_id, step.count) == ("vts-ppt", "patch.flat.resultant", 28):
             raise KeyboardInterrupt
 
     with pytest.raises(RunStopped) as stopped:
         judge(None, interrupt)
-    *_, first, second = stopped.value.run.rows
+    *_, second, first = stopped.value.run.rows
     assert (first.verdict, len(first.outcomes)) == (Verdict.PASS, 30)
     assert (second.verdict, second.judged, second.planned) == (Verdict.NOT_JUDGED, 25, 30)
     assert second.reason == "stopped: 25 of 30 cases judged"
