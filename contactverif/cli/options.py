@@ -38,7 +38,7 @@ _PANELS = {  # {option, or group of options: its panel in a help page}; all othe
     SAMPLING: "Cases",
     PLACE: "Mesh or scene",
     ISOLATION: "Processes of plugins",
-    **dict.fromkeys(("out", "pictures", "verbose", "quiet", "show"), _RESULTS),
+    **dict.fromkeys(("out", "pictures", "verbose", "quiet", "show", "durations"), _RESULTS),
     **dict.fromkeys(("last_failed", "memory"), EARLIER),
 }
 
@@ -54,6 +54,7 @@ class Screen:
     show: Annotated[
         Literal["first", "all"], Option("The counterexamples that are drawn: the most telling one, or all.")
     ] = "first"
+    durations: Annotated[int, Option("Show the N rows that took longest.", "N")] = 0
 
 
 @dataclass(frozen=True, slots=True)

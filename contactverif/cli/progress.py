@@ -25,12 +25,12 @@ from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
 _BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
-_LONG_CASE = 10.0  # Seconds of a case that is worth a word.
+_LONG_CASE = 10.0  # Seconds without news that are worth a word.
 _PAUSE = 5.0  # Seconds between two lines about the whole, where there is no terminal.
 
 
 class _TimeColumn(TimeElapsedColumn):
-    """The time of a case that takes long, or the time that is left, where there is a guess, or that since the start."""
+    """How long there is no news, if that is long, or the time that is left, where there is a guess, or that so far."""
 
     def render(self, task: Task) -> Text:
         words = _patience(monotonic() - task.fields["since"]) or task.fields["left"]
@@ -38,8 +38,7 @@ class _TimeColumn(TimeElapsedColumn):
 
 
 def _patience(seconds: float) -> str:
-    """Return for how long a case runs, if that is long."""
-    return f"this case since {seconds:.0f} s" if seconds >= _LONG_CASE else ""
+    return f"no news for {seconds:.0f} s" if seconds >= _LONG_CASE else ""
 
 
 class Bar:
@@ -122,7 +121,7 @@ class Bar:
             self._last, self._since = description, now
         if self._progress.disable:
             if now >= self._next_line:
-                self._next_line = now + _PAUSE
+                self._next_line = now + max(_PAUSE, (now - self._since) / 2)
                 total = "" if n_planned is None else f"; {n_finished:,} of some {n_planned:,} in all"
                 parts = f"{description}{total}", left, _patience(now - self._since)
                 self._print(Text(", ".join(filter(None, parts)), style=PLAIN_STYLE))

@@ -208,7 +208,8 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
     yield from _part("also wrong", wrong[1:], width, _MOST_WRONG)
     if omitted := [row for row in rows if row.omitted]:
         reason = omitted[0].reason.removeprefix(results.OMITTED)
-        yield fold(f"{len(omitted)} properties were not asked: {reason}. --keep-going asks them all.", width, indent=0)
+        advice = "" if reason.endswith("(-x)") else " --keep-going asks them all."
+        yield fold(f"{len(omitted)} properties were not asked: {reason}.{advice}", width, indent=0)
     for row in rows:  # A doubt about a formulation that passes, or how stiff its springs are.
         if row.result is Result.PASS and (remark := "; ".join(filter(None, (row.suspicion, _finding(row))))):
             yield fold(f"{row.property_id} passes, and says: {remark}", width, "yellow", indent=0)

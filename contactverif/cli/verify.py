@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -150,7 +151,7 @@ class Job:
         loaders = begin_loading(self.options.names, self.limits(), executor)
         questions = load_properties(self.options.properties, engines=True)
         if self.options.quick:  # What does not load is told.
-            asked = [each for each in questions if isinstance(each, NotLoaded) or each.turn < LAST_TURN]
+            asked = tuple(each for each in questions if isinstance(each, NotLoaded) or each.turn < LAST_TURN)
             if not asked:
                 words = f"{len(questions)} properties, none of them of the first round"
                 raise MisuseError("--quick", words, "no --property, or -p 'balance.*'")
@@ -286,6 +287,10 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
             gc.freeze()  # What is loaded stays: no collection walks over it again, 2 to 3 % of a run.
             options = job.run_options(progress=bar.show_progress, executor=executor, store=store)
             result = run(*plugins, **options)
+            if job.options.quick:
+                n_all, size = len(job.options.properties), job.options.size
+                words = f"{len(plugins.questions)} of {n_all} properties, {size.examples} cases each, seed {size.seed}"
+                result = replace(result, provenance={**result.provenance, "asked": words})
         if failures is not None:
             failures.update(result.rows)
         missing = partial(find_missing, result, *plugins, job.sampling)
@@ -317,6 +322,9 @@ def show_end(
     annotate(result)
     if not screen.quiet:
         show_result()
+        longest = sorted(result.rows, key=attrgetter("seconds"), reverse=True)[: max(screen.durations, 0)]
+        for row in longest:
+            show(f"{row.seconds:8.1f} s  {row.formulation} {row.property_id}, {row.judged} cases")
         if stored := result.provenance.get(STORED):
             typer.echo(f"outcomes that were judged before: {stored}")
         if job.pictures is not None:

@@ -611,6 +611,7 @@ def _in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[Case
 # How far the run is
 
 _LIST = 8  # Cases of a list that is not made yet: making all of them takes a second.
+_PATIENCE = 60.0  # Seconds of a run for which a person waits without a word.
 _FEW = 10  # Cases of a property in a short run.
 # Seconds of a case over those of a drawn one that solves no bodies, of VTS-PPT: {(solves bodies, is in a list): ratio}.
 # They count only until the first cases of that kind are measured.
@@ -634,7 +635,7 @@ class RunMeter:
             if not (question.refusal_of(subject_of[name]) or question.needs - subject_of[name].provides):
                 self._planned[name, id_] = _LIST if is_list else sampling.examples
 
-    def measure(self, property_id: str, outcomes: Iterable[Outcome]) -> None:
+    def measure(self, property_id: str, outcomes: Sequence[Outcome]) -> None:
         """Note what cases have cost that were judged just now."""
         if self._started is None:  # First calls, which may compile, say nothing about the cases.
             self._started = perf_counter() - sum(outcome.seconds for outcome in outcomes)
@@ -660,7 +661,7 @@ class RunMeter:
             whole[id_] += count
             few[id_] += count if self._kinds[id_][1] else min(count, _FEW)
         slowest, times = max(calls, key=calls.__getitem__, default=""), (self._seconds_of(whole), self._seconds_of(few))
-        if calls.get(slowest, 0.0) < judge.SLOW_CALL or times[0] is None or times[1] is None:
+        if calls.get(slowest, 0.0) < judge.SLOW_CALL or times[0] is None or times[1] is None or times[0] < _PATIENCE:
             return ""
         words = f". An evaluation of {slowest} takes {calls[slowest]:.2g} s: the whole takes {in_words(times[0])}"
         return f"{words}, with --examples {_FEW} {in_words(times[1])}" if whole != few else words

@@ -14,7 +14,7 @@ from __future__ import annotations
 import io
 import pickle
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -35,7 +35,7 @@ from contactverif.isolation.remote import code_files, note_code_files, start_pro
 from contactverif.plugins.registry import installed_properties, load_property, load_subject, start_loading
 
 Phase = Literal["first call (compiles)", "asking again", "first round", "drawing", "judging", "diagnosis", "shrinking"]
-_SILENCE = 5.0  # Seconds after which the last step is reported once more, to show that the run goes on.
+_SILENCE = 5.0  # Seconds after which the job that all wait for is reported, to show that the run goes on.
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.
 
@@ -136,6 +136,8 @@ class Scheduler:
                 if future is not None:
                     running[future] = job
                     continue
+                if job.progress is not None:
+                    self.report(job.progress)
                 result = job.function(*job.arguments, **self._counting(job.progress))
                 waiting.appendleft(iter(job.then(result) or ()))
             for future in self._wait(running, is_patient=job is None):
@@ -147,13 +149,14 @@ class Scheduler:
     def _has_workers(self) -> bool:
         return self._start is None or self._start.done()
 
-    def _wait(self, running: Iterable[Future[bytes]], *, is_patient: bool) -> Iterable[Future[bytes]]:
+    def _wait(self, running: Mapping[Future[bytes], Job], *, is_patient: bool) -> Iterable[Future[bytes]]:
         while running:
             ended = wait(running, _SILENCE if is_patient else 0, FIRST_COMPLETED).done
             if ended or not is_patient:
                 return ended
-            if self._report is not None and self._last is not None:
-                self._report(replace(self._last, row=None))
+            step = next(iter(running.values())).progress or self._last
+            if self._report is not None and step is not None:
+                self._report(replace(step, row=None))
         return ()
 
     def report(self, step: Progress) -> None:

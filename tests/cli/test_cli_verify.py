@@ -274,6 +274,27 @@ def test_one_line_is_enough_for_a_script(ask: Ask) -> None:
 
 
 @pytest.mark.usefixtures("strangers")
+def test_the_first_round_alone_says_how_little_it_asks(ask: Ask, tmp_path: Path) -> None:
+    report = tmp_path / "r.nc"
+    answer = ask("verify vts-ppt --quick --seed 1 --durations 2 -p balance.* -p swap -p patch.curved --out", report)
+    assert answer.status == 0
+    assert "asked: 2 of 4 properties, 5 cases each, seed 1" in answer.out
+    assert re.search(r"\n +\d+\.\d s  vts-ppt balance\.\w+, 5 cases\n +\d+\.\d s  vts-ppt balance", answer.out)
+    assert "asked: 2 of 4 properties" in ask("report", report).out
+    check_mistake(
+        ask("verify vts-ppt --quick -p swap"), "--quick: found 1 properties, none of them of the first round.*"
+    )
+
+
+@pytest.mark.usefixtures("strangers")
+def test_the_first_row_that_is_wrong_can_be_the_last_one_that_is_asked(ask: Ask) -> None:
+    answer = ask(f"verify half -x -p purity -p balance.* -p total-stiffness -p swap {FEW}", columns=COLUMNS)
+    assert answer.status == 1
+    assert re.search(r"properties were not asked: half .* is wrong \(-x\)\.\n", " ".join(answer.out.split("\n ")))
+    assert "--keep-going" not in answer.out
+
+
+@pytest.mark.usefixtures("strangers")
 def test_what_is_left_out_has_one_line_that_says_why_and_how_to_ask_it(ask: Ask) -> None:
     answer = ask(f"verify remembering {CHEAP}", columns=COLUMNS)
     assert answer.status == 1
@@ -605,7 +626,7 @@ def test_what_fails_is_kept_and_asked_first_until_it_passes(
     lines: list[str] = []
 
     def show_progress(bar: progress.Bar, step: Progress) -> None:
-        if step.row is not None:
+        if step.row is not None and step.phase != "first round":
             lines.append(f"{step.row.property_id} {step.row.planned}")
 
     monkeypatch.setattr(progress.Bar, "show_progress", show_progress)

@@ -48,7 +48,7 @@ def test_a_case_that_takes_long_is_told(bar: Bar, capsys: pytest.CaptureFixture[
     for _ in range(7):
         bar.show_progress(step(4, 81.0))
     assert [line.rpartition(", ")[2] for line in capsys.readouterr().err.splitlines()] == [
-        *("about 81 s left", "about 81 s left", "this case since 15 s"),
+        *("about 81 s left", "about 81 s left", "no news for 15 s"),
     ]
 
 
