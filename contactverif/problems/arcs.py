@@ -23,15 +23,7 @@ SEGMENTS = (3, 4)  # Numbers of segments of slave and master on the coarsest mes
 
 @dataclass(frozen=True, slots=True)
 class Arcs:
-    """Two concentric arcs.
-
-    Examples
-    --------
-    >>> from contactverif.problems.arcs import Arcs
-    >>> arcs = Arcs(convex_slave=True)
-    >>> arcs.slave_radius, arcs.pressure
-    (4.1, 1.0)
-    """
+    """Two concentric arcs."""
 
     radius: float = 4.0  # The radius of the master, a length.
     depth: float = 0.1  # The penetration d > 0, a length.

@@ -7,9 +7,7 @@ Those are assumptions, and the attribute `assumptions` of each scene says so.
 Rule for the next editor: this file is data. A new scene of `verify --scene` is one entry of `BLOCKS` or `SCENES`, with
 its source. A scene of `bench`, with an exact solution, is a `Problem` (`problem.py`).
 
-References
-----------
-Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Sections 4, 5 and 7.
+Source: Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Sections 4, 5 and 7.
 """
 
 import inspect

@@ -12,9 +12,7 @@ open, and without contact nothing holds the disk; so the first guess lowers it.
 Rule for the next editor: the middle of an element of the foundation, not a node, lies in the middle of the contact. The
 force of a node-to-segment formulation jumps at a slave node that symmetry keeps on a master node.
 
-References
-----------
-Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Section 7.2.
+Source: Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Section 7.2.
 """
 
 from dataclasses import dataclass, replace
@@ -71,11 +69,6 @@ class DiskProblem:
         """The half-width of the contact after Hertz, a length."""
         return half_width(self.force, self.radius, self.stiffness)
 
-    @property
-    def layer_half_width(self) -> float:
-        """The half-width of the contact if the penalty's layer alone gave way, a length."""
-        return layer_half_width(self.force, self.radius, self.penalty)
-
     def winkler_contact(self) -> LinePressure:
         """Return the contact after Hertz with the penalty as a Winkler layer, to which a penalty method converges."""
         return solve_winkler_contact(self.force, self.radius, self.stiffness, self.penalty)
@@ -96,7 +89,7 @@ def disk_on_foundation(
         actual = f"{problem.force:g}, with which Hertz' contact is {2 * a:.3g} wide"
         raise MisuseError("force", actual, f"a contact from {2 * low:.3g} to {2 * high:.3g} wide")
     widest = WIDEST * FINE * a
-    wide = problem.layer_half_width
+    wide = layer_half_width(problem.force, problem.radius, problem.penalty)
     wide = problem.winkler_contact().half_width if wide <= widest else wide
     if wide > widest:
         actual = f"{problem.penalty:g}, with which the contact is {2 * wide:.3g} wide"

@@ -7,10 +7,8 @@ the answer with the layer. Nothing here knows a mesh, a body or a formulation.
 Axes: x along the surface, the depth η ≥ 0 into the body. A stress is positive in tension. Displacements are those of
 plane strain, with E' = E/(1 − ν²) and ν' = ν/(1 − ν); they grow like ln r, so that only differences mean something.
 
-References
-----------
-K. L. Johnson, Contact Mechanics (1985): equations 2.14, 2.19 and 2.24 (line load), Sections 4.2(c) (line contact), 4.3
-and 5.8 (elastic foundation), equation 4.49 (McEwan's stresses).
+Source: K. L. Johnson, Contact Mechanics (1985): equations 2.14, 2.19 and 2.24 (line load), Sections 4.2(c) (line
+contact), 4.3 and 5.8 (elastic foundation), equation 4.49 (McEwan's stresses).
 """
 
 from collections.abc import Callable

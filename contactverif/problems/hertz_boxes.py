@@ -16,9 +16,7 @@ contact divide segments one to two and two to one, so that errors fall evenly: w
 puts them, they scatter by a factor of 3. Cells grow away from the contact by a share that falls like √h, so that the
 error of the mesh itself falls like h.
 
-References
-----------
-K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
+Source: K. L. Johnson, Contact Mechanics (1985), Sections 2.3, 4.2(c) and 5.8.
 """
 
 from collections.abc import Iterator

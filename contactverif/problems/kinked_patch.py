@@ -32,19 +32,7 @@ _FACTS = ("line", "height", "pressure", "young", "poisson")  # The attributes of
 
 @dataclass(frozen=True, slots=True)
 class KinkedPatch:
-    """Two blocks on a broken line.
-
-    Examples
-    --------
-    A roof: two normals, and a penetration of 0.1 along both is a translation.
-
-    >>> from contactverif.problems.kinked_patch import KinkedPatch
-    >>> roof = KinkedPatch(line=((0.0, 0.0), (4.0, 3.0), (8.0, 0.0)))
-    >>> roof.normals.tolist()
-    [[-0.6, 0.8], [0.6, 0.8]]
-    >>> roof.translation(0.1).round(12).tolist()
-    [0.0, -0.125]
-    """
+    """Two blocks on a broken line."""
 
     line: tuple[tuple[float, float], ...]  # The ends of the facets from left to right, a length each.
     height: float = 6.0  # The distance of bottom and top from y = 0, a length.

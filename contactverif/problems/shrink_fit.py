@@ -14,9 +14,7 @@ Rules for the next editor: `ShrinkFit` knows no mesh and no formulation, so that
 scene holds a quarter, cut along both lines of symmetry, so that nothing but contact loads the rings. A cut has ends of
 both surfaces, and the foot of the slave's end may lie just past that of the master; whole rings have no ends.
 
-References
-----------
-S. P. Timoshenko & J. N. Goodier, Theory of Elasticity (1970), Section 28 (Lamé's thick-walled cylinder).
+Source: S. P. Timoshenko & J. N. Goodier, Theory of Elasticity (1970), Section 28 (Lamé's thick-walled cylinder).
 """
 
 from collections.abc import Callable

@@ -8,9 +8,8 @@ symmetry; the far edges move as the exact field does there, so that nothing is c
 Each body has its own depth η = |y| ≥ 0: the upper one is 0 < y < H, the lower one −H < y < 0. The field is one of
 linear elasticity: it is exact but for terms of the order of p1/E and of the slope of the surfaces, 1e-6 here.
 
-References
-----------
-K. L. Johnson, Contact Mechanics (1985), Sections 2.2 (stress function of a half-plane) and 13.2 (wavy surfaces).
+Source: K. L. Johnson, Contact Mechanics (1985), Sections 2.2 (stress function of a half-plane) and 13.2 (wavy
+surfaces).
 """
 
 from collections.abc import Iterator

@@ -180,9 +180,7 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
     zero at the node that overhangs, not at the end of the master. `tau` is the part of a master segment by which a foot
     may lie past its free end and still count.
 
-    References
-    ----------
-    Chen & Hisada, as Zavarise & De Lorenzis (2009), Section 1, describe their method; tangent: here.
+    Source: Chen & Hisada, as Zavarise & De Lorenzis (2009), Section 1, describe their method; tangent: here.
     """
     quadrature = Quadrature.gauss(N_POINTS, choose("area", area, AREAS))
     traits = CELL_TRAITS.revise(

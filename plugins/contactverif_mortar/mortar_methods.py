@@ -230,9 +230,7 @@ def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -
     normal, the gradient of the gap is not. With `normals="averaged"` normals are averaged at slave nodes and
     interpolated in between, which is smoother, and fails the patch test on a kinked surface.
 
-    References
-    ----------
-    Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
+    Source: Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
     return Mortar(*_make(penalty, area, normals, dual=False))
 
@@ -242,9 +240,7 @@ def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segmen
 
     Its promises are those of `mortar`. The weighted gap of a node is the value of a linear fit to the gaps around it.
 
-    References
-    ----------
-    Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
+    Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
     return Mortar(*_make(penalty, area, normals, dual=True))
 
@@ -255,9 +251,7 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
     Its promises are those of `mortar`, except that no continuity is promised: at given multipliers forces jump where a
     node is released. The constraints are independent, so the multipliers are unique.
 
-    References
-    ----------
-    Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
+    Source: Puso & Laursen, Comput. Methods Appl. Mech. Engrg 193 (2004) 601–629.
     """
     return MortarMultipliers(*_make(penalty, area, normals, dual=False, multipliers=True))
 
@@ -267,9 +261,7 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
 
     Its promises are those of `mortar_lm`.
 
-    References
-    ----------
-    Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
+    Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
     return MortarMultipliers(*_make(penalty, area, normals, dual=True, multipliers=True))
 

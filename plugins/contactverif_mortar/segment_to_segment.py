@@ -155,9 +155,7 @@ def sts(*, penalty: float, area: str = "current") -> SegmentToSegment:
     test is passed, and an overhang is covered. At a high penalty its springs are more conditions than the surfaces can
     follow, and it locks. The tangent is exact and unsymmetric: the gradient of the gap is not along the slave's normal.
 
-    References
-    ----------
-    Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here.
+    Source: Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here.
     """
     quadrature = Quadrature.gauss(N_POINTS, choose("area", area, AREAS))
     source = "Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; segmentation and tangent: here"

@@ -200,9 +200,7 @@ def mortar_two_half_pass(*, penalty: float, area: str = "current", n: int = 2) -
     too compliant at 100 E/h, and 0.85 times at 110 E/h. Five points move this beyond 1e3 E/h. For that reason nothing
     is promised of kinks with stiff springs either.
 
-    References
-    ----------
-    Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179.
+    Source: Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (2018), arXiv 1712.01179.
     """
     current = choose("area", area, AREAS)
     witnesses = {"balance.force": "tilted", "balance.moment": "tilted", "symmetric": "offset-c", **LOCKING_WITNESSES}

@@ -176,9 +176,7 @@ def vts_ppt(
     master segment that the area covers. It does not conserve force and moment where the surfaces are tilted: the slave
     pushes with lengths along itself, the master with lengths projected on it. It does not cover an overhang.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Appendix A.
+    Source: Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Appendix A.
     """
     rule = choose("free_end", free_end, FREE_ENDS)
     return PatchTestPassing(
@@ -202,9 +200,7 @@ def vts_ppt_basic(
     The forces and their promises are those of `vts_ppt`. The tangent is promised to be approximate: it treats each
     virtual slave node as if it pressed on one master segment only.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
+    Source: Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
     """
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
     return replace(consistent, consistent=False, traits=_basic_promises(consistent.free_end, n))
@@ -223,9 +219,7 @@ def vts_ppt_balanced(
     A walk does not begin where the whole area of competence lies past one end of V's master segment: its part of that
     segment is negative, and S may vanish. Eq. 6 holds there, which is balanced as well.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Boxes 1–3 and Appendix A; balance and "cover": here.
+    Source: Zavarise & De Lorenzis (2009), Boxes 1–3 and Appendix A; balance and "cover": here.
     """
     current = choose("area", area, AREAS) == CURRENT
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
@@ -253,9 +247,7 @@ def vts_ppt_lm(
     singular in the positions too, and Newton's method may find no solution though there is an exact one (case C with
     each segment divided by two). With n = 1 neither happens.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Sections 6 and 7.1; rows and tangent: here.
+    Source: Zavarise & De Lorenzis (2009), Sections 6 and 7.1; rows and tangent: here.
     """
     make = choose("transmission", transmission, {"printed": vts_ppt, "balanced": vts_ppt_balanced})
     springs = make(penalty=penalty, n=n, tau=tau, threads=threads, **({"free_end": free_end} if free_end else {}))

@@ -230,9 +230,7 @@ def nts(*, penalty: float, tau: float = 1e-2) -> PointContact:
     The nodal springs know nothing of areas, so a uniform pressure does not come out on meshes of unequal segments: it
     fails the flat patch test (case A1). Its tangent is exact and symmetric.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
+    Source: Zavarise & De Lorenzis (2009), Section 4.1, Eq. 6 with F = ε g.
     """
     traits = _traits("a1", "nodal", None, symmetric=True, passes_normal=False, table="nts")
     return _points_at([-1.0, 1.0], [0.5, 0.5], traits, penalty, tau, nts_force.NODAL, at_nodes=True)
@@ -244,9 +242,7 @@ def nts_ar(*, penalty: float, area: str = "current", tau: float = 1e-2) -> Point
     The slave side is loaded exactly, the master side is not where a slave node's area covers several master segments:
     it fails the flat patch test (case B). Its tangent is exact, and symmetric with reference areas.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Section 4.2, Eq. 6 with F = ε̂ g a.
+    Source: Zavarise & De Lorenzis (2009), Section 4.2, Eq. 6 with F = ε̂ g a.
     """
     area_from = choose("area", area, AREAS)
     traits = _traits("b", "distributed", area_from, table="nts-ar")
@@ -259,9 +255,7 @@ def vts_g(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e-
     A Gauss point does not balance the moment of the part of the segment that it stands for, so it fails the flat patch
     test (case B). Its tangent is exact, and symmetric with reference areas.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g w l_AB / 2.
+    Source: Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g w l_AB / 2.
     """
     c, weights = np.polynomial.legendre.leggauss(check_count(n))
     area_from = choose("area", area, AREAS)
@@ -275,9 +269,7 @@ def vts_me(*, penalty: float, n: int = 2, area: str = "current", tau: float = 1e
     Moments balance where each part faces one master segment only, as in case B. Where a part covers several, it fails
     the flat patch test (case C′; with an odd n also case B). Its tangent is exact, and symmetric with reference areas.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g l_AB / n.
+    Source: Zavarise & De Lorenzis (2009), Section 5.1.2, Eq. 6 with F = ε̂ g l_AB / n.
     """
     n = check_count(n)
     area_from = choose("area", area, AREAS)
@@ -294,9 +286,7 @@ def nts_lm(*, penalty: float, tau: float = 1e-2) -> PointContact:
     It fails the flat patch test in one pass (case B): the multipliers fit the gaps at the slave nodes only, and the
     master nodes get what Eq. 6 hands on. Its constraints are independent, and its saddle point is symmetric.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Section 5.1.3; rows and tangent: here.
+    Source: Zavarise & De Lorenzis (2009), Section 5.1.3; rows and tangent: here.
     """
     springs = nts(penalty=penalty, tau=tau)
     # On A1 and A2 nodal forces are free to be the right ones.
@@ -313,9 +303,7 @@ def vts_me_lm(*, penalty: float, n: int = 2, area: str = "current", tau: float =
     Its promises are those of `vts_me`: it fails the flat patch test (case C′). With n ≥ 2 its multipliers are not
     unique (case A1).
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Sections 5.1.3 and 6; rows and tangent: here.
+    Source: Zavarise & De Lorenzis (2009), Sections 5.1.3 and 6; rows and tangent: here.
     """
     springs = vts_me(penalty=penalty, n=n, area=area, tau=tau)
     return replace(springs, traits=with_multipliers(springs.traits, n))

@@ -120,9 +120,7 @@ def two_pass(*, penalty: float, inner: Callable[..., Any]) -> TwoPass:
     With a penalty two passes fail the flat patch test (case A1): springs on both sides give twice the pressure. With
     nodal multipliers that balance force and moment they pass it. All other promises are those of the formulation.
 
-    References
-    ----------
-    Zavarise & De Lorenzis (2009), Sections 1 and 5.
+    Source: Zavarise & De Lorenzis (2009), Sections 1 and 5.
     """
     return TwoPass(Subject("inner", inner), penalty)
 

@@ -101,9 +101,7 @@ def sts_3d(*, penalty: float) -> CellSprings:
     A cell of triangles has three points a triangle of its fan, which are exact for a linear gap × a shape function; of
     quadrilaterals it has six.
 
-    References
-    ----------
-    Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; on faces: here.
+    Source: Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; on faces: here.
     """
     source = "Zavarise & Wriggers, Math. Comput. Modelling 28 (1998) 497–515; on faces: here"
     traits = SURFACE_TRAITS.revise(faces=(3, 4), integrates_linear_gap=True, source=source)
@@ -210,9 +208,8 @@ def _forces(n_slave: int, corners: Array, codes: IntArray, pressure: Array) -> A
 def mortar_3d(*, penalty: float) -> SurfaceMortar:
     """Mortar in three dimensions: nodal pressures from weighted gaps, over exactly cut cells.
 
-    References
-    ----------
-    Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629, with the normal of the slave face: here.
+    Source: Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629, with the normal of the slave face:
+    here.
     """
     source = "Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629; the slave's normal: here"
     return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source), check_penalty(penalty))
@@ -364,9 +361,7 @@ def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
 def vts_ppt_3d(*, penalty: float) -> FaceQuarters:
     """Virtual slave nodes at the centres of four equal parts of each triangle, pressing on all master faces below.
 
-    References
-    ----------
-    Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Section 8.
+    Source: Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Section 8.
     """
     source = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, the outlook"
     # A part that overhangs the master presses the slave with all its area, and the master with what is covered.
