@@ -7,37 +7,20 @@ Rule for the next editor: a point is formed from the stored nodes and its shape 
 formulation reports is rounded, and nothing here reads it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
-from contactverif.contract.interface import Interface, measure_heights
-from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Ratios, as_integers, dot, roots
+from contactverif.contract.interface import measure_heights
+from contactverif.oracle.exact_points import ROOT_SHIFT, Integers, Lattice, Ratios, as_integers, dot, roots
 from contactverif.oracle.flat_answers import cut_polygon, turn
 from contactverif.oracle.nearest import integers
 
 _UNIT_TRIANGLE = [(Fraction(0), Fraction(0)), (Fraction(1), Fraction(0)), (Fraction(0), Fraction(1))]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FaceLattice:
-    """The nodes of a state as integers, with the triangles of both sides."""
-
-    nodes: Integers  # (n_nodes, 3) Positions × `scale`.
-    scale: int  # A power of two.
-    slave: IntArray  # (n_faces, 3)
-    master: IntArray
-
-    @classmethod
-    def from_state(cls, interface: Interface, z: FloatArray) -> FaceLattice:
-        """Return the lattice of a state z (n_unknowns + …,), whose numbers count as the rationals that they are."""
-        values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
-        return cls(as_integers(values).reshape(-1, 3), scale, interface.slave.faces, interface.master.faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +32,7 @@ class ExactFacePoints:
     outward: Integers  # (n_points, 3) A normal of any length.
 
     @classmethod
-    def at(cls, lattice: FaceLattice, face: IntArray, shape: FloatArray) -> ExactFacePoints:
+    def at(cls, lattice: Lattice, face: IntArray, shape: FloatArray) -> Self:
         """Return the points with shape functions (n_points, 3) on slave faces (n_points,).
 
         The first shape function is what the others leave of 1, so that a point is on its face.
@@ -81,7 +64,7 @@ class FaceView:
     corners: FloatArray  # (n_points, 3, 3) The corners of the master triangle, from the point.
 
     @classmethod
-    def of_faces(cls, lattice: FaceLattice, points: ExactFacePoints, faces: IntArray, *, closest: bool) -> FaceView:
+    def of_faces(cls, lattice: Lattice, points: ExactFacePoints, faces: IntArray, *, closest: bool) -> Self:
         """Return what points see of master faces (n_points,). One that is seen edge-on has infinite numbers."""
         nodes = lattice.nodes[lattice.master[faces]]
         outward = _outward(nodes)
@@ -129,7 +112,7 @@ def _cross(a: Integers, b: Integers) -> Integers:
     return np.stack([x, y, z], axis=-1)
 
 
-def covered_shares(lattice: FaceLattice) -> list[Fraction]:
+def covered_shares(lattice: Lattice) -> list[Fraction]:
     """Return the share of each slave triangle's area (n_faces,) that sees the front of the master along its normal.
 
     Master triangles behind one another count as often as they are there, so a share may be above 1.

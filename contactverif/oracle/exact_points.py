@@ -5,14 +5,12 @@ needs a root, which is taken to 2^-128 of the lattice; that is the only rounding
 nodes and its c, never from the position that a formulation reports.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from math import isqrt
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,16 +28,17 @@ ROOT_SHIFT = 128  # The bits of a root behind the lattice's own.
 class Lattice:
     """The nodes of a state as integers."""
 
-    nodes: Integers  # (n_nodes, 2) Positions × `scale`.
+    nodes: Integers  # (n_nodes, dim) Positions × `scale`.
     scale: int  # A power of two.
-    slave: IntArray  # (n_segments, 2) The nodes of the segments.
+    slave: IntArray  # (n_segments, 2) The nodes of the segments, or (n_faces, 3) the corners of the triangles.
     master: IntArray
 
     @classmethod
-    def from_state(cls, interface: Interface, z: FloatArray) -> Lattice:
+    def from_state(cls, interface: Interface, z: FloatArray) -> Self:
         """Return the lattice of a state z (n_unknowns + …,), whose numbers count as the rationals that they are."""
         values, scale = integers(np.asarray(z, dtype=np.float64)[: interface.n_unknowns])
-        return cls(as_integers(values).reshape(-1, 2), scale, interface.slave.segments, interface.master.segments)
+        nodes = as_integers(values).reshape(-1, interface.dim)
+        return cls(nodes, scale, interface.slave.faces, interface.master.faces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,22 +50,22 @@ class ExactPoints:
     along: Integers  # (n_points, 2) The vector from the first to the second node of the slave segment of each point.
 
     @classmethod
-    def at(cls, lattice: Lattice, slave_segment: IntArray, c: FloatArray) -> ExactPoints:
+    def at(cls, lattice: Lattice, slave_segment: IntArray, c: FloatArray) -> Self:
         """Return the points at c (n_points,), from −1 at the first to +1 at the second node of a slave segment."""
         ratios = [value.as_integer_ratio() for value in c.tolist()]
         above, below = (as_integers([ratio[end] for ratio in ratios]) for end in (0, 1))
         return cls.at_ratios(lattice, slave_segment, above, below)
 
     @classmethod
-    def at_ratios(cls, lattice: Lattice, slave_segment: IntArray, above: Integers, below: Integers) -> ExactPoints:
+    def at_ratios(cls, lattice: Lattice, slave_segment: IntArray, above: Integers, below: Integers) -> Self:
         """Return the points at c = above/below, with below > 0."""
         first, second = (lattice.nodes[lattice.slave[slave_segment, end]] for end in (0, 1))
         place = (below - above)[:, None] * first + (below + above)[:, None] * second
         return cls(place, 2 * below, second - first)
 
-    def select(self, numbers: IntArray) -> ExactPoints:
+    def select(self, numbers: IntArray) -> Self:
         """Return some of the points, by number."""
-        return ExactPoints(self.place[numbers], self.weight[numbers], self.along[numbers])
+        return type(self)(self.place[numbers], self.weight[numbers], self.along[numbers])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -283,7 +282,7 @@ class Coverage:
     clear: BoolArray
 
     @classmethod
-    def along_slave_normals(cls, lattice: Lattice) -> Coverage:
+    def along_slave_normals(cls, lattice: Lattice) -> Self:
         """Return the coverage of a state by all master segments that face the slave."""
         n_slave, n_master = len(lattice.slave), len(lattice.master)
         carrier, segment = np.divmod(np.arange(n_slave * n_master), n_master)

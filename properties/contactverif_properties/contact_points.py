@@ -23,7 +23,7 @@ from contactverif.contract.property import Measurement, Property, Quantity, chec
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import exact_points
-from contactverif.oracle.exact_faces import ExactFacePoints, FaceLattice, FaceView, covered_shares
+from contactverif.oracle.exact_faces import ExactFacePoints, FaceView, covered_shares
 from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lies_in_shadow, seen_excess
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
@@ -163,7 +163,7 @@ class _FacePlaces:
     """The points of a pass that name a place on a slave face and a master face, and what is exact there."""
 
     interface: Interface  # In the roles of the pass.
-    lattice: FaceLattice
+    lattice: exact_points.Lattice
     reported: ContactPoints
     exact: ExactFacePoints
     view: FaceView  # Of the reported master face, by the rule of the formulation.
@@ -181,7 +181,7 @@ class _FacePlaces:
     def from_pass(cls, each: Pass, reported: _Reported) -> _FacePlaces:
         named = _name_places(each.points) & (each.points.master_segment >= 0)
         points, slave = each.points.select(named & ~each.points.weighted), each.interface.slave
-        lattice = FaceLattice.from_state(each.interface, each.z)
+        lattice = exact_points.Lattice.from_state(each.interface, each.z)
         exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
         closest = reported.rule == CLOSEST
         view = FaceView.of_faces(lattice, exact, points.master_segment, closest=closest)
@@ -619,7 +619,7 @@ def _find_sum_error_of_faces(each: Pass, reported: _Reported, areas: FloatArray)
         at_nodes = bool((points.slave_shape == 1).any(axis=1).all())
         covered = at_nodes and len(np.unique(corners)) == each.interface.n_slave_nodes
         return {SUM: (abs(excess) if covered else max(excess, 0.0)) / scale}
-    shares = np.array([float(share) for share in covered_shares(FaceLattice.from_state(each.interface, each.z))])
+    shares = np.array(covered_shares(exact_points.Lattice.from_state(each.interface, each.z)), dtype=np.float64)
     if (shares > 1).any():  # Master faces lie behind one another.
         return {SUM: 0.0}
     if rule not in CELLS:

@@ -8,7 +8,8 @@ from readable_cells import readable_vts_cell
 
 from contactverif import Case, Interface, Pairing, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.oracle.exact_faces import FaceLattice, covered_shares
+from contactverif.oracle.exact_faces import covered_shares
+from contactverif.oracle.exact_points import Lattice
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import SpaceMotion, flat_surface_cases, smooth_surface_cases, surface_cases
 from contactverif_surfaces import vts_cell_3d
@@ -115,7 +116,7 @@ def test_edges_that_nearly_coincide_are_cut_where_the_search_saw_it() -> None:
     z = meshes.nodes.reshape(-1)
     formulation = vts_cell_3d(penalty=1.0)
     (weight,) = formulation.contact_points(meshes, formulation.pair(meshes, z), z).weight
-    (share,) = covered_shares(FaceLattice.from_state(meshes, z))
+    (share,) = covered_shares(Lattice.from_state(meshes, z))
     area = meshes.slave.measures(meshes.nodes)[0]
     assert abs(weight - float(share) * area) <= 16 * UNIT_ROUNDOFF * area
 
