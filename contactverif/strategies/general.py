@@ -77,9 +77,8 @@ class Ring:
     master: Sequence[int]
     degrees: int  # The angle; 360 is closed.
     inner_slave: bool  # The slave is the disc, else the hole around it.
-    quarters: Sequence[
-        int
-    ]  # As of `Broken`, along the radius; then the slave is scaled until half a segment is closed.
+    # As of `Broken`, along the radius; then the slave is scaled until half a segment is closed.
+    quarters: Sequence[int]
     unit: float
 
     def __call__(self, offsets: Sequence[int]) -> samples.Panel:

@@ -23,7 +23,6 @@ from contactverif.contract.property import Measurement, Property, Quantity, chec
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle import exact_points
-from contactverif.oracle.exact_faces import ExactFacePoints, FaceView, covered_shares
 from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lies_in_shadow, seen_excess
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
@@ -165,8 +164,8 @@ class _FacePlaces:
     interface: Interface  # In the roles of the pass.
     lattice: exact_points.Lattice
     reported: ContactPoints
-    exact: ExactFacePoints
-    view: FaceView  # Of the reported master face, by the rule of the formulation.
+    exact: exact_points.ExactFacePoints
+    view: exact_points.FaceView  # Of the reported master face, by the rule of the formulation.
     # (n_points,) The length of which rounding is a share: 2 (L + |P − A| + D + |gap| D/h) Π ℓ/h over the cosine. L are
     # the longest edges of both faces, |P − A| is the way from the point to a corner. Rounding the corners of a face at
     # D turns it by D over its height h. Coordinates in a slave face of length ℓ and height h round a place by ℓ/h along
@@ -182,9 +181,9 @@ class _FacePlaces:
         named = _name_places(each.points) & (each.points.master_segment >= 0)
         points, slave = each.points.select(named & ~each.points.weighted), each.interface.slave
         lattice = exact_points.Lattice.from_state(each.interface, each.z)
-        exact = ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
+        exact = exact_points.ExactFacePoints.at(lattice, points.slave_segment, points.slave_shape)
         closest = reported.rule == CLOSEST
-        view = FaceView.of_faces(lattice, exact, points.master_segment, closest=closest)
+        view = exact_points.FaceView.of_faces(lattice, exact, points.master_segment, closest=closest)
         slave_height = slave.heights(each.positions)[points.slave_segment]
         carrier = view.heights if closest else slave_height
         edges = _longest_edges(view.corners)
@@ -214,8 +213,10 @@ class _FacePlaces:
         """Return how much farther each point's face (n_points,) is than another one with a foot inside, a length."""
         n_master, n_points = len(self.lattice.master), len(self.reported.gap)
         point, face = np.divmod(np.arange(n_points * n_master), n_master)
-        exact = ExactFacePoints(self.exact.place[point], self.exact.weight[point], self.exact.outward[point])
-        view = FaceView.of_faces(self.lattice, exact, face, closest=True)
+        exact = exact_points.ExactFacePoints(
+            self.exact.place[point], self.exact.weight[point], self.exact.outward[point]
+        )
+        view = exact_points.FaceView.of_faces(self.lattice, exact, face, closest=True)
         rounding = 4 * UNIT_ROUNDOFF * self.scale[point] * (1 + _longest_edges(view.corners) / view.heights)
         inside = view.shape.floats().min(axis=1, initial=np.inf) * view.heights > rounding
         gap = np.where(inside, np.abs(view.gap.floats()), np.inf).reshape(n_points, n_master)
@@ -383,7 +384,7 @@ def _find_errors_on_faces(each: Pass, reported: _Reported) -> Iterator[FloatArra
     turned = 1 + reported.distant / places.carrier_height
     yield _size(np.linalg.norm(view.normal.errors(points.normal), axis=1) / turned, points.active)[facing]
     points = each.points.select(_name_places(each.points))
-    exact = ExactFacePoints.at(places.lattice, points.slave_segment, points.slave_shape).positions
+    exact = exact_points.ExactFacePoints.at(places.lattice, points.slave_segment, points.slave_shape).positions
     shifts = replace(exact, below=exact.below * places.lattice.scale).errors(points.position)
     yield _size(np.abs(shifts).max(axis=1, initial=0.0), points.active) / reported.state.largest_coordinate
 
@@ -619,7 +620,8 @@ def _find_sum_error_of_faces(each: Pass, reported: _Reported, areas: FloatArray)
         at_nodes = bool((points.slave_shape == 1).any(axis=1).all())
         covered = at_nodes and len(np.unique(corners)) == each.interface.n_slave_nodes
         return {SUM: (abs(excess) if covered else max(excess, 0.0)) / scale}
-    shares = np.array(covered_shares(exact_points.Lattice.from_state(each.interface, each.z)), dtype=np.float64)
+    lattice = exact_points.Lattice.from_state(each.interface, each.z)
+    shares = np.array(exact_points.covered_shares(lattice), dtype=np.float64)
     if (shares > 1).any():  # Master faces lie behind one another.
         return {SUM: 0.0}
     if rule not in CELLS:
