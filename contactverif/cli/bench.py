@@ -23,6 +23,8 @@ from contactverif.studies.bench_study import run_bench
 from contactverif_reports import bench_costs
 from contactverif_reports.bench_results import BenchResults, Outcome
 from contactverif_reports.files import whole
+from contactverif_reports.html.bench_page import bench_markdown, bench_page
+from contactverif_reports.html.pages import write_page
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
 _LONG_CALLS = 10  # A state of a large mesh, or all states of differences, may take so many times the limit of a call.
@@ -58,15 +60,11 @@ def bench(
 
         plot_bench(results, pictures)
     if PAGE in files.paths:
-        from contactverif_reports.html.bench_page import bench_page
-        from contactverif_reports.html.pages import write_page
-
         write_page(files.paths[PAGE], bench_page(results, since))
     if MARKDOWN in files.paths:
         name_of_report = (files.names.get(REPORT) or Path(file)).name
         with whole(files.paths[MARKDOWN]) as part:
-            text = bench_costs.bench_markdown(results, name_of_report, pictures is not None)
-            part.write_text(text, encoding="utf-8")
+            part.write_text(bench_markdown(results, name_of_report, pictures is not None), encoding="utf-8")
     for name in results.scenes:
         show(bench_costs.overview_table(results, name).terminal(dense=True))
     if any(results.uses_differences(name, each) for name in results.formulations for each in results.scenes):

@@ -1,4 +1,4 @@
-"""Conclusions from a bench: the cost of an error, ratios with intervals, tables, sentences, changes, a page.
+"""Conclusions from a bench: the cost of an error, ratios with intervals, tables, sentences, changes.
 
 An instance that no mesh brings below the error counts as never, as COCO counts it; it is never left out. A ratio is
 that of a formulation to `REFERENCE` on the instances that both bring there. A sentence has only ratios whose interval
@@ -34,7 +34,6 @@ BODIES: Mapping[str, float] = {"cheap bodies": 0.1, "even bodies": 1.0, "dear bo
 ROUNDOFF = 1e-12  # Smaller errors are roundoff.
 ALIKE = 0.05  # Two formulations are as fast if the whole interval of their ratio is this near to 1.
 MOST_CURVES = 6  # More curves in one panel cannot be told apart.
-COST_PICTURE, RUNTIME_PICTURE, STARTS_PICTURE = "cost.svg", "runtimes.svg", "starts.svg"
 _MOST_NAMES = 4  # A sentence names no more formulations of a kind than these; the table has all.
 _RESAMPLES = 2000
 _LEAST = 5  # Fewer instances give no interval.
@@ -325,6 +324,8 @@ def cost_sentences(results: BenchResults, scene: str, target: float) -> list[str
     start = f"On {scene}, at an error of {format_share(target)} in the forces"
     if not cost_of(results, REFERENCE, scene, target).is_usual:
         return [f"{start}, there is no ratio, since {REFERENCE} does not get there."]
+    if len(results.ladders(scene)) < _LEAST:
+        return [f"{start}, no ratio has an interval, so nobody is known to be faster: that takes {_LEAST} instances."]
     words = {number: _put_in_words(ratios_at(results, scene, target, number)) for number in ("evaluation", "systems")}
     return [f"{start}, {NUMBERS[number]} over those of {REFERENCE}: {text}." for number, text in words.items()]
 
@@ -410,7 +411,7 @@ def compare_benches(new: BenchResults, old: BenchResults) -> tuple[BenchChange, 
     return tuple(changes)
 
 
-# The page in Markdown.
+# The words of a page.
 
 HOW_TO_READ = (
     f"The penalty is {RULE.penalty:g} E/h, fixed beforehand; dashed lines and the column “best” have the best of three "
@@ -436,49 +437,3 @@ STARTS = (
     "Linear systems on each mesh from the guess (near), from ten times its depth (deep), and from a thousand times "
     "(deepest)."
 )
-
-
-def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> str:
-    """Return the page for a folder of results that is kept."""
-    facts = results.provenance
-    version, commit = (facts.get(name, "unknown") for name in ("contactverif_version", "commit"))
-    parts = [
-        "# Speed against error",
-        f"`{facts.get('command', '')}`",
-        f"The command above wrote these files with contactverif {version}, commit {commit}: {results.settings}.",
-        THREE_NUMBERS,
-    ]
-    if with_pictures:
-        parts.append(f"![What an error costs: evaluation, linear systems, factorisation]({COST_PICTURE})")
-    parts.append(HOW_TO_READ)
-    for scene in results.scenes:
-        parts += _scene_markdown(results, scene, with_pictures)
-    if with_pictures:
-        parts += ["## A thousand times as deep", DEEPEST_START]
-        parts += [f"![Who fails from a thousand times the depth of the guess]({STARTS_PICTURE})"]
-        parts += ["## Runtimes", f"![Share of targets that are reached within a time]({RUNTIME_PICTURE})"]
-    if report:
-        parts.append(
-            f"`{report}` holds every instance; `contactverif bench {report} --out bench.html` makes a page of it, and "
-            f"`contactverif bench NAME … --against {report}` says what became slower."
-        )
-    return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def _scene_markdown(results: BenchResults, scene: str, with_pictures: bool) -> list[str]:
-    label = results.label(scene)
-    parts = [f"## {label[:1].upper()}{label[1:]}"]
-    if with_pictures and len(results.meshes_of(scene)) > 1:
-        parts.append(f"![Errors against one evaluation and one factorisation: {label}]({scene}.svg)")
-        if len(results.formulations) > MOST_CURVES:
-            parts.append(f"[Each formulation in a panel of its own]({scene}-each.svg)")
-    reached, words = split_targets(results, scene)
-    for target in reached:
-        sentences = cost_sentences(results, scene, target)
-        parts += [f"### {format_share(target)} on {scene}", "\n".join(f"- {sentence}" for sentence in sentences)]
-        parts.append(cost_table(results, scene, target).markdown())
-    parts.append(words)
-    totals = totals_table(results, scene)
-    if totals is not None:
-        parts += [f"### Whole solutions on {scene}", TOTALS, totals.markdown()]
-    return [*parts, f"### Starts on {scene}", STARTS, starts_table(results, scene).markdown()]

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from quotes import DOCS, README, ROOT
 
-from contactverif_reports.bench_costs import REFERENCE, bench_markdown, ratios_at
+from contactverif_reports.bench_costs import REFERENCE, ratios_at
 from contactverif_reports.bench_results import BenchResults
+from contactverif_reports.html.bench_page import bench_markdown
 from contactverif_reports.netcdf.bench_file import read_bench
 
 BENCH = ROOT / "reports" / "bench"

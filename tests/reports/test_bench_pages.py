@@ -17,7 +17,6 @@ from contactverif.contract.errors import MisuseError
 from contactverif_reports.bench_costs import (
     BODIES,
     Ratio,
-    bench_markdown,
     compare_benches,
     cost_of,
     cost_ratio,
@@ -32,7 +31,7 @@ from contactverif_reports.bench_costs import (
     total_ratio,
 )
 from contactverif_reports.bench_results import BEST, DEEP, VARIANTS, Outcome
-from contactverif_reports.html.bench_page import bench_page
+from contactverif_reports.html.bench_page import bench_markdown, bench_page
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 from contactverif_reports.plot.bench_figures import ROOM, highlights, make_scene_figure, plot_bench, spread
 
@@ -140,6 +139,8 @@ def test_a_sentence_has_ratios_whose_interval_excludes_1_alone() -> None:
     assert "not told apart: alike" in noisy
     (none,) = cost_sentences(RESULTS, "wavy", 1e-3)
     assert none.endswith("there is no ratio, since vts-ppt does not get there.")
+    few = make_results(make_cells(n_instances=4), RUNS)
+    assert cost_sentences(few, "wavy", 1e-2)[0].endswith("so nobody is known to be faster: that takes 5 instances.")
     assert cost_sentences(make_results(make_cells(), {"poor": RUNS["poor"]}), "wavy", 1e-2) == []
 
 

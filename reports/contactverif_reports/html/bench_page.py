@@ -1,9 +1,14 @@
-"""The page of a bench: sentences, the cost of an error, figures, starts, and changes since an earlier bench."""
+"""The page of a bench: sentences, the cost of an error, figures, starts, and changes since an earlier bench.
+
+The page in Markdown has the same sections. It stands in a folder beside its pictures.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
+
+from markupsafe import Markup
 
 from contactverif_reports import bench_costs as costs
 from contactverif_reports.bench_results import VARIANTS, BenchResults
@@ -17,32 +22,13 @@ def bench_page(results: BenchResults, changes: Sequence[costs.BenchChange] = ())
     """Return the page of a bench."""
     from contactverif_reports.plot import bench_figures as plots  # Importing it is slow.
 
-    scenes: list[dict[str, Any]] = []
+    figures: dict[str, list[Markup]] = {}
     for scene in results.scenes:
-        figures = []
+        figures[scene] = []
         if len(results.meshes_of(scene)) > 1:
-            figures.append(svg_inline(plots.make_scene_figure(results, scene), f"errors, {scene}"))
+            figures[scene].append(svg_inline(plots.make_scene_figure(results, scene), f"errors, {scene}"))
             if len(results.formulations) > costs.MOST_CURVES:
-                figures.append(svg_inline(plots.make_each_figure(results, scene), f"each formulation, {scene}"))
-        reached, words = costs.split_targets(results, scene)
-        scenes.append(
-            {
-                "name": scene,
-                "label": results.label(scene),
-                "figures": figures,
-                "targets": [
-                    {
-                        "title": f"an error of {costs.format_share(target)} in the forces",
-                        "sentences": costs.cost_sentences(results, scene, target),
-                        "table": costs.cost_table(results, scene, target),
-                    }
-                    for target in reached
-                ],
-                "out_of_reach": words,
-                "totals": costs.totals_table(results, scene),
-                "starts": costs.starts_table(results, scene),
-            }
-        )
+                figures[scene].append(svg_inline(plots.make_each_figure(results, scene), f"each formulation, {scene}"))
     since = Table([Column("formulation"), Column("evaluation", number=True), Column(""), Column("counts", wrap=True)])
     for change in changes:
         since.add(change.formulation, change.evaluation.text, change.evaluation.word, change.counts_text)
@@ -53,11 +39,37 @@ def bench_page(results: BenchResults, changes: Sequence[costs.BenchChange] = ())
         cost=svg_inline(plots.make_cost_figure(results), "what an error costs"),
         runtimes=svg_inline(plots.make_runtime_figure(results), "runtimes"),
         deepest=svg_inline(plots.make_starts_figure(results), "who fails from the deepest start"),
-        scenes=scenes,
+        figures=figures,
+        scenes=_sections(results),
         failures=_list_failures(results),
         changes=since,
         about=origin(results.provenance, _FACTS),
     )
+
+
+def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> str:
+    """Return the page in Markdown, for a folder of results that is kept."""
+    scenes = _sections(results)
+    return render("bench.md.j2", results=results, texts=costs, scenes=scenes, report=report, pictures=with_pictures)
+
+
+def _sections(results: BenchResults) -> list[dict[str, Any]]:
+    """Return what a page says of each scene."""
+    sections = []
+    for scene in results.scenes:
+        reached, words = costs.split_targets(results, scene)
+        targets = [
+            {
+                "share": costs.format_share(target),
+                "sentences": costs.cost_sentences(results, scene, target),
+                "table": costs.cost_table(results, scene, target),
+            }
+            for target in reached
+        ]
+        tables = {"totals": costs.totals_table(results, scene), "starts": costs.starts_table(results, scene)}
+        section = {"name": scene, "label": results.label(scene), "has_curves": len(results.meshes_of(scene)) > 1}
+        sections.append({**section, **tables, "targets": targets, "out_of_reach": words})
+    return sections
 
 
 def _list_failures(results: BenchResults) -> list[tuple[str, int, str]]:

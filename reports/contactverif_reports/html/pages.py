@@ -150,7 +150,7 @@ def _environment(package: str = "contactverif_reports.html") -> Environment:
     packages = dict.fromkeys([package, "contactverif_reports.html"])
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in packages]),
-        autoescape=True,
+        autoescape=lambda name: name is None or not name.endswith(".md.j2"),
         undefined=StrictUndefined,
         # No control character comes into a page; only `Markup` is of our own making.
         finalize=lambda value: printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value,

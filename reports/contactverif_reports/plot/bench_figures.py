@@ -19,12 +19,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from contactverif_reports.bench_costs import (
-    COST_PICTURE,
     MOST_CURVES,
     REFERENCE,
     ROUNDOFF,
-    RUNTIME_PICTURE,
-    STARTS_PICTURE,
     Ratio,
     costs_at,
     curve,
@@ -54,9 +51,9 @@ def plot_bench(results: BenchResults, folder: Path) -> None:
             save(make_scene_figure(results, scene), folder / f"{scene}.svg")
             if len(results.formulations) > MOST_CURVES:
                 save(make_each_figure(results, scene), folder / f"{scene}-each.svg")
-    save(make_cost_figure(results), folder / COST_PICTURE)
-    save(make_runtime_figure(results), folder / RUNTIME_PICTURE)
-    save(make_starts_figure(results), folder / STARTS_PICTURE)
+    save(make_cost_figure(results), folder / "cost.svg")
+    save(make_runtime_figure(results), folder / "runtimes.svg")
+    save(make_starts_figure(results), folder / "starts.svg")
 
 
 def highlights(results: BenchResults) -> dict[str, dict[str, Any]]:
