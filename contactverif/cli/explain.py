@@ -31,6 +31,7 @@ def explain(name: str | None, report: Path | None, case: str | None, options: Ru
     run, examples = _read(name, report, case)
     name = examples[0].property_id if name is None and examples else name
     ids = property_ids(engines=True)
+    name = name.lower() if name is not None and name.lower() in ids else name
     if name not in ids:
         text = terms.list_of_terms() if name is None else terms.term_text(name) or terms.trait_text(name)
         if name is not None and not text:

@@ -63,14 +63,21 @@ def term_text(name: str) -> str:
     """Return the text about a term or a symbol, in Markdown; empty if there is none of that name."""
     if meaning := symbol_meanings().get(name):
         return f"# {name}\n\nA symbol of the tolerances: {meaning}.\n"
-    return term_texts().get(name.lower(), "")
+    return {_key(each): text for each, text in term_texts().items()}.get(_key(name), "")
+
+
+def _key(name: str) -> str:
+    """Return a name in small letters and in the singular, by which it is looked up."""
+    words = re.sub(r"[-_\s]+", " ", name.strip().lower())
+    return re.sub(r"(?<=ss)es\b|(?<!s)s\b", "", re.sub(r"ies\b", "y", words))
 
 
 def list_of_terms() -> str:
     """Return in Markdown all terms, in the order of the page, and what else there is to look up."""
     headings = dict.fromkeys(text.partition("\n")[0].removeprefix("# ") for text in term_texts().values())
     terms, symbols = "\n".join(f"- {heading}" for heading in headings), ", ".join(symbol_meanings())
-    return f"# Terms\n\n{terms}\n\nSymbols of the tolerances: {symbols}. `contactverif list` lists the properties.\n"
+    others = f"Symbols of the tolerances: {symbols}.\n\nTraits: {', '.join(trait_names())}.\n"
+    return f"# Terms\n\n{terms}\n\n{others}\n`contactverif list` lists the properties.\n"
 
 
 _GROUPS = {
@@ -93,7 +100,7 @@ def trait_text(name: str) -> str:
     wanted, _, _ = name.partition("=")
     for place, kind in _GROUPS.items():
         for entry, values, text in _entries(kind):
-            if entry == wanted:
+            if _key(entry) == _key(wanted):
                 form = f"{place}({entry}=…)" if kind is not PatchPromises else f"promises=Promises({place}({entry}=…))"
                 return f"# {entry}\n\nA trait, `Traits({form})`: `{values}`.\n\n{text}\n"
     return ""

@@ -22,6 +22,11 @@ INSTALLED = load_formulations()
 HOOKS = Path(__file__).parents[2] / "docs" / "hooks"
 PARTS = ("Question.", "Why it matters.", "How it is judged.", "Undecided.", "Source.", "Promised by:", "Usual causes:")
 WORDS = ("promise", "witness", "kink", "undecided", "idle", "locking", "patch test", "trait", "residual", "NTS")
+FOUND = {  # {name: the head of what it finds}
+    **dict.fromkeys(("Traits", "promises", "WITNESSES"), "Trait, promise, witness"),
+    **{"kinks": "Kink", "Patch tests": "Patch test", "two-passes": "One pass and two passes", "Inf-Sup": "inf_sup"},
+    **{"Balance.Force": "balance.force", "properties": "Property"},
+}
 
 
 @pytest.fixture(autouse=True)
@@ -68,6 +73,11 @@ def test_a_word_of_the_screen_is_a_term(name: str, ask: Ask) -> None:
     assert len(words(answer.out)) > 5
 
 
+@pytest.mark.parametrize(("name", "head"), FOUND.items())
+def test_a_name_is_found_in_the_plural_and_in_capitals(name: str, head: str, ask: Ask) -> None:
+    assert ask("explain", name).out.partition("\n")[0] == head
+
+
 def test_every_term_has_a_text_in_80_columns_that_ends_like_a_sentence() -> None:
     for name, text in term_texts().items():
         lines = in_terminal(text).rstrip().splitlines()
@@ -78,7 +88,7 @@ def test_every_term_has_a_text_in_80_columns_that_ends_like_a_sentence() -> None
 
 def test_without_a_name_the_terms_are_listed(ask: Ask) -> None:
     out = ask("explain", columns=COLUMNS).out
-    assert all(word in out.lower() for word in ("witness", "kink", "idle", "ε̂"))
+    assert all(word in out.lower() for word in ("witness", "kink", "idle", "ε̂", "conserves_force"))
 
 
 def test_the_failures_that_are_known_come_from_traits_and_from_the_tables_of_planted_mistakes() -> None:
