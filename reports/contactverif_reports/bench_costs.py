@@ -414,13 +414,14 @@ def compare_benches(new: BenchResults, old: BenchResults) -> tuple[BenchChange, 
 # The words of a page.
 
 HOW_TO_READ = (
-    f"The penalty is {RULE.penalty:g} E/h, fixed beforehand; dashed lines and the column “best” have the best of three "
-    "penalties, chosen afterwards. All start from the same guess. A point is the median over the instances of a mesh: "
-    "the other body is the slave, the master is graded, the edge shifted, the size changed by up to a fifth. Contact "
-    "no longer limits an error at its floor. Of pressures that is the L2 error of the best linear one on the slave's "
-    f"mesh (dotted, at the times of {REFERENCE}); at reported points alone an error may be lower. Of forces and "
-    "displacements it is the curve of sts, which integrates each overlap of two segments exactly where it is closed: "
-    "with 12 points in place of 3 its errors are the same on wavy to 1e-10, and on hertz to 3 %."
+    f"The penalty is {RULE.penalty:g} E/h, fixed beforehand; the column “best”, and dashed lines where each "
+    "formulation has a panel, have the best of three penalties, chosen afterwards. All start from the same guess. "
+    "A point is the median over the instances of a mesh: the other body is the slave, the master is graded, the "
+    "edge shifted, the size changed by up to a fifth. Contact no longer limits an error at its floor. Of "
+    "pressures that is the L2 error of the best linear one on the slave's mesh (dotted, at the times of "
+    f"{REFERENCE}); at reported points alone an error may be lower. Of forces and displacements it is the curve of "
+    "sts, which integrates each overlap of two segments exactly where it is closed: with 12 points in place of 3 "
+    "its errors are the same on wavy to 1e-10, and on hertz to 3 %."
 )
 THREE_NUMBERS = (
     "An error costs three numbers, and they are not added up, since what a linear system costs depends on the bodies. "

@@ -24,8 +24,12 @@ PARTS = ("Question.", "Why it matters.", "How it is judged.", "Undecided.", "Sou
 WORDS = ("promise", "witness", "kink", "undecided", "idle", "locking", "patch test", "trait", "residual", "NTS")
 FOUND = {  # {name: the head of what it finds}
     **dict.fromkeys(("Traits", "promises", "WITNESSES"), "Trait, promise, witness"),
-    **{"kinks": "Kink", "Patch tests": "Patch test", "two-passes": "One pass and two passes", "Inf-Sup": "inf_sup"},
-    **{"Balance.Force": "balance.force", "properties": "Property"},
+    "kinks": "Kink",
+    "Patch tests": "Patch test",
+    "two-passes": "One pass and two passes",
+    "Inf-Sup": "inf_sup",
+    "Balance.Force": "balance.force",
+    "properties": "Property",
 }
 
 

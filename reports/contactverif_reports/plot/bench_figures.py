@@ -1,7 +1,7 @@
 """The figures of a bench: errors against the numbers, what an error costs, runtimes. Importing it is slow.
 
-At most six formulations have a colour and a name, the reference among them; the others are grey. Solid lines have the
-penalty of the rule, dashed ones the best afterwards.
+At most six formulations have a colour and a name, the reference among them; the others are grey. A figure with curves
+is as wide as a phone, so that a page shows its letters as large as they are.
 """
 
 from __future__ import annotations
@@ -32,16 +32,21 @@ from contactverif_reports.bench_costs import (
 )
 from contactverif_reports.bench_results import BEST, DEEPEST, ERRORS, RULE, VARIANTS, BenchResults
 from contactverif_reports.plot.case_figures import save
+from contactverif_reports.tables import decimal
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#8B4513")  # Okabe and Ito's, and brown.
 _MARKERS = "os^vDP"
-_AXES = {"evaluation": "one evaluation / ms", "factorisation": "one factorisation / ms"}
-_GREY: dict[str, Any] = {"color": "0.8", "linewidth": 0.8, "zorder": 0}
-_STYLE: dict[Any, Any] = {"font.size": 8.5, "axes.titlesize": 8.5, "axes.linewidth": 0.6, "lines.markersize": 3.5}
-_N_COLUMNS = 3
-_STROKES = f"solid: {RULE.penalty:g} E/h, dashed: the best penalty,\ndotted: the best linear pressure, grey: others"
-ROOM = 0.1  # The least distance of two names, over the height of a panel.
-_BESIDE = 1.04  # The place of names, over the width of a panel.
+_AXES = {"evaluation": "evaluation / ms", "factorisation": "factorisation / ms"}
+_WIDTH = 3.7  # The width of a figure with curves, in inches.
+_GREY: dict[str, Any] = {"color": "0.75", "linewidth": 0.8, "zorder": 0}
+_DOTTED: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": ":", "zorder": 1}
+_STYLE: dict[Any, Any] = {
+    **dict.fromkeys(("font.size", "axes.titlesize", "legend.fontsize", "figure.labelsize"), 9),
+    "axes.linewidth": 0.6,
+    "lines.markersize": 4,
+    "legend.frameon": False,
+}
+_N_COLUMNS = 2
 
 
 def plot_bench(results: BenchResults, folder: Path) -> None:
@@ -76,11 +81,12 @@ def _panels(size: tuple[float, float], rows: int, columns: int, **options: Any) 
 
 
 def _label_plainly(*every: Any) -> None:
-    """Write the numbers of a logarithmic axis at 1, 2 and 5 of each power of ten where there is room, else at 1."""
+    """Write the numbers of a logarithmic axis at 1, 2 and 5 of each power of ten where there is room, else at fewer."""
     for axis in every:
         low, high = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 60 * low else (1.0,)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        subs = (1.0, 2.0, 5.0) if high < 10 * low else (1.0, 3.0) if high < 40 * low else (1.0,)
+        axis.set_major_locator(LogLocator(subs=subs))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: decimal(value, 3)))
         axis.set_minor_formatter(NullFormatter())
         axis.set_minor_locator(NullLocator())
 
@@ -89,63 +95,74 @@ def _label_plainly(*every: Any) -> None:
 def make_scene_figure(results: BenchResults, scene: str) -> Figure:
     """Return the three errors of a scene, each against one evaluation and against one factorisation."""
     pens = highlights(results)
-    figure, panels = _panels((5.2, 6.6), len(ERRORS), len(_AXES), sharex="col", sharey="row")
+    figure, panels = _panels((_WIDTH, 6.8), len(ERRORS), len(_AXES), sharex="col", sharey="row")
     for row, kind in zip(panels, ERRORS, strict=True):
         for axes, number in zip(row, _AXES, strict=True):
             axes.set(xscale="log", yscale="log")
             for name in sorted(results.formulations, key=lambda name: name in pens):
-                _plot_curve(axes, results, scene, (name, kind, number), pens.get(name))
+                _plot_curve(axes, results, scene, (name, kind, number), pens.get(name, _GREY))
         row[0].set_ylabel(f"error of the {kind}")
     best = np.median(results.best_pressure[results.ladders(scene)], axis=0)
     if REFERENCE in results.formulations and (best > ROUNDOFF).all():  # Uniform pressures have no error.
         # What the mesh allows pressures, at the times of the reference.
         for axes, number in zip(panels[list(ERRORS).index("pressure")], _AXES, strict=True):
             x, _ = curve(results, REFERENCE, scene, "pressure", number)
-            axes.plot(1e3 * x, best, color="0.45", linewidth=1.0, linestyle=":", zorder=1)
+            axes.plot(1e3 * x, best, **_DOTTED)
     for axes, label in zip(panels[-1], _AXES.values(), strict=True):
         axes.set_xlabel(label)
     for axes in panels.flat:
         _label_plainly(axes.xaxis, axes.yaxis)
-    figure.draw_without_rendering()  # Labels stand where the layout has put the panels.
-    for axes in panels[:, -1]:
-        _name_curves(axes, {pen["color"]: name for name, pen in pens.items()})
-    figure.suptitle(_STROKES, fontsize=8, color="0.3")
+    others = {"others": _GREY} if len(pens) < len(results.formulations) else {}
+    _add_legend(figure, {**pens, **others, "best linear pressure": _DOTTED})
     return figure
 
 
+def _add_legend(figure: Figure, looks: Mapping[str, Mapping[str, Any]]) -> None:
+    """Say above the panels what each curve is."""
+    handles = [Line2D([], [], label=label, **{"mfc": "none", **look}) for label, look in looks.items()]
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+
+
 def _plot_curve(
-    axes: Axes, results: BenchResults, scene: str, series: tuple[str, str, str], pen: dict[str, Any] | None
+    axes: Axes,
+    results: BenchResults,
+    scene: str,
+    series: tuple[str, str, str],
+    pen: Mapping[str, Any],
+    variants: Sequence[int] = (0,),
 ) -> None:
-    """Draw a formulation, error and number: with the penalty of the rule, and with a colour at the best one too."""
+    """Draw the curve of a formulation, an error and a number: at the penalty of the rule, or at the best of some."""
     name, kind, number = series
-    x, errors = curve(results, name, scene, kind, number)
+    x, errors = curve(results, name, scene, kind, number, variants)
     finite = np.isfinite(errors) & np.isfinite(x)
-    if pen is None:
-        axes.plot(1e3 * x[finite], errors[finite], **_GREY)
-        return
-    axes.plot(1e3 * x[finite], errors[finite], linewidth=1.1, markerfacecolor="none", **pen)
-    _, best = curve(results, name, scene, kind, number, BEST)
-    finite = np.isfinite(best) & np.isfinite(x)
-    axes.plot(1e3 * x[finite], best[finite], color=pen["color"], linewidth=0.8, linestyle="--")
+    axes.plot(1e3 * x[finite], errors[finite], **{"linewidth": 1.1, "markerfacecolor": "none", **pen})
 
 
 @matplotlib.rc_context(_STYLE)
 def make_each_figure(results: BenchResults, scene: str) -> Figure:
     """Return the error of the forces against one evaluation, a panel for each formulation, the reference in each."""
     n_rows = ceil(len(results.formulations) / _N_COLUMNS)
-    figure, grid = _panels((5.0, 0.7 + 1.25 * n_rows), n_rows, _N_COLUMNS, sharex=True, sharey=True)
+    figure, grid = _panels((_WIDTH, 1.0 + 1.15 * n_rows), n_rows, _N_COLUMNS, sharex=True, sharey=True)
     panels = grid.reshape(-1)
+    looks: dict[str, dict[str, Any]] = {
+        f"{RULE.penalty:g} E/h": {"color": _COLOURS[1], "marker": "o"},
+        "best penalty": {"color": _COLOURS[1], "linestyle": "--"},
+        REFERENCE: {"color": "0.5", "zorder": 1},
+    }
+    solid, dashed, grey = looks.values()
     for axes, name in zip(panels, results.formulations, strict=False):
         axes.set(xscale="log", yscale="log")
         if REFERENCE in results.formulations:
-            _plot_curve(axes, results, scene, (REFERENCE, "forces", "evaluation"), None)
-        _plot_curve(axes, results, scene, (name, "forces", "evaluation"), {"color": "#C2410C", "marker": "o"})
-        axes.set_title(name, fontsize=8, pad=2)
+            _plot_curve(axes, results, scene, (REFERENCE, "forces", "evaluation"), grey)
+        _plot_curve(axes, results, scene, (name, "forces", "evaluation"), solid)
+        _plot_curve(axes, results, scene, (name, "forces", "evaluation"), dashed, BEST)
+        axes.set_title(name, pad=2, parse_math=False)
     _label_plainly(panels[0].xaxis, panels[0].yaxis)
     for axes in panels[len(results.formulations) :]:
         axes.set_visible(False)
-    figure.supxlabel(f"one evaluation / ms; grey: {REFERENCE}, dashed: best penalty", fontsize=8)
-    figure.supylabel("error of the forces", fontsize=8)
+    figure.supxlabel("evaluation / ms")
+    figure.supylabel("error of the forces")
+    _add_legend(figure, looks)
     return figure
 
 
@@ -175,7 +192,7 @@ def make_cost_figure(results: BenchResults) -> Figure:
     factorisation.set_title(f"one factorisation,\n{REFERENCE} = 1")
     evaluation.set_yticks(range(len(order)), order, parse_math=False)
     evaluation.set_ylim(-0.6, len(order) - 0.4)
-    figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
     return figure
 
 
@@ -215,7 +232,7 @@ def make_runtime_figure(results: BenchResults) -> Figure:
     handles = [Line2D([], [], label=name, color=pen["color"]) for name, pen in pens.items()]
     if len(pens) < len(results.formulations):
         handles.append(Line2D([], [], label="others", **_GREY))
-    figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure
 
 
@@ -241,42 +258,3 @@ def make_starts_figure(results: BenchResults) -> Figure:
     axes.set_yticks(np.arange(len(names)) + 0.5, names, parse_math=False)
     axes.tick_params(length=0)
     return figure
-
-
-def _name_curves(axes: Axes, names: Mapping[str, str]) -> None:
-    """Write {colour: name} of the solid curves at the right edge, each joined with the end of its curve.
-
-    Call it once the layout and both scales are final.
-    """
-    ends = {
-        str(line.get_color()): np.asarray(line.get_xydata())[-1:] for line in axes.lines if line.get_linestyle() == "-"
-    }
-    heights = {  # Those of the ends of curves, over that of the panel.
-        colour: float(axes.transLimits.transform(axes.transScale.transform(end))[0, 1])
-        for colour, end in ends.items()
-        if colour in names and len(end)
-    }
-    colours = sorted(heights, key=lambda colour: heights[colour])
-    for colour, height in zip(colours, spread([heights[colour] for colour in colours]), strict=True):
-        x, y = ends[colour][0].tolist()
-        look: dict[str, Any] = {"color": colour, "fontsize": 7, "va": "center", "parse_math": False}
-        arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 2}
-        place = (_BESIDE, height)
-        axes.annotate(names[colour], (x, y), place, textcoords="axes fraction", arrowprops=arrow, **look)
-
-
-def spread(heights: Sequence[float]) -> list[float]:
-    """Return places for names that are at least `ROOM` apart, as near to their rising heights as that allows.
-
-    Names that would overlap stand together around the mean of their heights, and all stand beside the panel.
-    """
-    groups: list[tuple[float, int]] = []  # The mean of the heights less the room below, and the number of names
-    for number, height in enumerate(heights):
-        mean, count = height - number * ROOM, 1
-        while groups and groups[-1][0] > mean:
-            below, size = groups.pop()
-            mean, count = (mean * count + below * size) / (count + size), count + size
-        groups.append((mean, count))
-    top = 1.0 - (len(heights) - 1) * ROOM
-    levels = [min(max(mean, 0.0), top) for mean, count in groups for _ in range(count)]
-    return [level + number * ROOM for number, level in enumerate(levels)]
