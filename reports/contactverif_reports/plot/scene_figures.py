@@ -25,13 +25,9 @@ from contactverif_reports.plot.case_figures import SUFFIXES, hatch, save
 from contactverif_reports.plot.geometry import Gaps, format_number, one_digit
 from contactverif_reports.plot.solved_scene import Solution, SolvedScene, pressures_across
 
-_WIDTH = 10.0  # Width of the figure in inches.
-_ACROSS = 3  # The largest number of panels side by side.
-_SMALL: dict[Any, Any] = {
-    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize", "legend.fontsize"), 9),
-    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), 8),
-    "hatch.linewidth": 0.5,
-}
+_WIDTH = 3.7  # Width of the figure in inches: that of a phone, or of a column of a journal.
+_LETTERS = 50  # Letters in a line of that width.
+_SMALL: dict[Any, Any] = {"font.size": 9, "axes.titlesize": 9, "legend.fontsize": 9, "hatch.linewidth": 0.5}
 _MANY = 40  # The points of a curve get markers up to this number.
 # Lengths as shares of the size of the scene.
 _VISIBLE_MOVE = 0.06  # The largest displacement is drawn about so large.
@@ -149,31 +145,29 @@ def make_scene_figure(solved: SolvedScene, title: str = "") -> Figure:
     """Return the figure that `plot_scene` writes."""
     box = close_up(solved)
     panels = len(solved.solutions) + (box is not None)
-    across = min(panels, _ACROSS)
-    rows = -(-panels // across)
     width, height = np.ptp(np.vstack([body.nodes for body in solved.bodies]), axis=0) + 0.1 * solved.size
     slope = height / width if box is None else 1.0
-    panel = float(np.clip((_WIDTH - 2.2) / across * slope, 1.6, 4.2))
-    heights = rows * (panel + 0.5) + 0.6, 4.8
+    panel = float(np.clip((_WIDTH - 0.9) * slope, 0.8, 4.2))
+    heights = panels * (panel + 0.4) + 1.1, 8.2
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(h_pad=0.07))
     grid = figure.add_gridspec(2, 1, height_ratios=heights)
     bodies, curves = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
-    _plot_meshes(bodies, solved, rows, across)
+    _plot_meshes(bodies, solved, panels)
     _plot_curves(curves, solved)
     soft = (body for body in solved.bodies if not body.rigid)
     moduli = ", ".join(f"{body.name} E {format_number(body.young)}, ν {format_number(body.poisson)}" for body in soft)
     facts = f"penalty {format_number(float(f'{solved.case.penalty:.4g}'))}; {moduli}"
-    lines = [*textwrap.wrap(title, 110), *textwrap.wrap(facts, 110, max_lines=2, placeholder=" …")]
+    lines = [*textwrap.wrap(title, _LETTERS), *textwrap.wrap(facts, _LETTERS, max_lines=3, placeholder=" …")]
     for solution in solved.solutions:  # What happened where Newton's method did not converge.
-        lines += textwrap.wrap(f"{solution.formulation}: {solution.advice}", 110) if solution.advice else []
-    figure.suptitle("\n".join(lines), fontsize=10, parse_math=False)
+        lines += textwrap.wrap(f"{solution.formulation}: {solution.advice}", _LETTERS) if solution.advice else []
+    figure.suptitle("\n".join(lines), fontsize=9, parse_math=False)
     return figure
 
 
-def _plot_meshes(figure: SubFigure, solved: SolvedScene, rows: int, across: int) -> None:
+def _plot_meshes(figure: SubFigure, solved: SolvedScene, n_panels: int) -> None:
     scale, large = colour_scale(solved), magnifications(solved)
     box = close_up(solved)
-    panels = figure.subplots(rows, across, squeeze=False, sharex=box is None, sharey=box is None)
+    panels = figure.subplots(n_panels, 1, squeeze=False, sharex=box is None, sharey=box is None)
     if box is not None:
         whole = panels.flat[0]
         for body in solved.bodies:
@@ -184,28 +178,26 @@ def _plot_meshes(figure: SubFigure, solved: SolvedScene, rows: int, across: int)
         whole.set_aspect("equal", adjustable="box")
         whole.margins(0.04)
         whole.autoscale_view()
-        whole.set_title("all of the meshes; the frame\nis drawn on the right")
+        whole.set_title("all of the meshes; the frame is drawn below")
         _bare(whole, alone=True)
     from_near = panels.ravel()[int(box is not None) :]
     for axes, solution in zip(from_near, solved.solutions, strict=False):
         plot_bodies(axes, solved, solution, large[solution.formulation], scale)
         axes.set_title(f"{solution.formulation}\n{large[solution.formulation].words}", parse_math=False)
         _bare(axes, alone=box is not None)
-    for axes in from_near[len(solved.solutions) :]:
-        axes.set_axis_off()
-    bar = figure.colorbar(scale, ax=panels, shrink=0.85, aspect=18, pad=0.01)
-    bar.set_label("pressure across the\ninterface, −σₙ (force / length)")
+    bar = figure.colorbar(scale, ax=panels, location="bottom", aspect=30, pad=0.01)
+    bar.set_label("pressure across the interface, −σₙ (force / length)")
 
 
 def _plot_curves(figure: SubFigure, solved: SolvedScene) -> None:
-    (slave, residuals), (master, energies) = figure.subplots(2, 2, sharex="col")
+    panels = slave, master, residuals, energies = figure.subplots(4, 1)
     _plot_pressures(slave, solved, "slave")
     _plot_pressures(master, solved, "master")
     master.set_xlabel("position along the interface (length)")
     _plot_history(residuals, solved, "residuals")
     _plot_history(energies, solved, "energies")
     energies.set_xlabel("iterate")
-    for axes in (slave, master, residuals, energies):
+    for axes in panels:
         axes.spines[["top", "right"]].set_visible(False)
     handles: list[Artist] = []
     for number, solution in enumerate(solved.solutions):
@@ -219,8 +211,7 @@ def _plot_curves(figure: SubFigure, solved: SolvedScene) -> None:
         exact = " and ".join(map(format_number, solved.pressures))  # A penalty and multipliers may have one each.
         handles.append(Line2D([], [], color="0.6", linewidth=2.2, label=f"exact pressure {exact}"))
     handles.append(Patch(color="0.92", label="roundoff of the residual"))
-    n_columns = 2 if len(handles) > 3 else len(handles)
-    figure.legend(handles=handles, loc="outside lower center", ncols=n_columns, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", frameon=False)
 
 
 def _bare(axes: Axes, *, alone: bool) -> None:
