@@ -3,8 +3,6 @@
 Rule: what cannot be judged is a MisuseError that names the argument. No run is empty without a word.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor

@@ -1,7 +1,5 @@
 """The work of `bench`: speed against error, on scenes whose exact solution is known."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """The work of `explain`: what a property asks, or what a term means, and the numbers of a case that fails."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The words of the project, the symbols of the tolerances and the traits, by the names that a user looks up."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from functools import cache

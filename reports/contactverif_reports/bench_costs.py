@@ -10,8 +10,6 @@ Hansen et al., Optim. Methods Softw. 36 (2021) 114–144 (COCO: instances, targe
 Efron & Tibshirani, An Introduction to the Bootstrap (1993), Chapter 13 (percentile intervals).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, isnan, nan

@@ -3,8 +3,6 @@
 The page in Markdown has the same sections. It stands in a folder beside its pictures.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
