@@ -91,14 +91,10 @@ def test_round_trip_through_a_case(make: Callable[[], Scene]) -> None:
         assert bits(again.case(seed=7).to_arrays()) == bits(case.to_arrays())
 
 
-def test_the_bodies_of_a_case_are_called_by_their_roles() -> None:
-    again = scene_of(three_bodies().case())
-    assert [body.name for body in again.bodies] == ["slave 1", "master", "slave 2"]
-
-
-def test_one_scene_is_made_of_one_case() -> None:
-    case = press_blocks().case()
+def test_one_scene_is_made_of_one_case_and_its_bodies_are_called_by_their_roles() -> None:
+    case = three_bodies().case()
     assert scene_of(case) is scene_of(case)
+    assert [body.name for body in scene_of(case).bodies] == ["slave 1", "master", "slave 2"]
 
 
 def test_a_case_without_bodies() -> None:

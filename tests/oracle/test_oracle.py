@@ -91,18 +91,6 @@ def test_several_chains_load_what_each_covers() -> None:
     assert weights.tolist() == [0.5, 0.5, 0.5, 0.5, 0.75, 0.5, 0.75]
 
 
-@CHECKED
-@given(flat_cases())
-def test_both_sides_carry_the_same_load_and_moment(case: Case) -> None:
-    along = case.parameters["along"]
-    weights = uniform_pressure_weights_exact(case.interface, along)
-    places = [Fraction(place) for place in along.tolist()]
-    count = case.interface.n_slave_nodes
-    assert sum(weights[:count]) == sum(weights[count:])
-    moments = [weight * place for weight, place in zip(weights, places, strict=True)]
-    assert sum(moments[:count]) == sum(moments[count:])
-
-
 ROOF = [(4.0, -2.0), (0.0, 0.0), (-4.0, -2.0)]  # convex: the cone of its vertex is above
 VALLEY = [(4.0, 2.0), (0.0, 0.0), (-4.0, 2.0)]
 

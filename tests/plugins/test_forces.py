@@ -73,16 +73,6 @@ def test_a_node_that_faces_a_free_end_is_not_lost_to_roundoff(name: str, angle: 
     assert turn(turned, -angle) == pytest.approx(contact_forces(load(name), interface, z), abs=1e-13)
 
 
-@pytest.mark.parametrize("n_master", [1, 2, 7, 100])
-def test_any_number_of_master_segments_under_one_slave_segment(n_master: int) -> None:
-    interface, z = make_flat([12.0], [12.0 / n_master] * n_master)
-    for name in ("vts-ppt", "vts-ppt-balanced"):
-        forces = contact_forces(load(name), interface, z)
-        share = 12 / n_master
-        expected = [-share / 2, *[-share] * (n_master - 1), -share / 2]
-        assert forces[2:, 1] == pytest.approx(expected, rel=1e-12)
-
-
 def test_several_and_closed_chains() -> None:
     """A closed square master inside a closed square slave that presses on all four of its sides."""
     inner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)  # body on the left: counter-clockwise

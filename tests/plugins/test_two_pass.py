@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from every_formulation import bent_state, load
 from subjects import load_subject
-from surfaces import DEPTH, contact_forces, make_flat
+from surfaces import make_flat
 from test_forces import PENALTY
 
 from contactverif import Abilities, Interface, Pairing, Promises, Scene, Subject, Trace, Traits, solve, two_blocks
@@ -182,14 +182,6 @@ def test_by_name_with_options_and_nested() -> None:
         assert tangent.any()
 
 
-def test_springs_act_twice_and_where_meshes_match_that_is_all() -> None:
-    interface, z = make_flat([2, 1, 4], [2, 1, 4])
-    forces = contact_forces(load("two-pass/nts-ar"), interface, z)
-    assert forces[:4, 1].tolist() == [2, 3, 5, 4]
-    assert forces[4:, 1].tolist() == [-4, -5, -3, -2]
-    assert DEPTH * PENALTY == 1
-
-
 # Solved
 
 ROUNDOFF = 1e-11  # The largest error of a stress over the pressure, on meshes whose segments differ little.
@@ -236,20 +228,15 @@ def test_elsewhere_they_lock_which_is_not_passing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene_name", "deficiency"), [("a1", 2), ("a2-graded", 2), ("b", 2), ("c", 2), ("c-prime", 2), ("example-1bis", 0)]
+    ("scene_name", "deficiency"),
+    [("a1", 2), ("a2-graded", 2), ("b", 2), ("c", 2), ("c-prime", 2), ("example-1bis", 0), ("matching", 4)],
 )
 def test_nodal_multipliers_in_two_passes_pass_and_are_too_many_where_nodes_coincide(
     scene_name: str, deficiency: int
 ) -> None:
-    trace = solve_scene("two-pass/nts-lm", make_scene(scene_name))
+    trace = solve_scene("two-pass/nts-lm", MATCHING if scene_name == "matching" else make_scene(scene_name))
     assert error_of(trace) < ROUNDOFF
     assert trace.deficiency == deficiency
-
-
-def test_on_matching_meshes_half_of_them_are_too_many() -> None:
-    trace = solve_scene("two-pass/nts-lm", MATCHING)
-    assert error_of(trace) < ROUNDOFF
-    assert (len(trace.multipliers), trace.deficiency) == (8, 4)
 
 
 def test_two_passes_state_less_where_the_second_pass_shows_more() -> None:
