@@ -15,7 +15,7 @@ from contactverif import __version__
 from contactverif.cli import commands
 from contactverif.cli.options import spell_out
 from contactverif.contract.errors import ContactverifError, MisuseError, name_line, one_line
-from contactverif.isolation.confine import ONE_THREAD
+from contactverif.isolation.confine import ONE_THREAD, address_space
 
 app = typer.Typer(
     help="Find out whether a contact formulation is right: random meshes, exact answers, small counterexamples.",
@@ -58,6 +58,7 @@ _OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {
 _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlier versions, now all --out.
 _STOPPED, _CLOSED_PIPE, _MISUSE = 130, 128 + signal.SIGPIPE, 2  # Exit statuses, as shells and typer have them.
 _MOST_COLUMNS = 10_000
+_LEAST_MEMORY = 1 << 30  # Bytes of address space. The libraries of a plugin take about half of them.
 _COMMAND = re.compile(r"((?:^|[\r\n])[^\S\r\n]*:(?=:)|#(?=#\[))")  # White space alone stands before the first colon.
 
 
@@ -92,6 +93,9 @@ def main() -> None:
     try:
         if sys.flags.optimize > 1:
             raise MisuseError("python", "-OO, which drops the docstrings", "it without -OO: pages are made of them")
+        if address_space() < _LEAST_MEMORY:
+            needed = f"at least {_LEAST_MEMORY >> 10} kB: with less, OpenBLAS may wait for memory for ever"
+            raise MisuseError("ulimit -v", f"{address_space() / 1024:.0f} kB", needed)
         status = app(prog_name="contactverif", standalone_mode=False)
         sys.stdout.flush()
     except Exception as error:
@@ -135,6 +139,8 @@ def _exit_status(error: Exception) -> int:
             reason = str(error)
         case OSError(strerror=str()) | MemoryError() | UnicodeEncodeError():
             reason = _words_of_machine(error)
+        case RuntimeError() if "start new thread" in str(error):
+            reason = "the system lets this user start no further thread (ulimit -u, ulimit -v)"
         case _:
             reason = _words_of_usage_error(error)
     if reason:

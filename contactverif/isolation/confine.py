@@ -14,7 +14,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
-from typing import Any
+from math import inf
+from mmap import PAGESIZE
 
 MEGABYTE = 2**20
 SOCKET = "CONTACTVERIF_SOCKET"  # The number of the child's end of the line to its parent.
@@ -41,12 +42,8 @@ def confine() -> None:
     die_with_parent()
     faulthandler.enable()
     limit_memory(int(os.environ[MEMORY]))
-    if PROCESSES in os.environ:
-        with suppress(ImportError):  # Windows has no such limits.
-            import resource
-
-            most = int(os.environ[PROCESSES])  # The system counts those of each user namespace, so of a box, apart.
-            resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
+    if PROCESSES in os.environ:  # The system counts those of each user namespace, so of a box, apart.
+        _lower("RLIMIT_NPROC", int(os.environ[PROCESSES]))
     if WRITABLE in os.environ:
         _keep_to(os.environ[WRITABLE].split(os.pathsep))
 
@@ -65,19 +62,31 @@ def hide_memory(*, hidden: bool) -> None:
 
 def limit_memory(megabytes: int) -> None:
     """Limit the address space of this process beyond what it has, and write no image of it when it crashes."""
-    resource: Any
-    try:
-        import resource
-    except ImportError:  # Windows has no such limits.
-        return
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _lower("RLIMIT_CORE", 0)
     with open("/proc/self/statm" if os.path.exists("/proc/self/statm") else os.devnull) as file:
         pages = int((file.read().split() or ["0"])[0])
-    limit = pages * resource.getpagesize() + megabytes * MEGABYTE
-    _, most = resource.getrlimit(resource.RLIMIT_AS)
-    if most == resource.RLIM_INFINITY or limit < most:
-        with suppress(OSError, ValueError):  # Not every system has this limit.
-            resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    _lower("RLIMIT_AS", pages * PAGESIZE + megabytes * MEGABYTE)
+
+
+def _lower(name: str, value: int) -> None:
+    """Lower a limit of this process, unless it is lower already; not every system has it."""
+    with suppress(ImportError, AttributeError, OSError, ValueError):
+        import resource
+
+        number = getattr(resource, name)
+        _, most = resource.getrlimit(number)
+        value = value if most == resource.RLIM_INFINITY else min(value, most)
+        resource.setrlimit(number, (value, value))
+
+
+def address_space() -> float:
+    """Return the bytes of memory that this process may address."""
+    with suppress(ImportError, AttributeError):
+        import resource
+
+        most, _ = resource.getrlimit(resource.RLIMIT_AS)
+        return inf if most == resource.RLIM_INFINITY else most
+    return inf
 
 
 @cache

@@ -100,11 +100,13 @@ class PluginProcess:
                     files=[self._progress.fileno()],
                     output=self.output.end,
                 )
-        except OSError as error:
-            self._progress.close()
-            raise PluginError(f"import: {command[0]} does not start: {error.strerror}", "exit", ended=True) from error
-        finally:
             self.output.start()
+        except (OSError, RuntimeError) as error:  # The user may have as many processes or threads as the system allows.
+            self._progress.close()
+            words = getattr(error, "strerror", error)
+            raise PluginError(f"import: {command[0]} does not start: {words}", "exit", ended=True) from error
+        finally:
+            os.close(self.output.end)
         self._core = -1
         self._sent_ahead = b""
 
@@ -211,33 +213,25 @@ class PluginProcess:
                 process.kill()
         self._child.end()
         psutil.wait_procs(first, timeout=_SECONDS_TO_DIE)
-        self.output.wait()
+        self.output.join(_SECONDS_TO_READ)  # A child that still writes is not waited for.
         self._progress.close()
         if self._group is not None:
             self._group.remove()
 
 
-class Output:
+class Output(threading.Thread):
     """The last bytes that a process writes to `end`. A thread reads them, so that no process waits for a reader."""
 
     def __init__(self) -> None:
+        super().__init__(daemon=True)
         self._near, self.end = os.pipe()
         self.last = b""
-        self._thread = threading.Thread(target=self._read, daemon=True)
 
-    def start(self) -> None:
-        """Begin to read, once the process has the other end."""
-        os.close(self.end)
-        self._thread.start()
-
-    def _read(self) -> None:
+    def run(self) -> None:
+        """Read until nobody has the other end."""
         with os.fdopen(self._near, "rb", buffering=0) as pipe, suppress(OSError):
             while data := pipe.read(1 << 16):
                 self.last = (self.last + data)[-_LAST_WORDS:]
-
-    def wait(self) -> None:
-        """Wait until all is read; a child that still writes is not waited for."""
-        self._thread.join(_SECONDS_TO_READ)
 
 
 def _file_of_one_byte() -> IO[bytes]:

@@ -1,8 +1,10 @@
 """Output that cannot be written, a closed pipe, a terminal without Greek: none of them is a traceback."""
 
 import os
+import re
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,6 +42,35 @@ def test_a_full_disk_is_one_line_and_rows_that_nobody_can_read_do_not_stop_a_run
     assert answer.stderr == "contactverif: the output cannot be written: No space left on device\n"
     assert of_run.returncode == 0
     assert "\nEvery promise is kept and every property was judged.\n" in of_run.stdout
+
+
+_INTERRUPTS = """
+import sys
+
+class Interrupts:
+    def find_spec(self, name, path=None, target=None):
+        if name == "typer":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupts())
+from contactverif.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("shell", "words", "status", "line"),
+    [
+        ("exec", ["-c", _INTERRUPTS], 130, "stopped"),
+        ("exec", ["-OO", "-m", "contactverif", "list"], 2, "python: found -OO, which drops the docstrings; needed .*"),
+        ("ulimit -v 350000; exec", ["-m", "contactverif", "list"], 2, "ulimit -v: found 350000 kB; needed at least .*"),
+    ],
+)
+def test_a_start_that_cannot_be_is_one_line(shell: str, words: list[str], status: int, line: str) -> None:
+    command = ["sh", "-c", f'{shell} "$@"', "sh", sys.executable, *words]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert (answer.returncode, answer.stdout) == (status, "")
+    assert re.fullmatch(f"contactverif: {line}\n", answer.stderr), answer.stderr
 
 
 def test_who_has_seen_enough_may_close_the_pipe() -> None:

@@ -2,6 +2,9 @@
 
 import os
 import pickle
+import subprocess
+import sys
+import threading
 import time
 
 import numpy as np
@@ -241,6 +244,20 @@ def test_a_wrong_option_is_a_mistake_of_the_user() -> None:
 
 def test_a_formulation_that_cannot_be_imported_is_not_loaded() -> None:
     assert isinstance(load_remote(hostile_few.PROGRAM, "no_such_class", QUICK), NotLoaded)
+
+
+def test_a_process_without_a_thread_for_its_output_is_not_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threading.Thread, "start", lambda _: hostile_few.throw(RuntimeError("can't start new thread")))
+    item = load_remote(hostile_few.PROGRAM, "Springs", Limits(seconds=22.0))
+    assert isinstance(item, NotLoaded)
+    assert "does not start: can't start new thread" in item.reason
+
+
+def test_a_lower_limit_of_the_user_stays() -> None:
+    words = "import resource; number = resource.RLIMIT_NPROC; resource.setrlimit(number, (400, 400)); "
+    words += "from contactverif.isolation import confine; confine._lower('RLIMIT_NPROC', 512); "
+    command = [sys.executable, "-c", f"{words}print(*resource.getrlimit(number))"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "400 400\n"
 
 
 def test_what_it_prints_is_kept_wherever_its_process_is() -> None:
