@@ -6,8 +6,10 @@ Rule for the next editor: the messages here are those of `contactverif.isolation
 import os
 import struct
 import sys
+import tempfile
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -37,6 +39,22 @@ say_misuse = before("residual", ends=EITHER)(
     lambda: _say(FAILURE, "misuse", "exception", ["--seed", "nothing", "another command"]),
     "Tell the harness that the user has made a mistake on the command line, which would end the run.",
 )
+say_misuse_in_make = before("make", ends=EITHER)(
+    lambda: _say(FAILURE, "misuse", "exception", ["--seed", "nothing", "another command"]),
+    "Tell the harness, while it is loaded, that the user has made a mistake, which would end a list of all.",
+)
+
+
+@instead("make")
+def say_misuse_when_it_starts_again(right: Any) -> HostileNts:
+    """End the process at the first forces; the next one says that the user has made a mistake."""
+    mark = Path(os.environ.get("NUMBA_CACHE_DIR", tempfile.gettempdir()), "started")
+    if mark.exists():
+        mark.unlink()
+        _say(FAILURE, "misuse", "exception", ["--seed", "nothing", "another command"])
+    return HostileNts(1.0, {"residual": lambda *_: (mark.touch(), os._exit(1))})
+
+
 say_too_much = before("residual", ends=EITHER)(
     lambda: _say(FAILURE, "plugin", "exception", ["\x1b[2J\x07\n" * 700_000]),
     "Tell the harness of an error in 5 MB of escape sequences.",

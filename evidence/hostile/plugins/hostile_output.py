@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 
-from hostile_kit import EITHER, LIKE_NTS, MOST_FILES, Factory, before
+from hostile_kit import CAUGHT, EITHER, LIKE_NTS, MOST_FILES, Factory, before
 
 _calls = itertools.count(1)
 
@@ -39,6 +39,19 @@ print_escapes = before("residual", ends=LIKE_NTS)(
     ),
     "Clear the terminal, change its title, and print a table of its own.",
 )
+
+
+print_commands = before("residual", ends=LIKE_NTS)(
+    lambda: print(" ::error::all is lost\r::add-mask::pass\n##[set-env name=PATH]nowhere", flush=True),
+    "Print commands that a workflow of GitHub obeys.",
+)
+
+
+@before("make", ends=CAUGHT)
+def print_as_the_box_and_exit() -> None:
+    """Print what a box prints that cannot be made, and end the process."""
+    os.write(2, b"bwrap: Can not bind mount\n")
+    os._exit(1)
 
 
 @before("residual", ends=LIKE_NTS)
