@@ -3,6 +3,7 @@
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,10 @@ from contactverif.contract.property import Verdict
 from contactverif.contract.result import Run
 from contactverif.plugins.provenance import machine
 from contactverif.plugins.registry import load_formulation, load_properties
-from contactverif.run.journal import read_messages, record_files
+from contactverif.run.journal import read_messages, record_files, write_record
 from contactverif.run.run import run
 from contactverif.run.run_options import RunOptions
-from contactverif.run.store import FormRecord, OutcomeRecord, Plan, RejectedRecord, Store
+from contactverif.run.store import FormRecord, OutcomeRecord, Plan, RejectedRecord, Store, read_plan
 
 IDS = ("balance.force", "patch.flat.transmission")
 EXAMPLES, SEED = 12, 3
@@ -57,6 +58,12 @@ def forge(journal: Path, change: Callable[[Record], Record]) -> None:
             places[place] = len(data)
             data += frame(changed)
         path.write_bytes(data)
+
+
+def forge_header(journal: Path, **options: Any) -> None:
+    """Let the header of a journal ask for other options."""
+    plan = read_plan(journal, "")
+    write_record(journal / "header", msgspec.structs.replace(plan, options=replace(plan.options, **options)))
 
 
 def say_pass(record: Record) -> Record:

@@ -56,7 +56,7 @@ _OPTIONS = {name: f"--{name}" for name in ("examples", "seed", "profile")} | {
     "place": "--mesh",
 }
 _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlier versions, now all --out.
-_STOPPED, _CLOSED_PIPE, _MISUSE = 130, 128 + signal.SIGPIPE, 2  # Exit statuses, as shells and typer have them.
+_STOPPED, _CLOSED_PIPE, _MISUSE = (130, 143), 128 + signal.SIGPIPE, 2  # Exit statuses, as shells and typer have them.
 _MOST_COLUMNS = 10_000
 _LEAST_MEMORY = 1 << 30  # Bytes of address space. The libraries of a plugin take about half of them.
 _COMMAND = re.compile(r"((?:^|[\r\n])[^\S\r\n]*:(?=:)|#(?=#\[))")  # White space alone stands before the first colon.
@@ -100,7 +100,7 @@ def main() -> None:
         sys.stdout.flush()
     except Exception as error:
         status = _exit_status(error)
-    if status == _STOPPED:
+    if status in _STOPPED:
         typer.echo("contactverif: stopped", err=True)
     sys.exit(status or 0)
 
@@ -132,7 +132,7 @@ def _exit_status(error: Exception) -> int:
         case typer.Abort():
             if isinstance(error.__cause__, EOFError):  # Typer takes it for the end of what a user types.
                 raise error.__cause__
-            return _STOPPED
+            return 128 + next(iter(getattr(error.__cause__, "args", ())), signal.SIGINT)  # `Bar` tells the signal.
         case MisuseError():
             reason = str(MisuseError(_OPTIONS.get(error.argument, error.argument), error.found, error.needed))
         case ContactverifError():

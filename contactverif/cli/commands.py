@@ -196,7 +196,13 @@ def merge(
         ),
     ],
     *,
-    options: Annotated[RunOptions, Takes(["shrink"])],
+    options: Annotated[
+        RunOptions,
+        Takes(
+            ["names", "shrink", "pictures", "known", "jobs", ISOLATION],
+            {"names": "Formulations of the shards that load a file, such as c:file=mine.so."},
+        ),
+    ],
     audit: Annotated[
         bool, typer.Option("--audit", help="Audit the report, as for shards that strangers computed.")
     ] = False,
@@ -337,7 +343,13 @@ def audit(
     *,
     report: ReportPath,
     share: Share = 0.01,
-    options: Annotated[RunOptions, Takes([PLACE, ISOLATION])],
+    options: Annotated[
+        RunOptions,
+        Takes(
+            ["names", PLACE, ISOLATION],
+            {"names": "Formulations of the report that load a file, such as c:file=mine.so."},
+        ),
+    ],
 ) -> None:
     """Derive all verdicts of a report again, and judge a sample again.
 

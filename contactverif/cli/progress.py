@@ -1,7 +1,7 @@
 """The progress of a run on standard error: a line for each row, and below it a bar, or in a file a line now and then.
 
-While the bar is up, Ctrl-C ends the run at the next case at the latest. Python drops an interrupt that arrives in a
-callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
+While the bar is up, Ctrl-C or SIGTERM ends the run at the next case at the latest. Python drops an interrupt that
+arrives in a callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from contactverif.contract.errors import one_line
 from contactverif.run import scheduler
 from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
+SIGNALED = 128  # The exit status of a run that a signal stops is this and its number.
 _BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
 _LONG_CASE = 10.0  # Seconds without news that are worth a word.
@@ -57,15 +58,16 @@ class Bar:
             disable=not console.is_terminal,
         )
         self._task: TaskID | None = None
-        self._interrupted = False
+        self._interrupted = 0  # The number of the signal that stops the run.
         self._of_run: scheduler.RunProgress | None = None
         self._last, self._since = "", monotonic()  # The last step, and when it was new.
         self._next_line = self._since + _PAUSE
-        self._previous_handler: Any = None
+        self._previous_handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Bar:
         if threading.current_thread() is threading.main_thread():  # Python allows signal handlers in no other thread.
-            self._previous_handler = signal.signal(signal.SIGINT, self._interrupt)
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._previous_handlers[number] = signal.signal(number, self._interrupt)
         if not self._progress.disable:
             self._progress.start()
         return self
@@ -73,12 +75,12 @@ class Bar:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         if not self._progress.disable:  # Old versions of rich end one that never started with an empty line.
             self._progress.stop()
-        if self._previous_handler is not None:
-            signal.signal(signal.SIGINT, self._previous_handler)
+        for number, handler in self._previous_handlers.items():
+            signal.signal(number, handler)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        self._interrupted = True
-        raise KeyboardInterrupt
+        self._interrupted = number
+        raise KeyboardInterrupt(number)
 
     def show_progress(self, step: scheduler.Progress) -> None:
         """Show how far a run is; the scheduler calls this after every case."""
@@ -112,10 +114,10 @@ class Bar:
         Raises
         ------
         KeyboardInterrupt
-            If the user has pressed Ctrl-C.
+            If the user has pressed Ctrl-C, or the system has sent SIGTERM; it has the number of the signal.
         """
         if self._interrupted:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(self._interrupted)
         now = monotonic()
         if description != self._last:
             self._last, self._since = description, now
@@ -132,3 +134,9 @@ class Bar:
         self._progress.update(
             self._task, description=description, completed=n_finished, total=n_planned, left=left, since=self._since
         )
+
+
+def leave_at_next_signal() -> None:
+    """Let a second Ctrl-C or SIGTERM end this process at once; whatever it has started ends with it."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: os._exit(SIGNALED + number))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import textwrap
 from collections.abc import Sequence
 from math import isnan
@@ -25,10 +26,11 @@ from contactverif.isolation.limits import Limits
 from contactverif.mechanics.scene import has_bodies
 from contactverif.plugins import registry
 from contactverif.problems.catalogue import load_scene
-from contactverif.run.audit import Audit
+from contactverif.run.audit import Audit, check_libraries
 from contactverif.run.audit import audit as audit_run
 from contactverif.run.judge import judge_if_applicable
 from contactverif.run.run_options import RunOptions
+from contactverif.run.store import check_names
 from contactverif.sampling.draw import Sampling
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.netcdf.differences import same_data
@@ -137,6 +139,9 @@ def announce_stored(name: str) -> str:
         if part not in installed:
             needed = "an installed one: install its plugin, or give --formulation NAME"
             raise MisuseError("REPORT", f"the formulation {part!r}, which is not installed", needed)
+    if registry.loads_file(name):
+        needed = f"--formulation {shlex.quote(name)}, if you trust the file"
+        raise MisuseError("REPORT", f"the formulation {name}, which loads a file", needed)
     listed = ", ".join(f"{option} = {value!r}" for option, value in options.items())
     echo(f"the report names the formulation {base}, {listed or 'without options'}", to_stderr=True)
     return name
@@ -194,6 +199,8 @@ def audit(report: Path, share: float, options: RunOptions) -> int:
     """Audit a report, and show what differs; return 1 if something does, else 0."""
     check_share(share)
     run = read_run(report, consistent=False)
+    check_names(run.formulations, options.names, "REPORT")
+    check_libraries(run)
     stored, typed = run.provenance.get("place", ""), options.place_words
     if stored != typed:
         difference = f"a run with {stored or 'no place'}, and here {typed or 'none'}"
@@ -231,4 +238,6 @@ def _show_audit(run: Run, audit: Audit, derivable: list[str]) -> None:
     chances = [f"{count}: {audit.chance(count):.0%}" for count in (1, 10, 100) if count <= audit.n_outcomes]
     if chances:
         show(f"chance to see one forged outcome among so many: {', '.join(chances)}")
+    words = f"not derived, as the report says it: {', '.join(audit.unproven)}"
+    echo(textwrap.fill(words, _MOST_COLUMNS, subsequent_indent="  "))
     show("Something differs." if lines else "Nothing differs.")

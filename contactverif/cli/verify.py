@@ -23,7 +23,7 @@ from contactverif.api.run_files import REPORT, RUN_FILES, write_run
 from contactverif.cli.annotations import annotate
 from contactverif.cli.console import columns, echo, print_plugin_output, show
 from contactverif.cli.options import OutputFiles, Screen, picture_folder, read_place, select_names, with_engines
-from contactverif.cli.progress import Bar
+from contactverif.cli.progress import SIGNALED, Bar, leave_at_next_signal
 from contactverif.cli.run_screen import run_screen, show_run, summary
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import case_id, failing_examples
@@ -38,12 +38,12 @@ from contactverif.plugins.provenance import CODE, code_digests, collect_versions
 from contactverif.plugins.registry import load_properties
 from contactverif.run.campaign import Shard, mark_done, open_shard, read_shards
 from contactverif.run.failure_memory import FailureMemory
-from contactverif.run.journal import hold_journal, journal_folder, keep_earlier, new_journal, remove_journal
+from contactverif.run.journal import hold_journal, is_own, journal_folder, keep_earlier, new_journal, remove_journal
 from contactverif.run.rows import find_missing
 from contactverif.run.run import RunStopped, run, run_failures, run_share
-from contactverif.run.run_options import Isolation, RunOptions, declared_options, read_settings
+from contactverif.run.run_options import PLACE, Isolation, RunOptions, declared_options, group_names, read_settings
 from contactverif.run.scheduler import WorkerError, begin_loading
-from contactverif.run.store import STORED, Plan, Store, check_versions, read_plan
+from contactverif.run.store import OF_USER, STORED, Plan, Store, agree, check_versions, read_plan
 from contactverif.run.worker_pool import check_jobs, default_jobs, worker_pool
 from contactverif.sampling.draw import Sampling
 from contactverif_reports.files import made_folder, reason_not_to_grow
@@ -73,7 +73,7 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
     plan = piece.plan(job.plan())
     made_folder(folder, "--out")
     journal_of_shard = folder.absolute() / piece.folder
-    with open_shard(journal_of_shard, plan) as is_done:
+    with watch_for_stops(replace(job, again="the same command")), open_shard(journal_of_shard, plan) as is_done:
         if is_done:
             echo(f"shard {piece.text} is done already")
             return 0
@@ -104,10 +104,10 @@ def merge(folder: Path, out: Sequence[Path], options: RunOptions, audit: bool, s
 
     replay.check_share(share if audit else 1.0)
     plan, journals = read_shards(folder, "FOLDER")
-    planned, shrink = options_of(plan, CAMPAIGN, "FOLDER"), options.shrink
-    job = new_job(replace(planned, shrink=shrink or planned.shrink, out=tuple(out)))
-    files = [word for path in out for word in ("--out", str(path))]
-    again = shlex.join(["contactverif", "merge", str(folder), *files, *(["--shrink", shrink] if shrink else [])])
+    typed = replace(options, out=tuple(out))
+    planned = options_of(plan, CAMPAIGN, "FOLDER", typed)
+    job = new_job(replace(planned, shrink=options.shrink or planned.shrink))
+    again = shlex.join(["contactverif", "merge", str(folder), *options.names, *typed.words(["shrink", *OF_USER])])
     if audit and REPORT not in job.files.names:
         raise MisuseError("--audit", "no report", f"--out FILE{REPORT} beside it")
     status = _run_job(replace(job, sources=journals, again=again), screen)
@@ -231,7 +231,8 @@ def new_job(options: RunOptions, *, fresh_seed: int | None = None, command: str 
 def resumed_job(output: Path, typed: RunOptions, command: str = VERIFY) -> Job:
     """Return the job that goes on with a run that was to write a report or page, and was stopped.
 
-    Beside `--resume` only `--jobs` and `--keep-going` may be typed: all other options come from the journal.
+    Beside `--resume` only `--jobs` and `--keep-going` may be typed: all other options come from the journal. If this
+    user has not begun it, what it may reach, write or excuse comes from the command line, as for the shards of others.
     """
     if output.is_dir():
         raise MisuseError("--resume", f"{output}, a folder", "the report of a run that was stopped")
@@ -239,11 +240,13 @@ def resumed_job(output: Path, typed: RunOptions, command: str = VERIFY) -> Job:
     if output.exists() and not folder.exists():
         raise MisuseError("--resume", f"{output}, which is complete", "the report of a run that was stopped")
     plan, nothing = read_plan(folder, "--resume"), RunOptions()
+    is_mine = is_own(folder)
+    beside = _BESIDE_RESUME if is_mine else (*_BESIDE_RESUME, "names", *OF_USER, *group_names(PLACE))
     for name, (_, option) in declared_options(RunOptions).items():
-        if name not in _BESIDE_RESUME and getattr(typed, name) != getattr(nothing, name):
+        if name not in beside and getattr(typed, name) != getattr(nothing, name):
             needed = "--jobs and --keep-going at most: all other options come from the journal"
             raise MisuseError("--resume", f"{option.group or name} beside it", needed)
-    options = options_of(plan, command, "--resume")
+    options = options_of(plan, command, "--resume", None if is_mine else typed)
     others = [path for path in options.out if path.suffix.lower() != output.suffix.lower()]
     jobs = options.jobs if typed.jobs is None else typed.jobs
     keep_going = typed.keep_going or options.keep_going
@@ -261,15 +264,23 @@ def versions_of(options: RunOptions) -> dict[str, str]:
     return versions
 
 
-def options_of(plan: Plan, command: str, argument: str) -> RunOptions:
-    """Return the options of a journal of a command and of these versions, with files relative to the working folder."""
+def options_of(plan: Plan, command: str, argument: str, typed: RunOptions | None) -> RunOptions:
+    """Return the options of a journal of a command and of these versions, with files relative to the working folder.
+
+    `typed` are those of the user, where somebody else may have made the journal.
+    """
     if plan.command != command:
         raise MisuseError(argument, f"a journal of {plan.command}", f"one of {command}")
     options = plan.options.from_folder(plan.folder)
+    if typed is not None:
+        options, refused = agree(options, typed, argument)
+        if refused:
+            _warn(f"{argument} asks for {shlex.join(refused)}, and does not get it; type it to allow it")
+    elif options.isolation in (Isolation.BOX, Isolation.LANDLOCK):
+        # They may not be had here, and the results are the same without.
+        options = replace(options, isolation=None)
     check_versions(plan.versions, versions_of(options), argument)
-    # A box or Landlock may not be had here, and the results are the same without.
-    weaker = options.isolation in (Isolation.BOX, Isolation.LANDLOCK)
-    return replace(options, isolation=None if weaker else options.isolation)
+    return options
 
 
 def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
@@ -381,10 +392,14 @@ def watch_for_stops(job: Job) -> Iterator[None]:
     """Open a block in which a job is judged. After Ctrl-C it shows what was judged; if a worker dies, how to go on."""
     try:
         yield
-    except RunStopped as stop:
-        show(*run_screen(stop.run, columns()))
+    except KeyboardInterrupt as stop:
+        leave_at_next_signal()
+        if isinstance(stop, RunStopped):
+            show(*run_screen(stop.run, columns()))
         print_resume_hint(job)
-        raise typer.Exit(STOPPED) from None
+        # Where a run is stopped, the interrupt with the number of the signal stands behind the error.
+        numbers = [word for error in (stop, stop.__context__) if error for word in error.args if isinstance(word, int)]
+        raise typer.Exit(next((SIGNALED + number for number in numbers), STOPPED)) from None
     except WorkerError:
         print_resume_hint(job)
         raise

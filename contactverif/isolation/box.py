@@ -33,6 +33,7 @@ _BASE_MEMORY = 512 << 20  # Bytes beyond the limit of memory, for Python and wha
 _GROUP_PREFIX = "contactverif-"
 _SECONDS_TO_END = 10.0
 _SECONDS_TO_JOIN = 60.0
+_SECONDS_TO_KEEP = 30 * 86400.0
 _ROOT = Path("/sys/fs/cgroup")
 # The shell joins the groups, and becomes the program: from its first moment on all that it starts is in them.
 _JOIN = 'while [ "$1" != -- ]; do echo $$ > "$1/cgroup.procs"; shift; done; shift; exec "$@"'
@@ -90,13 +91,16 @@ def environment(box: Box, folder: str) -> dict[str, str]:
     return places | {WRITABLE: os.pathsep.join((*writable, "/dev", NETWORK)), PROCESSES: str(MOST_PROCESSES)}
 
 
-def kernel_folder(name: str) -> str:
-    """Return a folder for the compiled kernels of the boxes of this name alone; empty if it cannot be made."""
+def kernel_folder(name: str, digest: str) -> str:
+    """Return a folder for the compiled kernels of the boxes of this name and code alone; empty if none can be made."""
     usual = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     installation = blake2b(sys.prefix.encode(), digest_size=4).hexdigest()
-    folder = Path(usual, "contactverif", "kernels", f"{name}-{installation}")
+    folder = Path(usual, "contactverif", "kernels", f"{name}-{installation}-{digest}")
     try:
         folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)  # A box may open its folder for other users.
+        for other in folder.parent.glob(f"{name}-{installation}*"):  # Those of earlier code, which no run has left.
+            if other != folder and time() - other.stat().st_mtime > _SECONDS_TO_KEEP:
+                shutil.rmtree(other, ignore_errors=True)
         folder.mkdir(mode=0o700, exist_ok=True)
     except OSError:
         return ""
@@ -241,11 +245,11 @@ def _find_parents() -> Iterator[tuple[str, Path]]:
                 yield from ((controller, parent) for controller in ("memory", "pids") if controller in enabled)
 
 
-@cache
-def plugin_folder() -> str:
-    """Return the folder of this process of the judge."""
-    # A process that is killed removes nothing. The lock of a folder ends with the process that made it.
-    for path in Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"):
+def remove_abandoned_folders() -> None:
+    """Remove the temporary folders of processes of the judge that were killed, those of multiprocessing among them."""
+    # The lock of a folder ends with the process that made it.
+    temporary = Path(tempfile.gettempdir())
+    for path in (*temporary.glob(f"{_FOLDER_PREFIX}*"), *temporary.glob("pymp-*")):
         with suppress(OSError):  # It belongs to another user, or a process has just made it or holds it.
             descriptor = os.open(path / _LOCK, os.O_RDWR)
             try:
@@ -253,11 +257,23 @@ def plugin_folder() -> str:
             finally:
                 os.close(descriptor)
             shutil.rmtree(path, ignore_errors=True)
+
+
+@cache
+def plugin_folder() -> str:
+    """Return the folder of this process of the judge."""
+    remove_abandoned_folders()
     folder = tempfile.mkdtemp(prefix=_FOLDER_PREFIX)
+    hold_folder(folder)
+    return folder
+
+
+@cache
+def hold_folder(folder: str) -> None:
+    """Lock a temporary folder as long as this process lives."""
     with suppress(OSError):
         _locks.append(os.open(os.path.join(folder, _LOCK), os.O_CREAT | os.O_RDWR, 0o600))
         _lock(_locks[-1])
-    return folder
 
 
 def remove_plugin_folder() -> None:

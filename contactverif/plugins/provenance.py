@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import cache
-from hashlib import sha256
 from importlib import import_module, metadata
 from pathlib import Path
 
@@ -20,10 +18,9 @@ from threadpoolctl import threadpool_info
 
 from contactverif.contract.subject import ENGINE
 from contactverif.plugins import registry
+from contactverif.plugins.registry import digest_files
 
 PACKAGES = ("contactverif", "numpy", "scipy", "scikit-fem", "hypothesis", "numba", "xarray")
-_CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
-_DIGITS = 16
 CODE = "code of "  # The name of a digest is this and the name of a package or a file.
 
 
@@ -113,30 +110,5 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
         modules |= registry.modules_of(entry for entry in metadata.entry_points(group=group) if entry.name in names)
     packages = sorted({module.partition(".")[0] for module in modules})
     files = sorted({path for text in formulations for path in registry.files_within(text)})  # They load these.
-    digests = {f"{CODE}{package}": _digest(_files_of(package)) for package in packages}
-    return digests | {f"{CODE}{path.name}": _digest([(path.name, path)]) for path in files}
-
-
-def _files_of(package: str) -> list[tuple[str, Path]]:
-    """Return (name, file) of all code of a package, in an order that no machine changes; nothing is imported."""
-    try:
-        spec = importlib.util.find_spec(package)
-    except (ImportError, ValueError):
-        spec = None
-    if spec is None:
-        return []
-    if spec.submodule_search_locations is None:  # A module by itself.
-        return [(package, Path(str(spec.origin)))]
-    folders = map(Path, spec.submodule_search_locations)
-    return sorted((path.relative_to(folder).as_posix(), path) for folder in folders for path in folder.rglob("*"))
-
-
-def _digest(files: Iterable[tuple[str, Path]]) -> str:
-    total = sha256()
-    for name, path in files:
-        if path.suffix not in _CODE or not path.is_file():
-            continue
-        content = path.read_bytes()
-        total.update(f"{name} {len(content)} ".encode())
-        total.update(content)
-    return total.hexdigest()[:_DIGITS]
+    digests = {f"{CODE}{package}": digest_files(registry.package_files(package)) for package in packages}
+    return digests | {f"{CODE}{path.name}": digest_files([(path.name, path)]) for path in files}

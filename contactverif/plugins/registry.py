@@ -23,6 +23,7 @@ from contextlib import suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, lru_cache, partial
+from hashlib import sha256
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import cache_from_source, find_spec
 from math import inf
@@ -64,6 +65,8 @@ _FORM = "NAME, NAME:OPTION=VALUE,OPTION=VALUE or WRAPPER/NAME"
 _ENGINE_FORM = "NAME or NAME:OPTION=VALUE,OPTION=VALUE"
 _MARKS = ":/"  # They stand before options, and before the formulation that is wrapped.
 _RESERVED = ("penalty", "inner")  # Arguments that the harness passes; a user cannot set them as options.
+_CODE = frozenset({".py", ".so", ".pyd", ".dylib", ".dll"})
+_DIGITS = 16
 # {an option: its form} of loaders: without the option such a name stands for no formulation.
 _FILE = "file"
 _NEEDED = {_FILE: f"{_FILE}=PATH", "kind": "kind=KIND"}
@@ -139,6 +142,39 @@ def files_within(text: str) -> list[Path]:
     """Return the files that a text names by an option `file`, as far as they exist."""
     paths = [Path(file).expanduser() for file in re.findall(rf"[:,]{_FILE}=([^,]+)", text)]
     return [path.resolve() for path in paths if path.is_file()]
+
+
+def loads_file(text: str) -> bool:
+    """Return whether a name may load a file or run a program: not if its options are plain words and numbers."""
+    options = re.findall(r"[:,]([^=,]*)=([^,]*)", text)
+    is_plain = re.compile(r"[\w+-]+|[-+]?[\d.]+(e[-+]?\d+)?").fullmatch
+    return any(name in (_FILE, "program") or not is_plain(value) for name, value in options)
+
+
+def package_files(package: str) -> list[tuple[str, Path]]:
+    """Return (name, file) of all code of a package, in an order that no machine changes; nothing is imported."""
+    try:
+        spec = find_spec(package)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        return []
+    if spec.submodule_search_locations is None:  # A module by itself.
+        return [(package, Path(str(spec.origin)))]
+    files = ((Path(folder), path) for folder in spec.submodule_search_locations for path in Path(folder).rglob("*"))
+    return sorted((path.relative_to(folder).as_posix(), path) for folder, path in files if path.suffix in _CODE)
+
+
+def digest_files(files: Iterable[tuple[str, Path]]) -> str:
+    """Return a digest of files and of the names that they go by."""
+    total = sha256()
+    for name, path in files:
+        if not path.is_file():
+            continue
+        content = path.read_bytes()
+        total.update(f"{name} {len(content)} ".encode())
+        total.update(content)
+    return total.hexdigest()[:_DIGITS]
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -235,11 +271,18 @@ def _with_store(limits: Limits, text: str) -> Limits:
     """Return the limits of a formulation's process, with a store of its kernels in the box, if there is one."""
     installed = entries_by_name(FORMULATIONS)
     modules = modules_of(entry for name in names_within(text) for entry in installed.get(name, ()))
-    _compile_once(frozenset(module.partition(".")[0] for module in modules))
-    if limits.box is not None:  # It keeps compiled kernels, those of all formulations of the same modules.
-        store = kernel_folder("+".join(sorted(modules))) if modules else ""  # Strangers may share a package's name.
+    _compile_once(packages := frozenset(module.partition(".")[0] for module in modules))
+    if limits.box is not None:  # It keeps compiled kernels, those of all formulations of the same modules and code.
+        # A library leaves there what it likes, and another one would load it: so libraries have none that stays.
+        keeps = modules and not loads_file(text)
+        store = kernel_folder("+".join(sorted(modules)), _digest_of(packages)) if keeps else ""
         return replace(limits, box=replace(limits.box, store=store))
     return limits
+
+
+@cache
+def _digest_of(packages: frozenset[str]) -> str:
+    return digest_files(file for package in sorted(packages) for file in package_files(package))
 
 
 @cache

@@ -9,16 +9,21 @@ from time import perf_counter
 
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample, Origin, counterexamples
+from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Outcomes, Property, PropertyInfo, judge_stored
 from contactverif.contract.result import OMITTED, Row, Run
 from contactverif.contract.subject import Subject
-from contactverif.plugins.provenance import code_digests, collect_versions, machine
+from contactverif.plugins.provenance import CODE, code_digests, collect_versions, machine
+from contactverif.plugins.registry import files_within
 from contactverif.run.recheck import Sample, choose_share, judge_again, judge_samples
 from contactverif.run.rows import OpenRow, find_missing_cases, find_missing_row, open_row, verdict_of_row
 from contactverif.run.run import Driver
 from contactverif.run.scheduler import Scheduler
 from contactverif.run.store import WITNESS, Store
 from contactverif.sampling.draw import Sampling
+
+_DERIVED = {"examples", "seed", "place"}  # The attributes from which the cases follow.
+_UNPROVEN = {"platform", "seconds"}  # They are compared or shown, and anybody can write them.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +36,7 @@ class Audit:
     n_outcomes: int  # The number of stored outcomes, and of those that were judged again.
     n_judged: int
     n_examples: int  # The number of witnesses and counterexamples, all of which were judged again.
+    unproven: tuple[str, ...]  # The attributes of the run that nothing tells again, such as its date.
     seconds: float
 
     def chance(self, n_forged: int) -> float:
@@ -97,17 +103,32 @@ def audit(
         n_outcomes=sum(len(row.outcomes) for row in run.rows),
         n_judged=sum(len(sample.words) for sample in samples) - n_witnesses,
         n_examples=len(examples) + n_witnesses,
+        unproven=tuple(sorted(run.provenance.keys() - _facts_of_today(run).keys() - _DERIVED | _UNPROVEN)),
         seconds=perf_counter() - start,
     )
 
 
+def check_libraries(run: Run) -> None:
+    """Check that the libraries that a run names are those with which it was judged; no other one is loaded."""
+    today = code_digests(run.formulations, ())
+    for name in sorted({f"{CODE}{path.name}" for text in run.formulations for path in files_within(text)}):
+        stored = run.provenance.get(name.replace(" ", "_"), today[name])
+        if stored != today[name]:
+            needed = "the library with which it was judged"
+            raise MisuseError("REPORT", f"{name}: {stored} in the report and {today[name]} here", needed)
+
+
 def _find_changes(run: Run) -> tuple[str, ...]:
     """Return what is other today than in a run, of what the last bits of a number depend on."""
-    digests = code_digests(run.formulations, list(run.properties))
-    today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
+    today = _facts_of_today(run)
     stored = {name: run.provenance.get(name, "unknown") for name in today}
     changed = [name for name in today if stored[name] != today[name]]
     return tuple(f"{name}: {stored[name]} in the report, {today[name]} here" for name in changed)
+
+
+def _facts_of_today(run: Run) -> dict[str, str]:
+    digests = code_digests(run.formulations, list(run.properties))
+    return collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
 
 
 class DerivedOutcomes(Outcomes):

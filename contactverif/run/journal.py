@@ -15,8 +15,9 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from hashlib import blake2b
 from pathlib import Path
-from secrets import token_hex
+from secrets import compare_digest, token_bytes, token_hex
 from typing import IO, TypeVar
 
 import msgspec
@@ -24,7 +25,8 @@ import psutil
 
 from contactverif.contract.errors import MisuseError
 
-_RECORDS, _HEADER, _EARLIER = ".outcomes", "header", "earlier"
+_RECORDS, _HEADER, _EARLIER, _SIGNATURE = ".outcomes", "header", "earlier", "signature"
+_KEY_SIZE = 32  # Bytes.
 _FRAME = struct.Struct("<II")
 _LARGEST = 2**26  # The largest record, in bytes.
 _Record = TypeVar("_Record", bound=msgspec.Struct)
@@ -91,7 +93,7 @@ def _frame(message: bytes) -> bytes:
 
 def record_files(folder: Path) -> list[Path]:
     """Return the files of records of a journal."""
-    return sorted(folder.glob(f"*{_RECORDS}"))
+    return sorted(path for path in folder.glob(f"*{_RECORDS}") if path.is_file())  # A pipe would wait for a writer.
 
 
 def read_messages(path: Path) -> Iterator[tuple[int, bytes]]:
@@ -127,6 +129,8 @@ def write_record(path: Path, record: msgspec.Struct) -> None:
 
 def read_record(path: Path, kind: type[_Record]) -> _Record | None:
     """Return the one record of a file; None if it is damaged. Without such a file there is an `OSError`."""
+    if not path.is_file():
+        raise FileNotFoundError(path)
     with path.open("rb") as file:
         message = read_message(file)
         decoder = msgspec.msgpack.Decoder(kind, dec_hook=lambda kind, value: kind(value))  # Of paths.
@@ -171,6 +175,8 @@ def new_journal(folder: Path, plan: msgspec.Struct, outputs: Sequence[Path] = ()
             part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
             part.mkdir()
             write_record(part / _HEADER, plan)
+            with suppress(OSError):  # Without a key the user types again what matters.
+                (part / _SIGNATURE).write_bytes(_sign(part))
             locks.enter_context(hold_journal(part, "--out"))
             part.replace(folder)
             for path in aside.glob(f"{_EARLIER}.*"):
@@ -191,6 +197,34 @@ def new_journal(folder: Path, plan: msgspec.Struct, outputs: Sequence[Path] = ()
                 if aside.exists():
                     aside.replace(folder)
             raise
+
+
+def key_file() -> Path:
+    """Return the file of the key with which this user signs journals, and which no plugin in a box sees."""
+    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state", "contactverif", "key")
+
+
+def is_own(folder: Path) -> bool:
+    """Return whether this user has begun a journal here: anybody may write one, but who has the key signs it."""
+    path = folder / _SIGNATURE
+    with suppress(OSError):
+        return path.is_file() and compare_digest(path.read_bytes(), _sign(folder))
+    return False
+
+
+def _sign(folder: Path) -> bytes:
+    """Return a digest of the header of a journal under the key of this user, which is made where there is none."""
+    path = key_file()
+    if not path.exists():
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        part = path.with_name(token_hex(4))
+        part.touch(0o600)
+        part.write_bytes(token_bytes(_KEY_SIZE))
+        part.replace(path)
+    key = path.read_bytes()
+    if len(key) != _KEY_SIZE:
+        raise OSError(f"{path} is no key")
+    return blake2b((folder / _HEADER).read_bytes(), key=key).digest()
 
 
 def _remove_stale(folder: Path) -> None:

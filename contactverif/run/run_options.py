@@ -287,20 +287,29 @@ class RunOptions:
         from contactverif.isolation.box import Box
         from contactverif.isolation.limits import Limits
         from contactverif.isolation.process import adopt_orphans
+        from contactverif.run.journal import key_file
 
         adopt_orphans()
-        box = Box(opened, tuple(map(str, hidden)), by_rules=place is Isolation.LANDLOCK)
+        box = Box(opened, tuple(map(str, [*hidden, key_file()])), by_rules=place is Isolation.LANDLOCK)
         return Limits(self.time_limit, self.memory_limit, None if place is Isolation.PROCESS else box)
+
+    def words(self, names: Iterable[str]) -> list[str]:
+        """Return some of the options as they are typed, a word each; those that nobody typed have none."""
+        words, nothing = [], RunOptions()
+        for name in names:
+            value, option = getattr(self, name), declared_options(RunOptions)[name][1]
+            if value == getattr(nothing, name) or value is None:
+                continue
+            flag = next(iter(option.flags), f"--{name.replace('_', '-')}")
+            pairs = [f"{key}={reason}" for key, reason in value.items()] if isinstance(value, dict) else value
+            for entry in pairs if isinstance(pairs, tuple | list) else [pairs]:
+                words += [flag] if isinstance(entry, bool) else [flag, str(entry)]
+        return words
 
     @property
     def place_words(self) -> str:
         """The options that say where a run asks, as they are typed; empty if it is on random interfaces and scenes."""
-        words = []
-        for name in group_names(PLACE):
-            value, flag = getattr(self, name), f"--{name.replace('_', '-')}"
-            values = value if isinstance(value, tuple) else [value] if value else []
-            words += [flag if entry is True else f"{flag} {entry}" for entry in values]
-        return " ".join(words)
+        return " ".join(self.words(group_names(PLACE)))
 
     def from_folder(self, folder: str) -> RunOptions:
         """Return the options of a run in a folder, with names of files as they are from here."""

@@ -7,9 +7,10 @@ stored outcomes count (`recheck_store`).
 from __future__ import annotations
 
 import os
+import shlex
 from array import array
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby, product
 from pathlib import Path
 from secrets import token_hex
@@ -23,8 +24,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, PropertyInfo, Verdict, judge_stored
 from contactverif.plugins.provenance import CODE, machine
+from contactverif.plugins.registry import loads_file
 from contactverif.run.journal import RecordFile, decode, read_header, read_message, read_messages, record_files
-from contactverif.run.run_options import RunOptions
+from contactverif.run.run_options import ISOLATION, PLACE, Isolation, RunOptions, group_names
 
 FORMAT = 5  # A change of a record is a new one.
 WITNESS = -1  # The number of the outcome of a row's witness.
@@ -33,6 +35,9 @@ _MOST_FORMS = 10_000  # The most forms that a process remembers.
 _MOST_FILES = 4  # The most stores that a process has open for writing.
 _FILE_BITS = 40  # A place is the number of its file, then this many bits for the byte.
 _LEAST_ROOM = 10_000  # A finite list may have this many cases.
+_MOST_ROWS, _MOST_EXAMPLES = 1 << 20, 1 << 40  # More are no plan of a run, and would not fit into a key.
+# The options that say what a run may reach, write or excuse: a journal of a stranger does not choose them.
+OF_USER = ("known", "pictures", "out", "jobs", *group_names(ISOLATION))
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True):
@@ -52,7 +57,41 @@ def read_plan(folder: Path, argument: str) -> Plan:
     plan = read_header(folder, Plan, argument)
     if plan.format != FORMAT:
         raise MisuseError(argument, f"{folder.name} with format {plan.format}", f"a journal of format {FORMAT}")
+    options, n_rows = plan.options, len(plan.options.names) * len(plan.options.properties)
+    if n_rows > _MOST_ROWS or not 0 <= (options.examples or 0) <= _MOST_EXAMPLES:
+        size = f"{n_rows} rows of {options.examples} cases"
+        raise MisuseError(argument, f"{folder.name} with {size}", "an undamaged journal, or another name")
     return plan
+
+
+def check_names(stored: Sequence[str], typed: Collection[str], argument: str) -> None:
+    """Check that the user has typed each stored name that loads a file, and none that is not stored."""
+    if untyped := [name for name in stored if loads_file(name) and name not in typed]:
+        needed = f"{shlex.join(untyped)} typed behind it, if you trust the file"
+        raise MisuseError(argument, f"{', '.join(untyped)}, which loads a file", needed)
+    for name in typed:
+        if name not in stored:
+            raise MisuseError("NAME", name, f"one of {', '.join(stored)}")
+
+
+def agree(stored: RunOptions, typed: RunOptions, argument: str) -> tuple[RunOptions, list[str]]:
+    """Return the options of a journal that a stranger may have made with those of the user, and what it asked beyond.
+
+    A file is named by both, or nothing begins.
+    """
+    check_names(stored.names, typed.names, argument)
+    if stored.place_words != typed.place_words:
+        words = shlex.join(stored.words(group_names(PLACE)))
+        places = f"a journal with {words or 'no mesh or scene'}, and here {typed.place_words or 'none'}"
+        trusted = "the same options, if you trust the files"
+        raise MisuseError(argument, places, trusted if argument.startswith("--") else "one on random cases")
+    options = replace(stored, **{name: getattr(typed, name) for name in OF_USER}).with_settings()
+    place, opened = options.settled_isolation()
+    options = replace(options, isolation=place, opened=opened)
+    weaker = max(stored.isolation or place, place, key=[*Isolation].index)  # A stronger place is none to agree to.
+    stored = replace(stored, out=options.out, jobs=options.jobs, isolation=weaker)
+    refused = [name for name in OF_USER if stored.words([name]) != options.words([name])]
+    return options, stored.words(refused)
 
 
 def check_versions(stored: Mapping[str, str], here: Mapping[str, str], argument: str) -> None:

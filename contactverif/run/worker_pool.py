@@ -11,10 +11,12 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import util
 from multiprocessing.process import BaseProcess
 from typing import Any
 
 from contactverif.contract.errors import MisuseError
+from contactverif.isolation.box import hold_folder, remove_abandoned_folders
 from contactverif.isolation.confine import ONE_THREAD, die_with_parent, one_thread_for_children
 
 CASES_A_WORKER = 1000  # A worker starts in about two seconds, in which the parent judges some hundred cases.
@@ -55,6 +57,7 @@ def worker_pool(jobs: int, *, parent_judges: bool = False) -> Iterator[Executor 
     """
     if jobs < 1:
         raise MisuseError("jobs", str(jobs), "at least 1")
+    remove_abandoned_folders()
     if jobs == 1:
         yield None
         return
@@ -100,6 +103,7 @@ def start_server() -> None:
     try:
         with one_thread_for_children():  # The server inherits both, and hears no Ctrl-C.
             forkserver.ensure_running()
+        hold_folder(util.get_temp_dir())  # That of its socket: a later run removes it if this one is killed.
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

@@ -42,7 +42,12 @@ def test_an_honest_report_agrees_bit_for_bit(ask: Ask, report: Path) -> None:
         "judged again: 4 of 36 outcomes and all 2 others; 0 differ, bit for bit",
     ]
     assert re.fullmatch(r"seconds: \d+\.\d, and \d+\.\d in the run", lines[3])
-    assert lines[4:] == ["chance to see one forged outcome among so many: 1: 11%, 10: 75%", "Nothing differs."]
+    assert lines[4:] == [
+        "chance to see one forged outcome among so many: 1: 11%, 10: 75%",
+        "not derived, as the report says it: command, commit, created, isolation,",
+        "  platform, profile, seconds",
+        "Nothing differs.",
+    ]
     assert max(map(len, lines)) <= 80
 
 
@@ -97,7 +102,7 @@ def test_another_seed_is_found(ask: Ask, report: Path) -> None:
 def test_other_versions_are_said_and_numbers_agree_up_to_roundoff(
     ask: Ask, report: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(provenance, "_digest", lambda files: "another")
+    monkeypatch.setattr(provenance, "digest_files", lambda files: "another")
     answer = ask("audit", report)
     assert answer.status == 0
     assert "  code_of_contactverif_nts: " in answer.out
@@ -114,6 +119,19 @@ def test_a_report_on_a_scene_needs_that_scene(ask: Ask, tmp_path: Path) -> None:
     assert ask("verify nts -p balance.force --scene c --examples 5 --out", report).status == 0
     check_mistake(ask("audit", report), "REPORT: found a run with --scene c, and here none; needed the same options")
     assert ask("audit", report, "--scene", "c").status == 0
+
+
+@pytest.mark.parametrize("typed", [False, True])
+def test_a_library_that_is_not_typed_or_is_another_one_is_not_loaded(ask: Ask, report: Path, typed: bool) -> None:
+    library = report.with_name("x.so")
+    library.write_bytes(b"no library")
+    run, name = read_run(report), f"c:file={library}"
+    rows = tuple(replace(row, formulation=name) if row.formulation == "nts" else row for row in run.rows)
+    write(replace(run, rows=rows, provenance=run.provenance | {"code_of_x.so": "another"}), report)
+    words = f"{name}, which loads a file; needed {name} typed behind it, if you trust the file"
+    if typed:
+        words = "code of x.so: another in the report and [0-9a-f]{16} here; needed the library with which it was judged"
+    check_mistake(ask("audit", report, *([name] if typed else [])), f"REPORT: found {words}")
 
 
 def test_merge_can_audit_what_it_makes(ask: Ask, tmp_path: Path) -> None:

@@ -3,12 +3,14 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from asking import Ask, check_mistake
+from forged_records import forge_header
 
 from contactverif import Property, load_properties
-from contactverif.run.run_options import RunOptions
+from contactverif.run.run_options import Isolation, RunOptions
 from contactverif.run.store import Plan, Store
 from contactverif_reports.netcdf.differences import same_data
 from contactverif_reports.netcdf.read import read_run
@@ -158,6 +160,56 @@ def test_plugins_of_another_shard_may_live_elsewhere(ask: Ask, shards: Path, tmp
     assert judge_shard(ask, shards, 2) == "shard 2/3 is done already\n"
     merged = ask("merge", shards, "--out", tmp_path / "merged.nc")
     assert (merged.status, merged.err) == (0, "")
+
+
+def test_a_shard_chooses_nothing_that_a_run_may_reach_write_or_excuse(ask: Ask, shards: Path, tmp_path: Path) -> None:
+    outside, report = tmp_path / "outside", tmp_path / "r.nc"
+    limits = {"isolation": Isolation.INLINE, "opened": ("/etc",), "time_limit": 0.0, "memory_limit": 1}
+    excuse = {"patch.flat.transmission": "as ever"}
+    for number in range(1, N + 1):
+        forge_header(shards / name(number), **limits, pictures=outside, known=excuse)
+    answer = ask(f"merge {shards} --isolation process --out {report}")
+    known = "--known 'patch.flat.transmission=as ever'"
+    words = f"{known} --pictures {outside} --isolation inline --time-limit 0.0 --memory-limit 1 --open /etc"
+    line = f"contactverif: FOLDER asks for {words}, and does not get it; type it to allow it\n"
+    assert (answer.status, answer.err.startswith(line)) == (0, True)
+    assert read_run(report).provenance["isolation"].startswith("process")
+    assert {row.known for row in read_run(report).rows} == {""}
+    assert not outside.exists()
+    answer = ask(f"merge {shards} {words.replace('0.0', '60').replace(' 1 ', ' 4096 ')} --out {report}")
+    assert "asks for --time-limit 0.0 --memory-limit 1, and" in answer.err
+    assert {row.known for row in read_run(report).rows} == {"", "as ever"}
+    assert outside.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"mesh": Path("/x.msh"), "slave": "a", "master": "b"}, "a journal with --mesh /x.msh --slave a --master b"),
+        ({"scene_file": "/x.py:f"}, "a journal with --scene-file /x.py:f, and here none; needed one on random cases"),
+        ({"names": ("nts", "c:file=/x.so")}, "c:file=/x.so, which loads a file; needed c:file=/x.so typed behind it"),
+        (
+            {
+                "names": (
+                    "nts",
+                    "engine/calculix:program=reboot",
+                )
+            },
+            "engine/calculix:program=reboot, which loads a file",
+        ),
+        ({"names": ("nts", "mine:table=../x")}, "mine:table=../x, which loads a file"),
+        ({"examples": 2**62}, "shard-1-of-3 with 6 rows of 4611686018427387904 cases"),
+        ({"names": ("nts",) * 2**12, "properties": ("x",) * 2**12}, "shard-1-of-3 with 16777216 rows of 43 cases"),
+    ],
+)
+def test_a_shard_that_names_a_file_or_has_no_end_is_refused(
+    ask: Ask, shards: Path, options: dict[str, Any], words: str
+) -> None:
+    for number in range(1, N + 1):
+        forge_header(shards / name(number), **options)
+    assert refusal(ask, shards).startswith(words)
+    answer = ask(f"merge {shards} nts nowhere --out r.nc")
+    assert answer.status == 2
 
 
 def test_a_plugin_that_does_not_load_is_no_shard_that_is_done(ask: Ask, tmp_path: Path) -> None:

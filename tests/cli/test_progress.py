@@ -1,8 +1,10 @@
 """The progress of a whole run, on standard error where it is no terminal; and Ctrl-C."""
 
 import signal
+import subprocess
 
 import pytest
+from fresh_process import PYTHON
 
 from contactverif.cli import progress
 from contactverif.cli.progress import Bar
@@ -77,3 +79,10 @@ def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
         with pytest.raises(KeyboardInterrupt):
             bar.update("two", 1, 3)
     assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_signal_ends_the_process_at_once_and_says_nothing(number: signal.Signals) -> None:
+    code = f"from contactverif.cli import progress as p; p.leave_at_next_signal(); p.signal.raise_signal({number:d})"
+    answer = subprocess.run([*PYTHON, "-c", f"{code}; print('on')"], capture_output=True, text=True, check=False)
+    assert (answer.returncode, answer.stdout, answer.stderr) == (128 + number, "", "")

@@ -3,14 +3,17 @@
 import resource
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
 from asking import Ask, check_mistake, run_inline, without_rows
+from forged_records import forge_header
 from fresh_process import MAIN, PYTHON
 
+from contactverif.cli.verify import versions_of
 from contactverif.run.journal import journal_folder, new_journal
 from contactverif.run.rows import RowOutcomes
 from contactverif.run.run_options import RunOptions
@@ -94,6 +97,29 @@ def test_a_run_goes_on_only_alone_and_only_once(ask: Ask, unbroken: Path, tmp_pa
     check_mistake(answer, "--resume: found names beside it; needed --jobs and --keep-going at most.*")
 
 
+def test_a_journal_of_somebody_else_reaches_only_what_is_typed(ask: Ask, tmp_path: Path) -> None:
+    """The options of a run need not be typed again, unless its header is not signed by this user."""
+    report, folder, outside = tmp_path / "r.nc", tmp_path / "r.nc.journal", tmp_path / "x.json"
+    run = RunOptions(names=("nts",), out=(report, outside), time_limit=7.0).with_settings()
+    options = replace(run, properties=("hard.deep",), examples=4).settle(1)
+    for forged in (False, True):
+        versions = versions_of(options)
+        with new_journal(folder, Plan(command="verify", versions=versions, options=options, folder=str(tmp_path))):
+            pass
+        if forged:
+            forge_header(folder, seed=2)
+        outside.unlink(missing_ok=True)
+        answer = ask(f"verify --resume {report}")
+        words = "--resume asks for --time-limit 7.0, and does not get it; type it to allow it"
+        assert (answer.status, answer.err) == (0, f"contactverif: {words}\n" if forged else "")
+        assert outside.exists() is not forged
+        report.unlink()
+    with new_journal(folder, Plan(command="verify", options=replace(options, scene_file="/x.py:f"))):
+        pass
+    forge_header(folder, seed=2)
+    check_mistake(ask(f"verify --resume {report} --scene c"), "--resume: found a journal with --scene-file /x.py:f, .*")
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -114,7 +140,7 @@ def test_a_mistake_leaves_the_report_of_an_earlier_run_where_it_was(ask: Ask, tm
 def test_a_run_does_not_go_on_with_other_code(ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     report = tmp_path / "r.nc"
     kill_at(1, f"{RUN} --out {report}", tmp_path / "r.nc.journal")
-    monkeypatch.setattr("contactverif.plugins.provenance._digest", lambda files: "another")
+    monkeypatch.setattr("contactverif.plugins.provenance.digest_files", lambda files: "another")
     answer = ask("verify", "--resume", report)
     assert answer.status == 2
     assert answer.err.startswith("contactverif: --resume: found code of contactverif")

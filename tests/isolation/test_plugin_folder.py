@@ -9,12 +9,21 @@ from pathlib import Path
 import pytest
 
 from contactverif.isolation.box import plugin_folder, remove_plugin_folder
+from contactverif.run.worker_pool import worker_pool
 
 HOLDER = """
 from contactverif.isolation.box import plugin_folder
 
 print(plugin_folder(), flush=True)
 input()
+"""
+SERVER = """
+import os, signal
+from contactverif.run.worker_pool import start_server
+
+if __name__ == "__main__":
+    start_server()
+    os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
@@ -41,3 +50,11 @@ def test_the_folder_of_a_killed_process_goes_and_that_of_a_living_one_stays(empt
     assert {*empty.iterdir()} == {other}
     mine = Path(plugin_folder())
     assert {*empty.iterdir()} == {mine}
+
+
+def test_the_next_run_removes_the_folder_of_a_server_of_workers_that_was_killed(empty: Path) -> None:
+    (empty / "pymp-of-another-program").mkdir()
+    subprocess.run([sys.executable, "-c", SERVER], check=False)
+    assert len([*empty.glob("pymp-*")]) == 2
+    with worker_pool(1):
+        assert [path.name for path in empty.iterdir()] == ["pymp-of-another-program"]

@@ -341,3 +341,20 @@ def test_a_mere_name_is_no_mistake_of_the_user_whatever_its_factory_says() -> No
 )
 def test_a_misspelt_promise_is_the_plugins_mistake_and_the_others_run(traits: dict[str, Any], message: str) -> None:
     assert reason_of(subject_of("misspelt", lambda *, penalty: Traits().revise(**traits))) == message
+
+
+def test_a_library_keeps_no_kernels_and_other_code_finds_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A store that two libraries shared could hold what one of them left for the other to load."""
+    boxes: list[Box | None] = []
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr("contactverif.isolation.remote.load_remote", lambda *words: boxes.append(words[-1].box))
+    digests = ("one", "other")
+    for digest in digests:
+        monkeypatch.setattr(registry, "digest_files", lambda files, digest=digest: digest)
+        registry._digest_of.cache_clear()
+        for name in ("nts", "c:file=x.so", "two-pass/uel:file=x.so"):
+            load_formulation(name, Limits(box=Box()))
+    registry._digest_of.cache_clear()
+    stores = [box.store for box in boxes if box is not None]
+    assert [bool(store) for store in stores] == [True, False, False] * 2
+    assert [stores[0].endswith("-one"), stores[3].endswith("-other")] == [True, True]
