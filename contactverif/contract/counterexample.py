@@ -89,7 +89,8 @@ class Counterexample:
         finding = "" if measurement is None else str(measurement.finding or "")
         finding = "" if finding in self.reason else finding  # Most reasons end with it.
         title = f"{self.formulation}, {self.property_id}: {self.row.result}, {self.label}"
-        return [line for line in (title, self.reason, finding) if line]
+        promise = f"promised by {self.row.promised_by}" if self.row.promised_by else ""
+        return [line for line in (title, self.reason, finding, promise) if line]
 
     def replay_command(self, report: str) -> str:
         """Return the command that judges the case again."""

@@ -15,7 +15,7 @@ from importlib import import_module
 from inspect import getdoc
 from math import isfinite
 from sys import modules
-from typing import Annotated, Any, Literal, TypedDict, Unpack, overload
+from typing import Annotated, Any, Literal, overload
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, CaseSummary
@@ -126,7 +126,7 @@ class Finding:
     Attributes
     ----------
     place : str
-        The place in words, such as a row and a column of the tangent.
+        What the property did to the case, if anything, and the place, such as a row and a column of the tangent.
     found, right : tuple[float, ...]
         The numbers at that place, as many of both; empty where the place says it all.
     unit : str
@@ -207,6 +207,17 @@ class Measurement:
         object.__setattr__(self, "idle", bool(self.idle))  # numpy's would turn counts of cases into numpy's integers.
         if len(self.values) != len(self.numbers):
             raise ValueError("a quantity is measured twice")
+
+    def after(self, action: str, *quantities: Quantity, finding: Finding | None = None) -> Measurement:
+        """Return the measurement of a case after an action on it, in words, which the finding of a failure begins with.
+
+        It does where one of some quantities fails, by default any; `finding` then is where the worst number is.
+        """
+        if not any(each.ratio > 1 and each.quantity in (quantities or [each.quantity]) for each in self.numbers):
+            return self
+        finding = finding or self.finding or Finding("")
+        place = ", ".join(filter(None, (action, finding.place)))
+        return replace(self, finding=replace(finding, place=place) if place else None)
 
     @property
     def values(self) -> dict[str, float]:
@@ -291,27 +302,6 @@ class PropertyInfo:
                 raise MisuseError(f"{self.id}: {name}", f"{getattr(self, name)}", "a share from 0 to 1")
 
 
-class OtherAttributes(TypedDict, total=False):
-    """The attributes of a `Property` that have a default."""
-
-    needs: frozenset[str]
-    series: Mapping[str, str]
-    kinds: tuple[str, ...]
-    least_contact: float
-    usual_undecided: float
-    applicable: Callable[[Traits], str]
-    asks: frozenset[str]
-    shown_by: frozenset[str]
-    bodies: bool
-    engines: bool
-    exact: Callable[[Case], FloatArray] | None
-    cases_in_space: Cases | None
-    rank: float
-    role: Role
-    turn: int
-    restarts: bool
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Property(PropertyInfo):
     """A property that formulations are checked for; besides the attributes of `PropertyInfo` it has functions.
@@ -375,7 +365,7 @@ class Property(PropertyInfo):
         cases: Callable[[Any], Any],
         family: str = "",
         promise: Callable[[Traits], bool | None] = lambda traits: True,
-        **others: Unpack[OtherAttributes],
+        **others: Any,
     ) -> Callable[[Measure], Property]:
         """Return a decorator that makes a property of the function that measures.
 

@@ -348,6 +348,9 @@ def format_forces(slave: Fractions, master: Fractions) -> str:
 _parse_once = lru_cache(maxsize=64)(parse_forces)  # Traits are made anew for each penalty.
 
 
+RULES = frozenset(entry.name for entry in fields(Rules))
+
+
 def traits_behind(statement: Callable[[Traits], object], traits: Traits) -> dict[str, Any]:
     """Return ``{name: value}`` of the traits without any one of which a statement about them would be another."""
     stated, silent = statement(traits), Traits().by_name()

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray, dense
-from contactverif.contract.errors import ContractError
-from contactverif.contract.interface import Interface
+from contactverif.contract.errors import ContractError, NonFiniteError
+from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residual_of
 from contactverif.diagnosis.force_patterns import diagnose_forces
@@ -30,13 +30,17 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
     """
     try:
         with np.errstate(all="ignore"):
+            springs = subject.traits.rules.enforcement == "penalty"
+            if springs and (text := _diagnose_numbering(subject)):
+                return text
             if property_id.startswith("purity"):  # Other patterns mean nothing then.
-                return _diagnose_memory(subject)
+                return _diagnose_memory(subject) if springs else ""
             every = (property_id, *others)
             if all(name.startswith(_OF_TANGENTS) for name in every):
                 text = diagnose_tangent(subject)
                 return f"only the tangent fails: {text}" if text else ""
-            in_full = property_id.startswith("patch.") or subject.traits.promises.patch.flat is True
+            asks_nodes = property_id.startswith("patch.") and not property_id.endswith(".resultant")
+            in_full = asks_nodes or subject.traits.promises.patch.flat is True
             text = diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
             if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
@@ -44,6 +48,26 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             return text or (diagnose_tangent(subject) if property_id.startswith(_OF_TANGENTS) else "")
     except ContractError:
         return ""
+
+
+def _diagnose_numbering(subject: Subject) -> str:
+    """Return with which numbers of nodes the forces on a mesh are not finite, if they are with others."""
+    state = flat_state()
+    along, mesh = np.arange(len(state.along)), state.case.interface
+    against = np.concatenate([along[nodes][::-1] for nodes in state.sides])
+    words: dict[bool, str] = {}  # {whether the forces are finite: with which numbers}
+    for name, number, step in (
+        ("nodes are numbered along the surfaces", along, 1),
+        ("nodes are numbered against the surfaces", against, 1),
+        ("segments are listed from the last to the first", along, -1),
+    ):
+        sides = (Surface(number[side.faces][::step]) for side in (mesh.slave, mesh.master))
+        try:  # Either order of nodes is its own inverse.
+            residual_of(subject, Interface(mesh.nodes[number], *sides), state.case.positions[number].reshape(-1))
+            words.setdefault(True, name)
+        except NonFiniteError:
+            words.setdefault(False, name)
+    return f"the forces are not finite where {words[False]}, and finite where {words[True]}" if len(words) > 1 else ""
 
 
 def _diagnose_scale(subject: Subject) -> str:

@@ -38,6 +38,8 @@ _MEANINGS = {  # {factor: what it may mean}
 _MOST_POINTS = 4  # More points of integration are used by hardly anybody.
 # The slave is moved along the master by these lengths. Its nodes pass nearly all of it, and face no node.
 _SHIFTS = (np.arange(-61, 61) + 0.5) / 128
+# The heights of all nodes of the slave but one, over its depth, from one at which only the nearest point presses.
+_LIFTS = 2.0 ** np.arange(6, -3, -1)
 _TILT = 0.25  # The slope of a slave whose forces must balance, too.
 # A change of places near 1 that single precision, with digits of 2^-24, does not see, and one that it sees.
 _TOO_SMALL, _LARGE = 2.0**-26, 2.0**-12
@@ -61,6 +63,7 @@ def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
     if rules.enforcement != "penalty":
         return
     yield _find_lost_places(subject)
+    yield _find_lost_sums(subject)
     if rules.penalty == "nodal" or promises.patch.flat is False:
         return  # Other forces than the consistent ones are right there.
     yield _diagnose_digits(subject)
@@ -111,7 +114,7 @@ def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
         yield f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
     is_right = equal(pushes[:n], exact[:n])
     ends = [node for node in (0, n - 1) if not is_right[node]]
-    if is_right[1:-1].all() and ends:
+    if n > 2 and is_right[1:-1].all() and ends:
         words = " and ".join(f"{_times(pushes[node] / exact[node])} at slave node {node}" for node in ends)
         yield f"only free ends are wrong: {words}"
     _, factors = _segment_factors(state, pushes, 0)
@@ -139,7 +142,7 @@ def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
     alike = [np.abs(part - pushes) <= SAME * np.abs(exact).max() for part in parts]
     if (np.any(alike, axis=0) & (pushes != 0))[~equal(pushes, exact)].all():
         owners = "nodes that belong to several pieces"
-        yield f"{owners} have the force of one alone: the others are overwritten, and not added"
+        yield f"{owners} have the force of one alone: the others are overwritten, and not added (`np.add.at`)"
     yield _piece_factors(state, pushes)
     halves = np.zeros(len(pushes))
     np.add.at(halves, state.ends[1], state.pieces[:, n:].sum(axis=1)[:, None] / 2)
@@ -243,7 +246,7 @@ def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
     if same(*master[:2]):
         return "the forces on the master are right, those on the slave are not" + total
     sums = [np.array([part.sum(), part @ places]) for part, _, places in (slave, master)]
-    if same(*sums):  # What is integrated acts alike on both sides.
+    if same(*sums) and slave[0].sum() > 0:  # What is integrated acts alike on both sides.
         total += "; the sides balance, in moments too: look at the points of integration, their weights and their range"
     return f"the forces are wrong on both sides{total}"
 
@@ -305,6 +308,19 @@ def _find_lost_places(subject: Subject) -> str:
     return f"slave nodes that face {', or '.join(words)} have no force; all others are right"
 
 
+def _find_lost_sums(subject: Subject) -> str:
+    """Return whether the master gets less than the slave where several points press, and as much where one does."""
+    sums = []
+    for lift in (-1.0, *_LIFTS):
+        state = flat_state(places=FINE, depths=DEPTH * np.array([1.0, *[-lift] * (len(FINE[0]) - 1)]))
+        sums.append([float(pushes_of(subject, state)[nodes, 1].sum()) for nodes in state.sides])
+    (slave, master), (alone, opposite) = sums[0], next((pair for pair in sums[1:] if pair[0] > 0), (0.0, 0.0))
+    if not 0 <= master < (1 - SAME) * slave or not alone or abs(opposite - alone) > SAME * alone:
+        return ""
+    less = f"the master gets {_times(master / slave)} the force of the slave, and all of it where one point presses"
+    return f"{less}: do several points add to one node (`np.add.at`)?"
+
+
 def _diagnose_turned(subject: Subject) -> str:
     state = flat_state()
     interface, positions = state.case.interface, state.case.positions
@@ -342,8 +358,10 @@ def _diagnose_balance(subject: Subject) -> str:
     on_slave, on_master = pushes[:n].sum(axis=0), pushes[n:].sum(axis=0)
     if not same(on_slave, on_master):
         sides = [_name_direction(force) for force in (on_slave, on_master)]
-        words = f"along {sides[0]} normal on the slave, along {sides[1]} normal on the master"
-        return f"the forces on the sides of a tilted slave do not balance: they are {words}"
+        words = f"they are along {sides[0]} normal on the slave, along {sides[1]} normal on the master"
+        if sides[0] == sides[1]:
+            words = f"the master gets {_times(float(np.linalg.norm(on_master) / np.linalg.norm(on_slave)))} the slave's"
+        return f"the forces on the sides of a tilted slave do not balance: {words}"
     x, y = state.case.positions.T
     moments = x * pushes[:, 1] - y * pushes[:, 0]
     if not subject.traits.promises.conserves_moment or same(moments[:n].sum(), moments[n:].sum()):

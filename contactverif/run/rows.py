@@ -22,7 +22,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Outcomes, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
-from contactverif.contract.traits import traits_behind
+from contactverif.contract.traits import RULES, traits_behind
 from contactverif.isolation.lockstep import in_lockstep
 from contactverif.isolation.remote import RemoteSubject, count_ends
 from contactverif.problems.named_states import named_case
@@ -229,8 +229,10 @@ def open_row(
     promise = question.promise(subject.traits)
     traits = traits_behind(question.promise, subject.traits) if promise else {}
     stated = {name: value for name, value in traits.items() if value is not False}  # Of a table, its name says enough.
-    words = (name if isinstance(value, Mapping) else f"{name}={value!r}" for name, value in stated.items())
-    row = Row(subject.name, question.info, Verdict.PASS, promise=promise, promised_by=", ".join(words), known=known)
+    words = ", ".join(name if isinstance(value, Mapping) else f"{name}={value!r}" for name, value in stated.items())
+    if stated and stated.keys() <= RULES:  # No author calls a rule a promise, and a question may follow from it.
+        words = f"the rule{'s' * (len(stated) > 1)} {words}"
+    row = Row(subject.name, question.info, Verdict.PASS, promise=promise, promised_by=words, known=known)
     if reason := question.refusal_of(subject):
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=reason)
     if missing := question.needs - subject.provides:

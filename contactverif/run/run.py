@@ -553,7 +553,7 @@ class Driver:
             if failure is None or failure.verdict is not Verdict.FAIL:
                 continue  # Crashes explain themselves.
             row = rows[id(failure)]
-            if failure.breach and row.question.role != "foundation":
+            if failure.breach and row.question.role != "foundation" and "not finite" not in failure.reason:
                 continue
             others = [wrong.property_id for wrong in wrong_rows(each.row for each in rows.values())]
             self._report(Progress(subject.name, failure.property_id, "diagnosis", 0, 1))

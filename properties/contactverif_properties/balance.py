@@ -158,7 +158,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
         tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance)
     if subject.traits.promises.tangent != "approximate":
         values[WORK], tolerances[WORK], undecided = _find_work(state, subject, distance)
-    return Measurement(check_all(values, tolerances), undecided, idle=not state.forces.any())
+    measurement = Measurement(check_all(values, tolerances), undecided, idle=not state.forces.any())
+    return measurement.after(f"moved round circles of radius {RADII[0] * case.resolution:.2g} or less", WORK)
 
 
 def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[float, float, str]:
@@ -292,7 +293,9 @@ def continuity(case: Case, subject: Subject) -> Measurement:
         tolerances[SLOPE] = ALLOWED_OF_SLOPE * ratio(_largest_step(samples), steepest) + rounding / DIFFERENCE
     places = [place for place, jump in jumps if ratio(jump, size) > tolerances[FORCE]]
     details = {"jumps": float(len(places))} | ({"place of the largest jump": places[0]} if places else {})
-    return Measurement(check_all(values, tolerances), details=details, idle=size == 0)
+    measurement = Measurement(check_all(values, tolerances), details=details, idle=size == 0)
+    slid = float(np.linalg.norm(way[: interface.dim]))
+    return measurement.after(f"slid by {slid:.4g} along the master, {jumps[0][0]:.2g} of the way")
 
 
 def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: float) -> list[tuple[float, float]]:

@@ -28,7 +28,7 @@ from contactverif.strategies import flat_cases, general_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties import roundoff
 from contactverif_properties.applicability import may_act_twice
-from contactverif_properties.exact_forces import normal_of, unit_forces
+from contactverif_properties.exact_forces import describe_node, normal_of, unit_forces, worst_force
 from contactverif_properties.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.states import FrozenState, Pass, freeze_state, prepare_state, random_moves
 
@@ -313,7 +313,12 @@ def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
         undecided = "a kink: moved by roundoff, it begins one way and not another" if len(begins) == 2 else ""
     elif _push_of_slave(pushes, case) < 0:
         broken = OPPOSITE_SIGN
-    return Measurement(check_all(values, tolerances), undecided, broken, idle=bool(undecided))
+    measurement = Measurement(check_all(values, tolerances), undecided, broken, idle=bool(undecided))
+    if values[OPEN] or broken:  # What is broken is so in the state that is drawn.
+        worst = worst_force(interface, -raised.forces, 0 * raised.forces, ("force", "needed")) if values[OPEN] else None
+        return measurement.after(f"lifted to a gap of {depth:.4g}", OPEN, finding=worst)
+    of_end = (DISTANT,) if not pulls or values[PULL_OF_POINT] == pulls[0][0] else (DISTANT, PULL_OF_POINT)
+    return measurement.after(f"lifted until all is open but {CLOSED:g} of the slave at one end", *of_end)
 
 
 def _measure_barrier(case: Case, subject: Subject) -> Measurement:
@@ -335,7 +340,9 @@ def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     broken = "nothing begins within the activation distance" if not pushes[0] else ""
     if pushes[0] < 0:
         broken = OPPOSITE_SIGN
-    return Measurement(check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH}), broken=broken)
+    measurement = Measurement(check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH}), broken=broken)
+    action = f"with gaps of {1.01 * activation:.4g} and {2 * activation:.4g}, and halved from {gap:.4g} on"
+    return measurement.after(action, OPEN, GROWTH)
 
 
 def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
@@ -419,7 +426,9 @@ def nodal_push(case: Case, subject: Subject) -> Measurement:
     tolerance = roundoff.segment_tolerance(case, state.forces, case.largest_coordinate)
     pulled = set(np.flatnonzero(pulls > tolerance * size).tolist())
     undecided = _excuse_pulls(state, pulled, subject.traits) if pulled else ""
-    return Measurement([PULL_OF_NODE.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided)
+    action = f"lifted until {HALF:g} of the slave is open, " if "penetration" in case.parameters else ""
+    action += f"{describe_node(case.interface, int(pulls.argmax()))} is pulled by {pulls.max():.4g}"
+    return Measurement([PULL_OF_NODE.check(max(0.0, float(pulls.max())) / size, tolerance)], undecided).after(action)
 
 
 def _excuse_pulls(state: FrozenState, pulled: set[int], traits: Traits) -> str:

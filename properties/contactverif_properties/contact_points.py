@@ -443,7 +443,7 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
         broken="an active point names no place or no master segment" if homeless else "",
         details={"decided points": sum(decided), "points left out": n_points - sum(decided)},
         idle=not decided[0],
-    )
+    ).after("" if wrong[0] else "with all lengths times 2^-32", WRONG)
 
 
 def _count_decisions(reported: _Reported) -> tuple[int, int]:

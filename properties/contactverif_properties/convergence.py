@@ -66,7 +66,8 @@ def _measure_convergence(studies: Studies, case: Case, subject: Subject) -> Meas
         for bound in rates
         if errors.keys() >= set(bound.kinds)
     ]
-    return Measurement([*numbers, *sizes], undecided, details=details, series=series)
+    action = f"solved on meshes {' · '.join(map(str, meshes))}, drawn on mesh {study.meshes[0]}"
+    return Measurement([*numbers, *sizes], undecided, details=details, series=series).after(action)
 
 
 def _name_failures(ends: dict[int, str], solver: str) -> str:
@@ -255,7 +256,8 @@ PRESSURE = Quantity("error of the reported pressures", _CHORDS, _CHORD_REASON)
 @cache
 def _arc_cases() -> tuple[Case, ...]:
     return tuple(
-        Arcs(convex_slave=convex).case(1, name) for name, convex in (("convex slave", True), ("concave slave", False))
+        Arcs(convex_slave=convex).case(REFINEMENTS[0], name)
+        for name, convex in (("convex slave", True), ("concave slave", False))
     )
 
 
@@ -306,7 +308,8 @@ def accuracy_arc(case: Case, subject: Subject) -> Measurement:
     tolerances = dict.fromkeys(extrapolated, EXTRAPOLATED) | {ALONG: fine.turn / 4, FORCES: fine.turn}
     tolerances |= dict.fromkeys((SLAVE_SUM, MASTER_SUM, PRESSURE), fine.chords)
     details = {f"{quantity.name}, m = {REFINEMENTS[0]}": value for quantity, value in coarse.others.items()}
-    return Measurement(check_all(values | extrapolated, tolerances), details=details)
+    measurement = Measurement(check_all(values | extrapolated, tolerances), details=details)
+    return measurement.after("on this mesh and on one that is twice as fine")
 
 
 class _ArcErrors(NamedTuple):

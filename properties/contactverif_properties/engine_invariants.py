@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import cos, radians, sin
+from math import cos, degrees, radians, sin
 
 import numpy as np
 
@@ -45,6 +45,7 @@ def _compare_scenes(
     case: Case,
     subject: Subject,
     changed: Scene,
+    action: str,
     back: Callable[[int, FloatArray], FloatArray] = lambda body, forces: forces,
 ) -> Measurement:
     """Solve the scene of a case and a changed one, and return the largest change of a nodal force over p L.
@@ -60,10 +61,10 @@ def _compare_scenes(
     largest = max(float(np.abs(back(body, there) - here).max(initial=0.0)) for body, (here, there) in pairs)
     total = float(np.linalg.norm(first.forces[: scene.interface.n_slave_nodes].sum(axis=0)))
     if total == 0:
-        return Measurement([CHANGE.check(largest, 0.0)], idle=True)
+        return Measurement([CHANGE.check(largest, 0.0)], idle=True).after(action)
     length = float(scene.interface.slave.lengths(scene.interface.nodes).sum())
     tolerance = 2 * engine_tolerance(scene, first, subject.engine_traits.accuracy, total / length)
-    return Measurement([CHANGE.check(largest / total, tolerance)])
+    return Measurement([CHANGE.check(largest / total, tolerance)]).after(action)
 
 
 def _by_body(scene: Scene, solution: Solution) -> list[FloatArray]:
@@ -96,7 +97,7 @@ def engine_purity(case: Case, subject: Subject) -> Measurement:
     """
     assert isinstance(subject, EngineSubject)
     solve_by_engine(changed_scenes.mirror(scene_of(case)), subject)
-    return _compare_scenes(case, subject, scene_of(case))
+    return _compare_scenes(case, subject, scene_of(case), "solved again, after its mirror image")
 
 
 @_define_for_codes(id="engine.mirror")
@@ -112,7 +113,8 @@ def engine_mirror(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where the code finds no solution.
     """
-    return _compare_scenes(case, subject, changed_scenes.mirror(scene_of(case)), lambda _, forces: forces @ IMAGE)
+    changed = changed_scenes.mirror(scene_of(case))
+    return _compare_scenes(case, subject, changed, "mirrored from x to −x", lambda _, forces: forces @ IMAGE)
 
 
 @_define_for_codes(id="engine.renumbering")
@@ -129,7 +131,8 @@ def engine_renumbering(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Where the code finds no solution.
     """
     changed, numbers = changed_scenes.renumber(scene_of(case), _of_seed(case))
-    return _compare_scenes(case, subject, changed, lambda body, forces: forces[numbers[body]])
+    action = "with nodes, cells and edges in other numbers"
+    return _compare_scenes(case, subject, changed, action, lambda body, forces: forces[numbers[body]])
 
 
 @_define_for_codes(id="engine.units")
@@ -147,7 +150,8 @@ def engine_units(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Where the code finds no solution.
     """
     changed = changed_scenes.change_units(scene_of(case), LENGTH, MODULUS)
-    return _compare_scenes(case, subject, changed, lambda _, forces: forces / (LENGTH * MODULUS))
+    action = f"with all lengths times {LENGTH:g} and all moduli times {MODULUS:.4g}"
+    return _compare_scenes(case, subject, changed, action, lambda _, forces: forces / (LENGTH * MODULUS))
 
 
 @_define_for_codes(id="engine.swap", promise=lambda traits: traits.promises.unbiased)
@@ -164,7 +168,8 @@ def engine_swap(case: Case, subject: Subject) -> Measurement:
 
     **Undecided.** Where the code finds no solution.
     """
-    return _compare_scenes(case, subject, changed_scenes.exchange_roles(scene_of(case)))
+    changed = changed_scenes.exchange_roles(scene_of(case))
+    return _compare_scenes(case, subject, changed, "with slave and master exchanged")
 
 
 @_define_for_codes(id="engine.objectivity")
@@ -189,6 +194,7 @@ def engine_objectivity(case: Case, subject: Subject) -> Measurement:
         case,
         subject,
         changed_scenes.turn(scene_of(case), (cos(angle), sin(angle))),
+        f"turned by {degrees(angle):.4g}°",
         lambda _, forces: forces @ rotation,
     )
 
@@ -213,4 +219,5 @@ def engine_remote(case: Case, subject: Subject) -> Measurement:
     along_x, along_y = scene.bodies[0].frame[:, 0].tolist()  # Some codes take no inclined supports.
     place = Placing((along_x, along_y), (float(low[0]) + DISTANCE * size, float(high[1])))
     far = block(Rectangle([0, size / 3, size], [0, size]), contact="bottom", approach=0.0, placing=place, name="far")
-    return _compare_scenes(case, subject, changed_scenes.add_body(scene, far))
+    changed = changed_scenes.add_body(scene, far)
+    return _compare_scenes(case, subject, changed, f"beside a block {DISTANCE:g} sizes away")

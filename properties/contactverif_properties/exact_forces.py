@@ -38,7 +38,7 @@ def worst_force(
     numbers, counted along the exact force, with their ratio; else the components of both.
     """
     node = int(np.linalg.norm(forces - exact, axis=1).argmax())
-    return _beside(_describe_node(interface, node), forces[node], exact[node], names)
+    return _beside(describe_node(interface, node), forces[node], exact[node], names)
 
 
 def total_force(total: FloatArray, exact: FloatArray) -> Finding:
@@ -68,7 +68,8 @@ def distance_from_line(force: FloatArray, direction: FloatArray) -> float:
     return float(np.linalg.norm(np.cross(force, direction)))
 
 
-def _describe_node(interface: Interface, node: int) -> str:
+def describe_node(interface: Interface, node: int) -> str:
+    """Return the side and the number of a node in words, and whether it is at a free end."""
     on_slave = node < interface.n_slave_nodes
     surface = interface.slave if on_slave else interface.master
     at_border = surface.neighbours < 0

@@ -433,7 +433,7 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
             sliding = max(float(np.abs(tangent @ way).max()) for way in ways)
             values[SLIDING] = sliding / (case.penalty * around)
             tolerances[SLIDING] = roundoff + 4 * depth / case.shortest_segment
-    return Measurement(check_all(values, tolerances))
+    return Measurement(check_all(values, tolerances)).after("pressed in by 64 u X", SLIDING)
 
 
 def _all_springs(case: Case, traits: Traits) -> float:

@@ -17,6 +17,7 @@ from scipy import linalg
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, Cases, random_source
+from contactverif.contract.errors import NonFiniteError
 from contactverif.contract.interface import PLANE, Interface, Surface
 from contactverif.contract.property import (
     WITH_BARRIER,
@@ -42,6 +43,7 @@ from contactverif_properties.kinks import explain_by_kink
 from contactverif_properties.states import FrozenState, any_cases, ask_forces_and_tangents, freeze_state
 
 TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
+CHANGED = ("force then", "before")  # The forces after a change of the case, and as it is drawn.
 SHARE = 0.1875  # A uniform multiplier over the shortest segment, with c = 1: as large as a penetration would be.
 BITS = "entries with other bits"
 TIE = "a tie: a point in the normal cone of a vertex is as near to one segment as to another"
@@ -120,17 +122,26 @@ def _compare(
     case: Case,
     other: Case,
     carry: Carry,
+    action: str,
     *,
     explain: bool = True,
 ) -> Measurement:
     """Compare the answers in two states: the largest change of a force over Σ|R| of a side, of an entry over max|K|.
 
+    `action` says what made the second state of the first. If the forces are finite in one of them alone, that is said.
     The sizes are the larger of both states. The detail `BITS` counts entries that are not equal to the last bit.
     """
     penalty, multiplier = subject.penalty(case), SHARE * case.resolution
-    (first, forces, tangent), (second, forces_there, tangent_there) = (
-        _ask(state, subject, penalty, multiplier) for state in (case, other)
-    )
+    answers: dict[str, tuple[FrozenState, FloatArray, FloatArray]] = {}
+    flaws: list[str] = []
+    for words, state in (("as drawn", case), (action, other)):
+        try:
+            answers[words] = _ask(state, subject, penalty, multiplier)
+        except NonFiniteError as error:
+            flaws.append(f"{error}, {words}")
+    if flaws:
+        raise NonFiniteError("; finite ".join([flaws[0], *answers]))
+    (first, forces, tangent), (second, forces_there, tangent_there) = answers.values()
     size = max(roundoff.sum_larger_forces(case, forces), roundoff.sum_larger_forces(other, forces_there))
     changes = [_Change("forces", question.quantities[0], forces_there[carry.nodes] - forces @ carry.matrix.T, size)]
     if tangent.size:
@@ -148,11 +159,10 @@ def _compare(
         undecided = _find_tie(first) or _find_tie(second)
     finding = None
     if numbers[0].ratio > 1:
-        back = forces_there[carry.nodes] @ carry.matrix
-        finding = worst_force(case.interface, back, forces, ("force in the second state", "in the first"))
+        finding = worst_force(case.interface, forces_there[carry.nodes] @ carry.matrix, forces, CHANGED)
     details = {BITS: float(sum(np.count_nonzero(each.change) for each in changes))}
     idle = not (forces.any() or forces_there.any())
-    return Measurement(numbers, undecided, details=details, idle=idle, finding=finding)
+    return Measurement(numbers, undecided, details=details, idle=idle).after(action, finding=finding)
 
 
 def _find_tie(state: FrozenState) -> str:
@@ -182,6 +192,7 @@ def _find_tie(state: FrozenState) -> str:
 
 ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 FAR, BEHIND = "a far pair of bodies", "a body behind the master"
+MOST_NUMBERS = 12  # So many new numbers of nodes are said.
 DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
 PLATE = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]])  # The faces of a plate's lower and upper side.
 
@@ -195,32 +206,6 @@ def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> 
     interface, old = case.interface, np.argsort(nodes)
     renumbered = Interface(interface.nodes[old], Surface(nodes[slave]), Surface(nodes[master]))
     return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes, np.eye(interface.dim))
-
-
-def mirror_case(case: Case) -> tuple[Case, Carry]:
-    """Return the mirror image in the y-axis; segments run the other way, so that the body stays on the left."""
-    interface = case.interface
-    sides = (Surface(side.faces[:, ::-1]) for side in (interface.slave, interface.master))
-    image = Interface(_reflect(interface.nodes), *sides)
-    carry = Carry(np.arange(interface.n_nodes), np.diag(_mirror_signs(interface.dim)))
-    return replace(case, interface=image, z=_reflect(case.positions).reshape(-1)), carry
-
-
-def exchange_roles(case: Case) -> tuple[Case, Carry]:
-    """Return the case in which the slave is the master, and the other way round."""
-    interface = case.interface
-    n_slave, n_master = interface.n_slave_nodes, interface.n_nodes - interface.n_slave_nodes
-    nodes = np.concatenate([n_master + np.arange(n_slave), np.arange(n_master)])
-    return renumber(case, nodes, interface.master.faces, interface.slave.faces)
-
-
-def _reflect(points: FloatArray) -> FloatArray:
-    """Return the points (n, dim), mirrored; no zero becomes −0."""
-    return points * _mirror_signs(points.shape[1]) + 0.0
-
-
-def _mirror_signs(dim: int) -> FloatArray:
-    return np.where(np.arange(dim) == 0, -1.0, 1.0)
 
 
 _define = partial(Property.define, family="invariants", asks=WITH_BARRIER)
@@ -251,7 +236,12 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
     vertex, a point is as near to one segment as to another, and the mirror image may choose the other.
     """
-    return _compare(mirror, subject, case, *mirror_case(case))
+    interface, signs = case.interface, np.where(np.arange(case.interface.dim) == 0, -1.0, 1.0)
+    sides = (Surface(side.faces[:, ::-1]) for side in (interface.slave, interface.master))
+    image = Interface(interface.nodes * signs + 0.0, *sides)  # No zero becomes −0.
+    there = replace(case, interface=image, z=(case.positions * signs + 0.0).reshape(-1))
+    carry = Carry(np.arange(interface.n_nodes), np.diag(signs))
+    return _compare(mirror, subject, case, there, carry, "mirrored from x to −x")
 
 
 @_define(
@@ -280,8 +270,10 @@ def swap(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A failing case of a formulation that promises `unbiased` is undecided where the state lies at a kink,
     or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
     """
-    unbiased = bool(subject.traits.promises.unbiased)
-    return _compare(swap, subject, case, *exchange_roles(case), explain=unbiased)
+    interface, unbiased = case.interface, bool(subject.traits.promises.unbiased)
+    nodes = np.roll(np.arange(interface.n_nodes), -interface.n_slave_nodes).argsort()
+    swapped = renumber(case, nodes, interface.master.faces, interface.slave.faces)
+    return _compare(swap, subject, case, *swapped, "with slave and master exchanged", explain=unbiased)
 
 
 @random_source("contactverif_properties.renumbering.renumbering_cases")
@@ -334,11 +326,13 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
     if interface.dim != PLANE:  # Which corner of a face is the first has no meaning.
         slave, master = (_roll_corners(faces, random) for faces in (slave, master))
     renumbered = renumber(case, nodes, slave[order(len(slave))], master[order(len(master))])
-    measurement = _compare(renumbering, subject, case, *renumbered)
+    numbers = ", ".join(map(str, nodes[:MOST_NUMBERS])) + (" …" if len(nodes) > MOST_NUMBERS else "")
+    action = f"with the numbers {numbers} for nodes 0, 1, 2 …"
+    measurement = _compare(renumbering, subject, case, *renumbered, f"{action} and segments in another order")
     if measurement.undecided != TIE:
         return measurement
     # The numbers of segments may decide a tie. Those of nodes still must not matter.
-    return _compare(renumbering, subject, case, *renumber(case, nodes, slave, master))
+    return _compare(renumbering, subject, case, *renumber(case, nodes, slave, master), action)
 
 
 def _roll_corners(faces: IntArray, random: np.random.Generator) -> IntArray:
@@ -394,10 +388,10 @@ def remote(case: Case, subject: Subject) -> Measurement:
     """
     if "behind" in case.parameters:
         nothing = np.empty((0, case.interface.dim))
-        parts, first = ((nothing, nothing.astype(np.int64)), _as_part(case.parameters["behind"])), False
+        parts, first, name = ((nothing, nothing.astype(np.int64)), _as_part(case.parameters["behind"])), False, BEHIND
     else:  # Multipliers of a plane case keep their places.
-        parts, first = _make_far_pair(case), case.interface.dim != PLANE and case.seed % 2 == 1
-    return _compare(remote, subject, case, *_add_parts(case, *parts, first=first))
+        parts, first, name = _make_far_pair(case), case.interface.dim != PLANE and case.seed % 2 == 1, FAR
+    return _compare(remote, subject, case, *_add_parts(case, *parts, first=first), f"beside {name}")
 
 
 _Part = tuple[FloatArray, IntArray]  # The nodes (n, dim) of a part of a surface, and its faces by their places there.
@@ -481,7 +475,8 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
     the answer by a quarter of the error or more.
     """
     bent = replace(case, z=case.parameters["bent"])
-    return _compare(locality_bend, subject, case, bent, Carry(np.arange(case.interface.n_nodes)))
+    action = f"with free nodes of the master moved by up to {np.abs(bent.z - case.z).max():.4g}"
+    return _compare(locality_bend, subject, case, bent, Carry(np.arange(case.interface.n_nodes)), action)
 
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
@@ -552,7 +547,8 @@ def units(case: Case, subject: Subject) -> Measurement:
             _Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max()), dim=dim)
         )
     tolerance = roundoff.segment_tolerance(case, forces, roundoff.rounding_distance(case, subject.traits))
-    return Measurement(*_judge_changes(changes, tolerance, [state]), idle=not forces.any())
+    measurement = Measurement(*_judge_changes(changes, tolerance, [state]), idle=not forces.any())
+    return measurement.after(f"with all lengths times {factor:.4g}")
 
 
 def _turn_state(case: Case) -> tuple[Case, FloatArray]:
@@ -622,4 +618,5 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
         changes.append(_Change("tangent", TURNED_TANGENT, change, size, dim=case.interface.dim))
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
     numbers, undecided = _judge_changes(changes, tolerance, [state, there], largest)
-    return Measurement(numbers, undecided, idle=not forces[:n].any())
+    turned = np.degrees(np.arccos(np.clip((np.trace(rotation) - rotation.shape[0] + 2) / 2, -1, 1)))
+    return Measurement(numbers, undecided, idle=not forces[:n].any()).after(f"turned by {turned:.4g}° and shifted")

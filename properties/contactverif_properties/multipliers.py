@@ -93,7 +93,8 @@ def complementarity(case: Case, subject: Subject) -> Measurement:
     if again.converged:
         values[CHANGE] = float((np.abs(again.u[-1] - solution) / units).max()) / length
     details |= {"converged with another scale": float(again.converged)}
-    return Measurement(check_all(values, floor), details=details, idle=is_untouched(trace))
+    measurement = Measurement(check_all(values, floor), details=details, idle=is_untouched(trace))
+    return measurement.after(f"solved again with c/{SCALE_RATIO:g}", CHANGE)
 
 
 @random_source("contactverif_properties.multipliers.covered_and_overhanging_cases")
@@ -216,4 +217,7 @@ def inf_sup(case: Case, subject: Subject) -> Measurement:
         values[SLOPE] = float(np.polyfit(np.log(segments[-N_FITTED:]), np.log(constants[-N_FITTED:]), 1)[0])
     tolerances = {ZEROS: 0.0, SLOPE: MOST_SLOPE}
     details = {"β on the finest mesh": float(constants[-1])}
-    return Measurement(check_all(values, tolerances), details=details, series=series)
+    measurement = Measurement(check_all(values, tolerances), details=details, series=series)
+    return measurement.after(
+        f"on {len(segments)} meshes, with slave segments of {segments[0]:.3g} to {segments[-1]:.3g}"
+    )

@@ -261,7 +261,8 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     # One step solves a linear problem, which has no order.
     numbers = [] if steps.order == inf else [ORDER.check(steps.order, QUADRATIC)]
-    return Measurement(numbers, undecided, details=details, idle=is_untouched(trace))
+    measurement = Measurement(numbers, undecided, details=details, idle=is_untouched(trace))
+    return measurement.after(f"solved, then begun anew {DISTANCES[0]:.1g} to {DISTANCES[-1]:.1g} segments beside it")
 
 
 class _Steps(NamedTuple):
@@ -432,7 +433,7 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
         broken=broken,
         details=details | {"steps that agree to the last bit": float(differences.count(0.0))},
         idle=is_untouched(trace),
-    )
+    ).after(f"solved with all lengths times 2^{k} and all moduli times 2^{2 * j}")
 
 
 def _compare_step(
@@ -571,7 +572,8 @@ def newton_attainable(case: Case, subject: Subject) -> Measurement:
     if decided := [place for place in places if not place.undecided]:
         values |= {RESIDUAL: max(place.residual for place in decided), ERROR: max(place.error for place in decided)}
     tolerances = {ADDED: MOST_ROUNDINGS, RESIDUAL: 1.0, ERROR: 1.0}
-    return Measurement(check_all(values, tolerances), details=details, idle=is_untouched(trace))
+    measurement = Measurement(check_all(values, tolerances), details=details, idle=is_untouched(trace))
+    return measurement.after(f"solved, then moved by up to {segment * 2.0 ** OFFSETS[-1]:.4g}")
 
 
 def examine(system: System, case: Case, u: FloatArray) -> Solution | None:

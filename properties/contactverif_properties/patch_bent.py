@@ -182,7 +182,8 @@ def _measure(study: RingStudy, coarser: int, subject: Subject, quarters: Literal
     is_code = isinstance(subject, EngineSubject)
     bound = WHOLE_CODES if is_code else bound_of_rings(coarser, study.penalty, subject.traits)
     nodes = (BARE_NODES.check(float(bare), 4.0),) if is_code else ()
-    return Measurement([*check_all(values, bound), *nodes], details=details)
+    action = f"solved {'as whole rings ' if quarters == 4 else ''}on this mesh and on one that is twice as fine"
+    return Measurement([*check_all(values, bound), *nodes], details=details).after(action)
 
 
 def count_bare(interface: Interface, forces: FloatArray) -> int:
@@ -385,7 +386,8 @@ def _add_three_normals(
         numbers.append(FALL.check(float(-np.diff(np.log10(errors)).min()), SLOPE))
     names = [f"stress error, three normals, ε̂ = {stiffness:g} E/ℓ" for stiffness in STIFF]
     details = {**measurement.details, **dict(zip(names, errors, strict=False))}
-    return replace(measurement, numbers=numbers, details=details)
+    action = f"with the ridge cut, solved at ε̂ = {' · '.join(f'{each:g}' for each in STIFF)} E/ℓ"
+    return replace(measurement, numbers=numbers, details=details).after(action, CUT, FALL)
 
 
 def _kink_floor(problem: KinkedPatch, state: Case, gap: float) -> float:

@@ -121,8 +121,9 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     stretched = replace(case, interface=interface)
     state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
     exact = exact_forces.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
-    if subject.traits.rules.area == "reference":
-        exact = exact * stretch ** (interface.dim - 1)
+    areas = {"current": exact, "reference": exact * stretch ** (interface.dim - 1)}
+    exact = areas.pop(rule := str(subject.traits.rules.area))
+    ((follows, other),) = areas.items()
     total = exact_forces.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
     error = float(np.linalg.norm(total - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), roundoff.gap_tolerance(case, penetration)
@@ -130,8 +131,12 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     if value > tolerance:
         rounding = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
         undecided = explain_by_kink(state, rounding, {"forces": error})
-    finding = exact_forces.total_force(total, exact) if value > tolerance else None
-    return Measurement([TOTAL.check(value, tolerance)], undecided, finding=finding)
+    finding, action = exact_forces.total_force(total, exact), f"on a reference {stretch:g} times as long"
+    if np.linalg.norm(total - other) <= tolerance * np.linalg.norm(other):
+        finding = replace(finding, remark=f"the force follows the {follows} area, and area={rule!r} is promised")
+    return Measurement([TOTAL.check(value, tolerance)], undecided).after(
+        action if stretch != 1 else "", finding=finding
+    )
 
 
 def _measure_class(case: Case, subject: Subject) -> Measurement:

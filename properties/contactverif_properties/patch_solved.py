@@ -345,7 +345,7 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
         [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
         undecided=moderate.undecided or high.undecided,
         details={**moderate.details, **{name + AT_HIGH: value for name, value in high.details.items()}, SLOPE: slope},
-    )
+    ).after(f"solved at ε̂ = {case.penalty:.4g} and {HIGH * case.penalty:.4g}")
 
 
 def _at_high(quantity: Quantity) -> Quantity:

@@ -279,8 +279,10 @@ def _block_norms(matrix: FloatArray, n_nodes: int, dim: int) -> FloatArray:
     return np.hstack([reduce(np.hypot, [rows[:, axis:n:dim] for axis in range(dim)]), np.abs(rows[:, n:])])
 
 
-def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error: Array, *, idle: bool) -> Measurement:
-    """Return ω of an error of the residual (n_unknowns + n_multipliers,), which is at most 16.
+def make_sweep_measurement(
+    quantity: Quantity, conditioning: Conditioning, error: Array, *, idle: bool, action: str
+) -> Measurement:
+    """Return ω of an error of the residual (n_unknowns + n_multipliers,), at most 16, after an action on a case.
 
     Details are the error and the condition number of the row with that ω, and the largest error of a force over the
     largest force.
@@ -290,4 +292,4 @@ def make_sweep_measurement(quantity: Quantity, conditioning: Conditioning, error
     largest = float(np.linalg.norm(np.asarray(error[:n], dtype=np.float64).reshape(-1, dim), axis=1).max())
     force_error = ratio(largest, float(conditioning.floor[0]))
     details = {ERROR: worst.error, CONDITION: worst.condition, FORCE_ERROR: force_error}
-    return Measurement([quantity.check(worst.roundings, MOST_ROUNDINGS)], details=details, idle=idle)
+    return Measurement([quantity.check(worst.roundings, MOST_ROUNDINGS)], details=details, idle=idle).after(action)

@@ -97,8 +97,9 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
     undecided = ""
     if excusable and max(values.values()) > roundoff.MOST_ROUNDINGS:
         undecided = explain_by_rounded_decision(near)
-    idle = not forces[: case.interface.n_unknowns].any()
-    return Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided, idle=idle)
+    measurement = Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided)
+    measurement = replace(measurement, idle=not forces[: case.interface.n_unknowns].any())
+    return measurement.after(_moved_by(case))
 
 
 def refuse_unknown_forces(traits: Traits) -> str:
@@ -170,7 +171,11 @@ def stability_local(case: Case, subject: Subject) -> Measurement:
         values[TOTAL_THERE] = roundoff.ratio(float(np.hypot(*errors[TOTAL_THERE])), UNIT_ROUNDOFF * reach)
     failed = max(values.values()) > roundoff.MOST_ROUNDINGS
     undecided = explain_by_rounded_decision(near) if failed else ""
-    return Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided)
+    return Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided).after(_moved_by(case))
+
+
+def _moved_by(case: Case) -> str:
+    return f"moved by ({', '.join(f'{length:.4g}' for length in case.parameters['shift'])})"
 
 
 def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
@@ -269,7 +274,8 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
     expected: FloatArray = np.array(state.residual)
     expected[: case.interface.n_unknowns] = ExactMotion.from_case(case).turn(state.forces).reshape(-1)
     error, conditioning = there.residual - expected, roundoff.measure_conditioning(state, state.residual)
-    return roundoff.make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, error, idle=not state.residual.any())
+    idle, action = not state.residual.any(), f"turned and {_moved_by(case)}"
+    return roundoff.make_sweep_measurement(SWEPT_ROUNDINGS, conditioning, error, idle=idle, action=action)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -407,7 +413,8 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
     reach = np.array(conditioning.reach)
     reach[: scene.interface.n_nodes] += np.hypot(*bulk.reshape(-1, 2).T)
     conditioning = replace(conditioning, reach=reach)
-    return roundoff.make_sweep_measurement(ROUNDINGS, conditioning, error, idle=not state.forces.any())
+    idle, action = not state.forces.any(), f"solved at ε̂ = {case.penalty:.4g}, then turned and {_moved_by(case)}"
+    return roundoff.make_sweep_measurement(ROUNDINGS, conditioning, error, idle=idle, action=action)
 
 
 def _solve(system: System, pairing: Pairing | None, u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -527,7 +534,8 @@ def _measure_locking(
         share = answer.compliance / matching(factor * case.penalty)
         values[DRIFT] = 1 - share * matching(factor * at_soft) / soft.compliance
         details["stiffness of the springs over the penalty"] = factor
-    return Measurement(check_all(values, {DRIFT: MOST_DRIFT, ROUGHNESS: MOST_ROUGHNESS}), details=details)
+    measurement = Measurement(check_all(values, {DRIFT: MOST_DRIFT, ROUGHNESS: MOST_ROUGHNESS}), details=details)
+    return measurement.after(f"solved with a wave of pressure at ε̂ = {case.penalty:.4g}")
 
 
 MOST_WAVE_STEPS = 12

@@ -120,6 +120,15 @@ def test_a_finding_stands_behind_the_numbers_of_a_failure() -> None:
         Finding("row 3", (1.0,))
 
 
+@pytest.mark.parametrize(
+    ("value", "quantities", "place"),
+    [(1.0, (), None), (2.0, (), "moved, slave node 0"), (2.0, (MOST,), "moved, slave node 0"), (2.0, (LEAST,), None)],
+)
+def test_a_finding_says_what_was_done(value: float, quantities: tuple[Quantity, ...], place: str | None) -> None:
+    finding = Measurement([MOST.check(value, 1.0)]).after("moved", *quantities, finding=Finding("slave node 0")).finding
+    assert (finding and finding.place) == place
+
+
 def test_no_quantity_is_measured_twice() -> None:
     with pytest.raises(ValueError, match="twice"):
         Measurement([MOST.check(1.0, 1.0), MOST.check(2.0, 1.0)])

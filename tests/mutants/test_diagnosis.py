@@ -104,7 +104,7 @@ def test_a_mistake_in_an_included_formulation_is_named(name: str) -> None:
 @pytest.mark.parametrize("name", [*STRANGERS, *plane_names()])
 def test_nothing_is_said_of_a_right_formulation(name: str) -> None:
     subject = Subject(name, STRANGERS[name]) if name in STRANGERS else load_subject(name)
-    assert [diagnose(subject, property_id) for property_id in ("balance.force", "units", TANGENT)] == [""] * 3
+    assert {diagnose(subject, property_id) for property_id in ("balance.force", "units", "purity", TANGENT)} == {""}
 
 
 class Nodes:
@@ -115,6 +115,7 @@ class Nodes:
     )
     first_xi = 0.0
     n_left_out = 0
+    add = staticmethod(np.sum)
 
     def __init__(self, *, penalty):
         self.penalty = penalty
@@ -131,8 +132,8 @@ class Nodes:
             acts = (xi >= self.first_xi) & (xi < 1) & (gap < 0)
             force = np.where(acts, self.penalty * gap * area, 0.0)
             forces[:n] += force[:, None] * normal
-            forces[a] -= ((1 - xi) * force).sum() * normal
-            forces[b] -= (xi * force).sum() * normal
+            forces[a] -= self.add((1 - xi) * force) * normal
+            forces[b] -= self.add(xi * force) * normal
         return forces.reshape(-1)
 
 
@@ -152,6 +153,31 @@ def test_places_without_force_are_named_where_only_matching_nodes_are_promised(
     text = diagnose(Subject("nodes", make), "balance.force")
     assert text.startswith(words)
     assert bool(text) == bool(words)
+
+
+class LastAlone(Nodes):
+    """The last of several points on a segment is added alone, as `forces[i] += …` does with equal indices."""
+
+    traits = Nodes.traits.revise(conserves_force=True)
+    add = staticmethod(lambda forces: forces[forces != 0][-1:].sum())
+
+
+class Backwards(Nodes):
+    def residual(self, interface, pairing, z):
+        first, second = interface.master.segments[0]
+        return super().residual(interface, pairing, z) * (np.nan if first > second else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (LastAlone, r"gets 0\.\d+ times the force .* do several points add to one node \(`np.add.at`\)\?"),
+        (Backwards, "not finite where nodes are numbered against the surfaces, and finite where .* along the surfaces"),
+    ],
+)
+def test_forces_that_are_lost_and_numbers_that_make_nan_are_named(make: type[Nodes], words: str) -> None:
+    run_of_all = run([Subject("nodes", make)], load_properties(["balance.force"]), examples=3, seed=1, shrink="none")
+    assert re.search(words, run_of_all.diagnoses["nodes"])
 
 
 class Linear:

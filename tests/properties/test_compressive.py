@@ -49,7 +49,9 @@ def test_springs_that_push_and_never_pull() -> None:
     assert lift_slave(case, 0.25).positions[0, 1] == case.positions[0, 1] + 0.25
     assert verdict(case)[0] is Verdict.PASS
     depth = case.parameter("penetration")
-    assert verdict(case, at=1.01 * depth)[0] is Verdict.FAIL
+    outcome, reason = verdict(case, at=1.01 * depth)
+    assert outcome is Verdict.FAIL
+    assert f"lifted to a gap of {depth:.4g}, slave node 0 (free end): force " in reason
     assert verdict(case, at=0.99 * depth)[0] is Verdict.PASS
     outcome, reason = verdict(case, closed=False)
     assert outcome is Verdict.FAIL

@@ -1,5 +1,6 @@
 """Two states with the same answer: other numbers, mirrored, roles exchanged, turned, in other units."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -33,6 +34,9 @@ from contactverif_properties.states import random_directions
 
 def cases_of(property_id: str, examples: int = 10) -> tuple[Case, ...]:
     return draw_cases(load_property(property_id).cases(None), seed=f"same/{property_id}", examples=examples).cases
+
+
+SEEDS = range(1, 30)
 
 
 def ring_in_ring(slave: list[tuple[float, float]], master: list[tuple[float, float]]) -> Case:
@@ -175,11 +179,23 @@ def test_half_of_the_renumbered_meshes_are_closed_rings_with_another_seam() -> N
 
 def test_a_promise_to_be_unbiased_is_found_out() -> None:
     boaster = with_promises(contactverif_nts.nts_ar, unbiased=True)
-    verdicts = [judge_case(load_property("swap"), state, boaster).verdict for state in cases_of("swap")]
-    assert verdicts.count(Verdict.FAIL) >= 5
+    outcomes = [judge_case(load_property("swap"), state, boaster) for state in cases_of("swap")]
+    assert [outcome.verdict for outcome in outcomes].count(Verdict.FAIL) >= 5
+    failing = [outcome.reason for outcome in outcomes if outcome.verdict is Verdict.FAIL]
+    assert all("; with slave and master exchanged" in reason for reason in failing)
 
 
-SEEDS = range(1, 30)
+class Backwards(Springs):
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        first, second = interface.slave.segments[0]
+        return super().residual(interface, pairing, z) * (np.nan if first > second else 1.0)
+
+
+def test_of_two_numberings_the_one_that_makes_nan_is_named() -> None:
+    outcomes = [judge_case(renumbering, case(seed=seed), subject(Backwards, penalty="distributed")) for seed in SEEDS]
+    reasons = {outcome.reason.partition(" entries, ")[2] for outcome in outcomes if outcome.verdict is Verdict.FAIL}
+    assert reasons
+    assert all(re.fullmatch(r"with the numbers 1, 0, .* in another order; finite as drawn", each) for each in reasons)
 
 
 def test_a_force_that_turns_with_the_state_is_objective() -> None:

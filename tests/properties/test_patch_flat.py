@@ -1,5 +1,6 @@
 """The flat patch tests by class of meshes, tilted slaves, the total stiffness, and the worst force in words."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -214,6 +215,17 @@ def test_nothing_is_asked_where_nothing_is_known() -> None:
     assert idle == {"a1": False, "b": True}
     (row,) = run([subject], [question]).rows
     assert (row.verdict, row.unexpected) == (Verdict.PASS, "")
+
+
+@pytest.mark.parametrize(("area", "promised"), [("reference", "current"), ("current", "reference")])
+def test_a_total_of_the_other_configuration_says_what_it_follows(area: str, promised: str) -> None:
+    inner, id_ = load_subject(f"nts-ar:area={area}"), "patch.flat.resultant"
+    subject = with_promises(lambda *, penalty: inner.with_penalty(penalty).plugin, area=promised)
+    outcomes = [judge_case(load_property(id_), case, subject) for case in draw(id_, examples=10)]
+    reasons = [outcome.reason for outcome in outcomes if outcome.verdict is Verdict.FAIL]
+    follows = f"the force follows the {area} area, and area='{promised}' is promised"
+    assert reasons
+    assert all(re.search(rf"; on a reference \S+ times as long, .*; {follows}", reason) for reason in reasons)
 
 
 SCALE = load_property("total-stiffness")

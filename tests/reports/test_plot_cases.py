@@ -40,8 +40,14 @@ def shift(case: Case, by: float) -> Case:
     return Case(case.interface.at(case.interface.nodes + by), case.z + by)
 
 
+def stretch() -> Case:
+    case = flat([2, 2], [4])
+    return Case(case.interface.at(case.interface.nodes / [4, 1]), case.z)
+
+
 CASES = {
     "one": flat([1], [1]),
+    "stretched": stretch(),
     "C": flat([2, 2, 4, 4], [3, 3, 3, 3]),
     "turned": flat([2, 1 / 3], [7 / 3], angle=2.5),
     "uneven": flat([1e-5, 12], [6, 6.5]),
@@ -105,6 +111,7 @@ def test_very_uneven_lengths_are_not_to_scale() -> None:
         ("open", "open by 1/2 at every slave node"),
         ("barely", "penetration 1e-9 at every slave node"),
         ("overhang", "2 beyond it"),
+        ("stretched", "lengths in the reference: slave 1/2, 1/2; master 1"),
         ("many", "too many segments"),
         ("many", "60 segments of length 1 to 3"),
         ("kinked", "2    3   0.99     -0.008      6  0     0"),

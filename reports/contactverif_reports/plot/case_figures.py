@@ -24,7 +24,7 @@ from contactverif.contract.errors import MisuseError, printable
 from contactverif.contract.interface import PLANE, Surface
 from contactverif_reports.files import checked_name, whole
 from contactverif_reports.plot.geometry import Course, Gaps, format_number, one_digit, segment_lengths, unit_of
-from contactverif_reports.plot.text import surfaces_headline
+from contactverif_reports.plot.text import reference_sizes, surfaces_headline
 
 SUFFIXES = (".png", ".svg")
 # Lengths as shares of the size of the interface.
@@ -119,7 +119,7 @@ def make_case_figure(
     shortest = min(float(its_lengths.min()) for its_lengths in lengths) / unit
     if shortest < _SHORT * size:
         notes.append(f"shortest segment {format_number(shortest, course.roundoff / unit)}")
-    lines = [*textwrap.wrap(title, 92), ", ".join(notes)]
+    lines = [*textwrap.wrap(title, 92), ", ".join(notes), *textwrap.wrap(reference_sizes(case, unit), 92)]
     axes.set_title("\n".join(lines), fontsize=9, loc="left", parse_math=False)
     return figure
 
@@ -316,6 +316,7 @@ def _surface_figure(
     if errors is not None:
         share = f"up to {errors.max():.3g} of the largest exact force" if np.isfinite(errors).all() else "not finite"
         lines.append(f"shade: error of the nodal forces, {share}")
+    lines += textwrap.wrap(reference_sizes(case, 1.0), 92)
     figure.suptitle("\n".join([*textwrap.wrap(title, 92), *lines]), fontsize=9, x=0.02, ha="left", parse_math=False)
     return figure
 

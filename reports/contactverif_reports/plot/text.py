@@ -24,6 +24,8 @@ _DISTANCE = 2  # Rows between surfaces that would be nearer to each other.
 _LABELLED = 12  # The nodes of a picture get their numbers if a side has at most so many.
 _LISTED = 8  # The positions of at most so many nodes a side are listed.
 _LISTED_FACES = 12  # The nodes and faces of at most so many a side in space are listed.
+_SAME_SIZE = 1e-9  # Sizes that differ by less are the same but for rounding, as those of a mesh that was turned.
+_LISTED_SIZES = 6  # The least and the largest size stand for those of more elements.
 _INKS = {"slave": "▒", "master": "░"}  # The fillings of bodies.
 _FACES = {3: "triangle", 4: "quadrilateral"}
 
@@ -56,6 +58,7 @@ def as_text(case: Case, width: int = 72) -> str:
     table = [] if course.flat else _list_positions(case, gaps, unit, course.roundoff, width)
     if not table:
         notes.append(_describe_gaps(gaps, course, unit))
+    notes += filter(None, [reference_sizes(case, unit)])
     parameters = [(name, each) for name, each in case.parameters.items() if each.size == 1 and name != "penetration"]
     numbers = [("penalty", case.penalty), *((name, each.item()) for name, each in parameters)]
     notes.append("   ".join([*(f"{name} {format_number(number)}" for name, number in numbers), f"seed {case.seed}"]))
@@ -98,6 +101,18 @@ def _describe_gaps(gaps: Gaps, course: Course, unit: float) -> str:
     mean = float(np.mean(facing_gaps))
     amount = format_number(abs(mean), course.roundoff / unit)
     return f"{f'penetration {amount}' if mean < 0 else f'open by {amount}' if mean else 'touching'} {place}"
+
+
+def reference_sizes(case: Case, unit: float) -> str:
+    """Return in words the sizes of segments or faces in the reference, of a side on which they are other ones."""
+    interface, sides, power = case.interface, [], case.interface.dim - 1
+    for name, surface in (("slave", interface.slave), ("master", interface.master)):
+        sizes, now = (surface.measures(nodes) / unit**power for nodes in (interface.nodes, case.positions))
+        if not np.allclose(sizes, now, rtol=_SAME_SIZE, atol=0):
+            few = sizes if len(sizes) <= _LISTED_SIZES else np.array([sizes.min(), sizes.max()])
+            texts = [format_number(size, _SAME_SIZE * size) for size in few.tolist()]
+            sides.append(f"{name} {(', ' if few is sizes else ' to ').join(texts)}")
+    return f"{'lengths' if power == 1 else 'areas'} in the reference: {'; '.join(sides)}" if sides else ""
 
 
 def _list_positions(case: Case, gaps: Gaps, unit: float, roundoff: float, width: int) -> list[str]:
@@ -144,6 +159,7 @@ def _surfaces(case: Case, width: int) -> str:
     notes += [f"seen from outside its body, a {_FACES[interface.slave.faces.shape[1]]}'s corners run counter-clockwise"]
     if "penetration" in case.parameters:
         notes.append(f"penetration {format_number(case.parameter('penetration') / unit)} everywhere")
+    notes += filter(None, [reference_sizes(case, unit)])
     notes.append(f"penalty {format_number(case.penalty)}   seed {case.seed}")
     return "\n".join([*lines, *_wrap(notes, width)])
 
