@@ -52,12 +52,7 @@ class DiskProblem:
     poisson: float = 0.0  # Poisson's ratio of both bodies.
     force: float = 1e6  # The force F on top of the disk, per unit of thickness.
     penalty: float = 1e9  # The distributed stiffness ε̂, force per length per length of penetration.
-    width: float = 0.0  # The width and the depth of the foundation, lengths; 2R and R by default.
-    depth: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, default in (("width", 2 * self.radius), ("depth", self.radius)):
-            object.__setattr__(self, name, getattr(self, name) or default)
+    size: float = 1.0  # The foundation is 2R × size wide and R × size deep.
 
     @property
     def stiffness(self) -> float:
@@ -102,17 +97,15 @@ def disk_on_foundation(
 
 def foundation(problem: DiskProblem, refine: int = 1) -> Body:
     """Return the foundation, whose surface is y = 0; its contact boundary is |x| ≤ 2.5 a."""
-    a = problem.half_width
+    a, extent = problem.half_width, problem.size * problem.radius  # The extent is half the width, and the depth.
     inner, outer, deep = ELEMENTS
     size = 2 * UNIFORM * a / inner
     middle = (np.arange(inner // 2 * refine + 1) + 0.5) * size / refine
-    left, right = (
-        middle[-1] + grade(problem.width / 2 - middle[-1], size, outer, outer * refine - fewer)[1:] for fewer in (0, 1)
-    )
+    left, right = (middle[-1] + grade(extent - middle[-1], size, outer, outer * refine - fewer)[1:] for fewer in (0, 1))
     whole = block(
         Rectangle(
             np.concatenate([-left[::-1], -middle[::-1], middle, right]),
-            -grade(problem.depth, size, deep, deep * refine)[::-1],
+            -grade(extent, size, deep, deep * refine)[::-1],
             young=problem.young[1],
             poisson=problem.poisson,
         ),

@@ -13,7 +13,7 @@ Source: Zavarise & De Lorenzis (2009), Section 7.2, Figs. 37 to 39.
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Annotated, Self
 
@@ -437,7 +437,6 @@ def _compute_peaks() -> _PeakStudy:
     for column, slope in enumerate(SLOPES):
         for row in EXPLAINED:
             slopes[PEAK_FORMULATIONS.index(row), column] = solve_disk(row, flatter(slope)).excess
-    resized = [replace(PAPER, width=PAPER.width * factor, depth=PAPER.depth * factor) for factor in SIZES]
     interfaces = [_disk_scene(refine=refine).interface for refine in _REFINEMENTS]
     return _PeakStudy(
         solutions=tuple(zip(*by_mesh, strict=True)),
@@ -445,7 +444,7 @@ def _compute_peaks() -> _PeakStudy:
         slope=SLOPES,
         excess_over_slopes=slopes,
         foundation=SIZES,
-        excess_over_sizes=np.array([solve_disk(paper.VTS_ME, problem).excess for problem in resized]),
+        excess_over_sizes=np.array([solve_disk(paper.VTS_ME, DiskProblem(size=size)).excess for size in SIZES]),
         winkler=PAPER.winkler_contact().peak,
     )
 
