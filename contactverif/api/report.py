@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from contactverif.api.run_files import PARAVIEW, RUN_FILES, either, write_run
 from contactverif.contract.counterexample import Counterexample, failing_examples
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import Outcome, Property, Verdict
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, describe
 from contactverif.contract.subject import Subject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.remote import RemoteSubject
@@ -228,9 +228,11 @@ class Report(Run):
 
         names = self.formulations
         if len(names) <= _MOST_FORMULATIONS:
-            lines = [f"{name}: {_counts(list(self.rows_of(name)))}" for name in names]
+            lines = [f"{name}: {describe(self.rows_of(name))}" for name in names]
         else:
-            lines = [f"{len(names)} formulations: {_counts(self.rows)}"]
+            counts = Counter(row.result for row in self.rows)
+            listed = ", ".join(f"{counts[result]} {result}" for result in Result if counts[result])
+            lines = [f"{len(names)} formulations: {listed}"]
         lines += _remarks(self)
         lines += [f"first failure: {failure!r}" for failure in self.failures[:1]]
         return "\n".join([*lines, headline(self)])
@@ -241,11 +243,6 @@ class Report(Run):
 
         rows, failures = _failing_rows(self), self.failures
         return run_view(self, rows, _remarks(self), failures[0] if failures else None)
-
-
-def _counts(rows: Sequence[Row]) -> str:
-    counts = Counter(row.result for row in rows)
-    return ", ".join(f"{counts[result]} {result}" for result in Result if counts[result]) or "nothing was checked"
 
 
 def _failing_rows(run: Run) -> list[Row]:

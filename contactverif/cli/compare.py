@@ -21,7 +21,7 @@ from contactverif.cli import verify
 from contactverif.cli.console import columns, fold, indent_below, line, show, show_verbatim
 from contactverif.cli.options import OutputFiles, Screen, with_engines
 from contactverif.cli.progress import Bar
-from contactverif.cli.run_screen import conclusion, headline
+from contactverif.cli.run_screen import headline, summary
 from contactverif.contract.counterexample import case_id, counterexamples
 from contactverif.contract.errors import MisuseError, unknown_name_error
 from contactverif.contract.property import Property, Verdict
@@ -217,10 +217,10 @@ def _compare_formulations(job: verify.Job, screen: Screen) -> int:
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
         if not screen.quiet:
             _show_verdicts(study, screen)
-        costs, last = _time_evaluations(plugins), last_line(study.comparison)
+        costs, last = _time_evaluations(plugins), summary(study.comparison.candidates, quiet=True)
         missing = partial(find_missing, study.run, *plugins, job.sampling)
         write = partial(_write_file, study, plugins, costs)
-        end = verify.end_run(job, store, missing, write, promises_kept=study.comparison.promises_kept)
+        end = verify.end_run(job, store, missing, write, promises_kept=study.comparison.candidates.promises_kept)
         if not costs:
             end = end._replace(status=verify.STOPPED)
             last.append("\nStopped before the time of an evaluation was known; all else is above.", "yellow")
@@ -300,14 +300,6 @@ def _show_verdicts(study: Study, screen: Screen) -> None:
             lines.append(f"{name}: {outcome.verdict}, {words}")
         drawing = as_text(differing.sides[-1][1].case).splitlines()
         show_verbatim(indent_below(f"{differing.info.id}, case {differing.number}", *lines, *drawing))
-
-
-def last_line(comparison: comparisons.Comparison) -> Text:
-    """Say whether the candidates keep their promises; the reference is not on trial."""
-    if comparison.promises_kept:
-        return Text(f"Every promise of {', '.join(comparison.formulations[1:])} is kept.", style="green")
-    rows = [cell.row for cell in comparison.cells.values() if cell.row.formulation != comparison.reference]
-    return conclusion(rows, list(comparison.not_loaded))
 
 
 def _few_lines(study: Study, width: int) -> Iterator[Text]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
 from typing import Any
 
 from rich.text import Text
@@ -11,7 +12,7 @@ from rich.text import Text
 from contactverif.cli.console import columns, line, show
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import OPTIONAL_PARTS, Subject
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Evidence, Traits
 from contactverif.isolation.remote import Wrapper
 from contactverif.plugins.registry import describe_engines, load_formulations, load_problems, load_properties
 from contactverif.problems.catalogue import BLOCKS, SCENES, load_scene, options_of
@@ -32,31 +33,18 @@ MEANINGS = {
     "lowered": "depth of the slave in the first guess; 0 begins where the bodies touch; p/ε̂ by default",
     "force": "force on top of the disk, per unit of thickness",
 }
+_EVIDENCE = [entry.name for entry in fields(Evidence)]
+_PATCH_TEST = {True: "passes", False: "fails", None: "–"}  # The statement about any flat interface.
 _MARGIN = 4
 _NARROWEST, _WIDEST = 40, 96  # Columns of running text, whatever the terminal has.
-_YES_OR_NO = (  # (trait, statement where it is true, statement where it is false)
-    ("normal", "passes with node on node", "fails with node on node"),
-    ("single", "passes with nodes on midpoints", "fails with nodes on midpoints"),
-    ("overhang", "passes where the slave overhangs", "fails where the slave overhangs"),
-    ("converges", "converges", "does not converge"),
-    ("inf_sup", "satisfies inf-sup", "does not satisfy inf-sup"),
-    ("locks", "locks", "does not lock"),
-    ("integrates_linear_gap", "integrates a linear gap", "does not integrate a linear gap"),
-    ("local", "local", "not local"),
-    ("unbiased", "unbiased", "biased"),
-    ("nodes_push", "nodes push", "nodes may pull"),
-    ("independent_multipliers", "independent multipliers", "dependent multipliers"),
-    ("conserves_force", "conserves force", "does not conserve force"),
-    ("conserves_moment", "conserves moment", "does not conserve moment"),
-    ("symmetric", "symmetric", "unsymmetric"),
-    ("translation_stable", "stable under translation", "not stable under translation"),
-)
 
 
 def list_installed(options: RunOptions, traits: bool) -> None:
     """Show four tables; of the traits the most important ones or all."""
     formulations = load_formulations(options.limits())
-    _show_table("formulations", ("name", "in", "promises"), (_formulation(item, traits) for item in formulations))
+    _show_table(
+        "formulations", ("name", "in", "patch test", "promises"), (_formulation(item, traits) for item in formulations)
+    )
     questions = (
         (item.formulation, "", _not_loaded(item))
         if isinstance(item, NotLoaded)
@@ -86,38 +74,30 @@ def _not_loaded(item: NotLoaded) -> Text:
 
 def _formulation(item: Subject | Wrapper | NotLoaded, every_trait: bool) -> tuple[Any, ...]:
     if isinstance(item, NotLoaded):
-        return item.formulation, "", _not_loaded(item)
+        return item.formulation, "", "", _not_loaded(item)
     if not isinstance(item, Subject):
         verbs = {"/NAME": "wraps another", "=PATH": "loads a file", "=KIND": "has kinds"}
         verb = next(words for ending, words in verbs.items() if item.form.endswith(ending))
-        return item.name, "", f"{verb}, {item.form}{f': {item.summary}' if item.summary else ''}"
-    statements = _statements(item.traits, every_trait) or ["nothing"]
+        return item.name, "", "", f"{verb}, {item.form}{f': {item.summary}' if item.summary else ''}"
+    statements = _statements(item.traits, every_trait) or [
+        "nothing else" if item.traits.promises.patch.flat is not None else "nothing"
+    ]
     if missing := ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides):
         statements.append(f"not provided: {missing}")
-    return item.name, ", ".join(f"{each}-D" for each in item.traits.abilities.dimensions), "; ".join(statements)
+    dimensions = ", ".join(f"{each}-D" for each in item.traits.abilities.dimensions)
+    return item.name, dimensions, _PATCH_TEST[item.traits.promises.patch.flat], "; ".join(statements)
 
 
 def _statements(traits: Traits, every_trait: bool) -> list[str]:
-    statements = [] if traits.rules.enforcement == "penalty" else [f"by {traits.rules.enforcement}"]
-    if traits.promises.patch.flat is not None:
-        statements.append("passes the flat patch test" if traits.promises.patch.flat else "fails the flat patch test")
-    if traits.promises.tangent is not None:
-        statements.append(f"{traits.promises.tangent} tangent")
+    """Return what a formulation states; all of it in the words of the code, which its author writes."""
     if not every_trait:
-        return statements
-    values = traits.by_name()
-    statements += [yes if values[name] else no for name, yes, no in _YES_OR_NO if values[name] is not None]
-    for words, value in (
-        ("area {}", traits.rules.area),
-        ("penalty {}", traits.rules.penalty),
-        ("gap by {}", traits.rules.gap),
-        ("force along {}", traits.rules.force_along),
-        ("{} when sliding", traits.promises.continuity),
-        ("forces stated on {}", ", ".join(traits.evidence.published_forces)),
-    ):
-        statements += [words.format(value)] if value else []
-    witnesses = sorted(traits.evidence.witnesses.items())
-    return statements + [f"{property_id} fails on {case}" for property_id, case in witnesses]
+        by = [] if traits.rules.enforcement == "penalty" else [f"by {traits.rules.enforcement}"]
+        return [*by, *([f"{traits.promises.tangent} tangent"] if traits.promises.tangent else [])]
+    silent, evidence = Traits().by_name(), traits.evidence
+    values = traits.by_name().items()
+    statements = [f"{name}={value!r}" for name, value in values if value != silent[name] and name not in _EVIDENCE]
+    statements += [f"forces stated on {name}" for name in evidence.published_forces]
+    return statements + [f"{property_id} fails on {case}" for property_id, case in sorted(evidence.witnesses.items())]
 
 
 def list_scenes() -> None:

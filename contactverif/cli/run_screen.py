@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import shlex
 import textwrap
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -41,16 +40,6 @@ _PARTS = {  # The results that show no mistake and have a line for each row, and
     Result.FAILS_AS_STATED: "fails as stated",
     Result.UNDECIDED: "undecided",
     Result.NOT_JUDGED: "not judged",
-}
-_COUNTED = {
-    Result.PASS: "pass",
-    Result.FAILS_AS_STATED: "fail as stated",
-    Result.FAIL: "fail without a promise",
-    Result.UNDECIDED: "undecided",
-    Result.NOT_JUDGED: "not judged",
-    Result.OMITTED: "not asked",
-    Result.NOT_APPLICABLE: "do not apply",
-    Result.NOT_PROVIDED: "need a missing part",
 }
 _PROMISES = {True: "passes", False: "fails", None: "–"}
 COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
@@ -115,24 +104,24 @@ def headline(provenance: Mapping[str, str]) -> str:
     return f"profile {profile}: {examples} random cases for each property, seed {seed}"
 
 
-def summary(run: Run, *, quiet: bool = False) -> Text:
-    """Say in the last lines whether every promise is kept, and how many there are, or what is wrong."""
+def summary(run: Run, *, quiet: bool = False, status: int | None = None) -> Text:
+    """Say in the last lines what fails or is wrong, or else that every promise is kept, and how many there are.
+
+    What fails without breaking a promise gives an exit status of 0, which is said beside it.
+    """
     if run.promises_kept:
-        return Text(run.praise if quiet else f"{run.praise}\n{run.promises}", style="green")
-    signs = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
-    return conclusion(run.rows, [item.formulation for item in run.not_loaded], signs)
-
-
-def conclusion(rows: Sequence[Row], not_loaded: Sequence[str], signs: Sequence[str] = ()) -> Text:
-    """Sum up rows and plugins that did not load, behind sentences about whole formulations."""
-    sentences = list(signs)
+        sentence = f"{'✗ ' if run.result is Result.FAIL else ''}{run.conclusion}"
+        if status == 0 and run.result in (Result.FAIL, Result.FAILS_AS_STATED):
+            sentence = f"{sentence.removesuffix('.')} (exit 0)."
+        return Text(sentence if quiet else f"{sentence}\n{run.promises}", style=STYLES.get(run.result, ""))
+    sentences = [f"The forces of {name} have the opposite sign." for name in run.opposite_signs]
     for result, words in WRONG_RESULTS.items():
         names = []
-        for row in by_rank(rows):
+        for row in by_rank(run.rows):
             if row.result is result and row.unexpected:
                 otherwise = result is Result.BROKEN_PROMISE and row.unexpected != results.BROKEN_BY_FAILING
                 names.append(f"{row.formulation} {row.property_id}{f' ({row.unexpected})' if otherwise else ''}")
-        names += not_loaded if result is Result.NOT_LOADED else []
+        names += [item.formulation for item in run.not_loaded] if result is Result.NOT_LOADED else []
         if names:
             named = f": {_list(names, _MOST_SUMMED_UP)}" if result is not Result.OMITTED else ""
             sentences.append(f"{len(names)} {words[len(names) > 1]}{named}.")
@@ -153,6 +142,7 @@ def _remark(row: Row) -> str:
         f"undecided in: {_list(row.undecided_names)}" if row.undecided_names else "",
         row.suspicion,
         _finding(row),
+        "a trait of the method" if row.is_trait else "",
     ]
     return "; ".join(part for part in parts if part)
 
@@ -188,11 +178,8 @@ def run_screen(run: Run, width: int, report: Path | None = None) -> Iterator[Tex
 
 def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone: bool) -> Iterator[Text]:
     rows = list(run.rows_of(name))
-    wrong, counts = wrong_rows(rows), Counter(row.result for row in rows)
-    words = [f"{len(wrong)} wrong"] if wrong else []
-    words += [f"{counts[result]} {text}" for result, text in _COUNTED.items() if counts[result]]
-    title = f"{name}: {', '.join(words)}" if words else name
-    yield fold(title, width, "bold red" if wrong else "bold", indent=0)
+    wrong = wrong_rows(rows)
+    yield fold(f"{name}: {results.describe(rows)}", width, f"bold {STYLES.get(results.overall(rows), '')}", indent=0)
     if name in run.opposite_signs:
         yield fold(results.OPPOSITE_SIGN, width, "bold red", indent=2)
     if name in run.diagnoses:
@@ -214,13 +201,15 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
         if row.result is Result.PASS and (remark := "; ".join(filter(None, (row.suspicion, _finding(row))))):
             yield fold(f"{row.property_id} passes, and says: {remark}", width, "yellow", indent=0)
     for result, title in _PARTS.items():
-        part = by_rank(row for row in rows if row.result is result)
+        part = by_rank(row for row in rows if row.result is result and not row.is_trait)
         # A row that was not judged makes a run fail, too: its reason is wanted.
         if (alone and not wrong) or result is Result.NOT_JUDGED:
             yield from _part(title, part, width)
         elif part:
             yield fold(f"{title}: {', '.join(row.property_id for row in part)}", width, indent=0)
-    yield from _families(rows, width)
+    if traits := [row.property_id for row in rows if row.is_trait]:
+        yield fold(f"traits of the method, no mistakes: fails {', '.join(traits)}", width, indent=0)
+    yield from _families([row for row in rows if not row.is_trait], width)
 
 
 def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -> Iterator[Text]:

@@ -322,7 +322,8 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
         if remark := result.provenance.get("drawing"):
             show(f"{remark}.")
 
-    return show_end(job, screen, end, result, show_result, summary(result, quiet=screen.quiet), advice)
+    last_line = summary(result, quiet=screen.quiet, status=end.status)
+    return show_end(job, screen, end, result, show_result, last_line, advice)
 
 
 def show_end(

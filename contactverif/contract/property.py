@@ -53,7 +53,7 @@ class Verdict(IntEnum):
 
 FAILED = frozenset({Verdict.FAIL, Verdict.CRASHED})
 DECIDED = FAILED | {Verdict.PASS}  # The verdicts that count as judged.
-Role = Literal["", "foundation", "exact", "comparison"]
+Role = Literal["", "foundation", "exact", "comparison", "trait"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +274,8 @@ class PropertyInfo:
         One of another author has −1 and is shown before ours, since it was installed for a purpose.
     role : str
         "foundation" if a failure says that no other answer can be relied on; "exact" for an exact answer, behind which
-        failures of "comparison" are shown: two answers that differ do not say which is right.
+        failures of "comparison" are shown: two answers that differ do not say which is right; "trait" if a failure that
+        breaks no promise tells what method it is, and is no mistake.
 
     Raises
     ------

@@ -64,6 +64,21 @@ class Result(StrEnum):
     NOT_LOADED = "not loaded"
 
 
+_WAYS_TO_FAIL = {
+    Result.BROKEN_PROMISE: "against a promise",
+    Result.CRASHED: "by a crash",
+    Result.WRONG_TRAITS: "by a mistake in the traits",
+    Result.FAIL: "without a promise",
+    Result.FAILS_AS_STATED: "as it states",
+}
+_COUNTED = {
+    Result.UNDECIDED: "undecided",
+    Result.NOT_JUDGED: "not judged",
+    Result.OMITTED: "not asked",
+    Result.NOT_APPLICABLE: "do not apply",
+    Result.NOT_PROVIDED: "need a missing part",
+}
+_MOST_NAMED = 3  # Formulations that a conclusion names.
 # The probability below which a count is no chance. A run of a thousand rows accuses one by chance once in ten runs.
 BY_CHANCE = 1e-4
 CaseKey = tuple[str, Verdict, bool]  # All that counts depend on: kind, verdict, and whether the case was idle.
@@ -359,6 +374,11 @@ class Row:
         return self.verdict is Verdict.NOT_JUDGED and self.reason.startswith(OMITTED)
 
     @property
+    def is_trait(self) -> bool:
+        """Return whether the row fails by what method it is, which is no mistake, and breaks no promise."""
+        return self.info.role == "trait" and self.verdict is Verdict.FAIL and not self.unexpected
+
+    @property
     def unexpected(self) -> str:
         """The reason why this row makes the run fail; empty if it does not."""
         match self.verdict:
@@ -386,6 +406,46 @@ class Row:
         if self.omitted:
             return Result.OMITTED
         return Result.WRONG_TRAITS if self.traits_are_wrong else Result[self.verdict.name]
+
+
+def overall(rows: Iterable[Row]) -> Result:
+    """Return the worst result of some rows, without traits of the method; a pass only if a promise to pass is kept."""
+    rows = [row for row in rows if not row.is_trait]
+    if any(row.unexpected and row.verdict is not Verdict.NOT_JUDGED for row in rows):
+        return Result.BROKEN_PROMISE
+    results = {row.result for row in rows}
+    kept = any(row.promise and row.verdict is Verdict.PASS for row in rows)
+    in_order = Result.FAIL, Result.NOT_JUDGED, Result.FAILS_AS_STATED, Result.UNDECIDED
+    return next((each for each in in_order if each in results), Result.PASS if kept else Result.NOT_APPLICABLE)
+
+
+def describe_failures(rows: Iterable[Row]) -> str:
+    """Return how many rows of a formulation fail, whoever promised it, and in which way; empty if none does.
+
+    Traits of the method are left out.
+    """
+    rows = [row for row in rows if not row.is_trait]
+    failing = [row for row in rows if row.verdict in FAILED]
+    if not failing:
+        return ""
+    patch = ", the patch test among them" if any(row.info.role == "exact" for row in failing) else ""
+    words = f"fails {len(failing)} of {sum(row.verdict in DECIDED for row in rows)}{patch}"
+    counts = Counter(row.result for row in failing)
+    if len(counts) > 1:
+        return f"{words}: {', '.join(f'{counts[each]} {way}' for each, way in _WAYS_TO_FAIL.items() if counts[each])}"
+    return f"{words}, {'and promises none of these' if counts[Result.FAIL] else _WAYS_TO_FAIL[failing[0].result]}"
+
+
+def describe(rows: Iterable[Row]) -> str:
+    """Return what became of the rows of a formulation: what fails comes first, and what passes where nothing does."""
+    rows = list(rows)
+    counts = Counter(row.result for row in rows)
+    others = sum(row.result is Result.BROKEN_PROMISE and row.verdict not in FAILED for row in rows)
+    words = [describe_failures(rows) or (f"{counts[Result.PASS]} pass" if counts[Result.PASS] else "")]
+    words += [f"{others} broken promise{'s' * (others > 1)} without a failure"] if others else []
+    words += [f"{counts[result]} {text}" for result, text in _COUNTED.items() if counts[result]]
+    mark = "✗ " if overall(rows) in (Result.BROKEN_PROMISE, Result.FAIL) else ""
+    return f"{mark}{'; '.join(filter(None, words))}" or "nothing was checked"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -465,14 +525,25 @@ class Run:
         return sum(row.result in results for row in self.rows)
 
     @property
-    def praise(self) -> str:
-        """The sentence about a run whose promises are kept; what stayed undecided was not judged."""
+    def result(self) -> Result:
+        """The word for the run, as for a row; it is a pass only if nothing fails, whoever promised it."""
+        return overall(self.rows) if self.promises_kept else Result.BROKEN_PROMISE
+
+    @property
+    def conclusion(self) -> str:
+        """The sentence about a run of which no promise is broken: what fails all the same, or was not judged."""
+        words = {name: describe_failures(self.rows_of(name)) for name in self.formulations}
+        if failures := [f"{name} {text}" for name, text in words.items() if text]:
+            more = f"; and {len(failures) - _MOST_NAMED} more fail" if len(failures) > _MOST_NAMED else ""
+            return f"{'; '.join(failures[:_MOST_NAMED])}{more}. No promise is broken."
         if unasked := {row.formulation for row in self.rows} - {row.formulation for row in self.rows if row.planned}:
             return f"Nothing was judged of {', '.join(sorted(unasked))}: no property applies. What was judged is kept."
         names = [f"{row.formulation} {row.property_id}" for row in self.rows if row.result is Result.UNDECIDED]
-        if not names:
+        if names:
+            return f"Every promise that was judged is kept. Undecided: {'; '.join(names)}."
+        if self.result is Result.PASS:
             return "Every promise is kept and every property was judged."
-        return f"Every promise that was judged is kept. Undecided: {'; '.join(names)}."
+        return "Nothing fails, and nothing was promised."
 
     @property
     def promises(self) -> str:

@@ -119,6 +119,7 @@ def _judge(quantity: Quantity, remainder: float, arm: float, state: FrozenState,
 @Property.define(
     id="symmetric",
     rank=300,
+    role="trait",
     family="invariants",
     quantities=(ASYMMETRY, WORK),
     cases=Cases.random(smooth_cases),

@@ -154,7 +154,7 @@ def engine_units(case: Case, subject: Subject) -> Measurement:
     return _compare_scenes(case, subject, changed, action, lambda _, forces: forces / (LENGTH * MODULUS))
 
 
-@_define_for_codes(id="engine.swap", promise=lambda traits: traits.promises.unbiased)
+@_define_for_codes(id="engine.swap", role="trait", promise=lambda traits: traits.promises.unbiased)
 def engine_swap(case: Case, subject: Subject) -> Measurement:
     """Slave and master may exchange their roles.
 

@@ -247,7 +247,7 @@ def mirror(case: Case, subject: Subject) -> Measurement:
 @_define(
     id="swap",
     rank=400,
-    role="comparison",
+    role="trait",
     quantities=_same_answer("with roles exchanged"),
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),

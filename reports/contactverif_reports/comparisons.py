@@ -16,7 +16,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, freeze
 from contactverif.contract.case import Case
 from contactverif.contract.property import DECIDED, CheckedNumber, Outcome, PropertyInfo, Verdict, checked_numbers
-from contactverif.contract.result import Row, Run
+from contactverif.contract.result import NotLoaded, Row, Run
 from contactverif_reports.tables import Code, Column, Measured, ResultCell, Table, numbers
 
 ORDER = "order of one Newton step"  # The quantity that measures the order of Newton's method.
@@ -271,14 +271,10 @@ class Comparison:
         )
 
     @property
-    def unexpected(self) -> tuple[RowNumbers, ...]:
-        """The cells in which a candidate breaks a promise or was not judged; the reference is not on trial."""
-        return tuple(cell for (name, _), cell in self.cells.items() if name != self.reference and cell.row.unexpected)
-
-    @property
-    def promises_kept(self) -> bool:
-        """Return whether every candidate was checked and keeps all that it promises."""
-        return not self.unexpected and not self.not_loaded and len(self.formulations) > 1
+    def candidates(self) -> Run:
+        """The candidates as a run of their own: the reference is not on trial."""
+        rows = (cell.row for (name, _), cell in self.cells.items() if name != self.reference)
+        return Run(tuple(rows), tuple(NotLoaded(*item) for item in self.not_loaded.items()))
 
     @property
     def differing(self) -> list[Differing]:

@@ -20,7 +20,7 @@ def report() -> Report:
 
 def test_it_prints_counts_and_the_first_failure_in_a_few_lines(report: Report) -> None:
     lines = repr(report).splitlines()
-    assert lines[0] == "vts-me: 1 pass, 1 fails as stated"
+    assert lines[0] == "vts-me: fails 1 of 2, the patch test among them, as it states"
     assert "Right: 2 pass" in lines
     at = next(n for n, line in enumerate(lines) if line.startswith("first failure"))
     assert lines[at] == "first failure: Half, patch.flat.transmission: fail, the smallest case found"

@@ -168,7 +168,7 @@ def test_the_list_has_what_does_not_load_too(ask: Ask) -> None:
     answer = ask("list")
     assert answer.status == 0
     assert re.search(r"absent +not loaded: ModuleNotFoundError", answer.out)
-    assert re.search(r"raising +2-D +nothing; not provided: pair, tangent, contact_points", answer.out)
+    assert re.search(r"raising +2-D +– +nothing; not provided: pair, tangent, contact_points", answer.out)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ def test_who_promises_nothing_is_told_so_and_how_stiff_its_springs_are(ask: Ask)
     assert answer.status == 0
     assert "your springs are 2.00 ε̂ L: two passes, or twice too stiff" in answer.out
     assert answer.out.splitlines()[-2:] == [
-        "Every promise is kept and every property was judged.",
+        "✗ twice fails 1 of 2, the patch test among them, and promises none of these. No promise is broken (exit 0).",
         "Properties promised to pass: 1, to fail: 0, neither: 2.",
     ]
 
@@ -215,9 +215,9 @@ def test_nobody_says_that_all_was_judged_where_something_is_undecided(ask: Ask) 
 def test_a_run_that_judges_nothing_does_not_say_that_all_was_judged() -> None:
     info = load_property("purity").info
     idle = (Row("barrier", info, Verdict.NOT_APPLICABLE, None, reason="not defined in penetration"),)
-    assert Run(idle).praise == "Nothing was judged of barrier: no property applies. What was judged is kept."
+    assert Run(idle).conclusion == "Nothing was judged of barrier: no property applies. What was judged is kept."
     judged = Row("mine", info, Verdict.PASS, True, planned=1, outcomes=(Outcome(named_case("a1"), Verdict.PASS),))
-    assert Run((judged,)).praise == "Every promise is kept and every property was judged."
+    assert Run((judged,)).conclusion == "Every promise is kept and every property was judged."
 
 
 def test_a_known_failure_that_passes_fails_the_run(ask: Ask) -> None:
@@ -244,7 +244,7 @@ def test_a_right_formulation_takes_few_lines_and_every_property_has_one_place(as
     assert len(lines) <= MOST_LINES
     assert max(map(len, lines)) <= COLUMNS
     assert lines[2].startswith("vts-ppt: ")
-    assert "  swap " in answer.out
+    assert "\ntraits of the method, no mistakes: fails swap\n" in answer.out
     assert "\npasses: " in answer.out
     assert "✗" not in answer.out
 
@@ -256,7 +256,7 @@ def test_a_wrong_formulation_shows_one_mesh_and_a_line_for_all_else(ask: Ask) ->
     assert answer.status == 1
     assert len(lines) <= MOST_LINES_OF_WRONG
     assert max(map(len, lines)) <= COLUMNS
-    assert "wrong" in lines[2]
+    assert "half: ✗ fails " in lines[2]
     assert answer.out.count("●──") == 1
     mesh, others = answer.out.split("also wrong:\n")
     assert "BROKEN PROMISE" in mesh
@@ -269,7 +269,9 @@ def test_a_wrong_formulation_shows_one_mesh_and_a_line_for_all_else(ask: Ask) ->
 
 @pytest.mark.usefixtures("strangers")
 def test_one_line_is_enough_for_a_script(ask: Ask) -> None:
-    assert ask(f"verify vts-ppt -q {CHEAP}").out == "Every promise is kept and every property was judged.\n"
+    assert ask(f"verify sts -q {CHEAP}").out == "Every promise is kept and every property was judged.\n"
+    stated = "vts-ppt fails 2 of 14, as it states. No promise is broken (exit 0).\n"
+    assert ask(f"verify vts-ppt -q {CHEAP}").out == stated
     assert ask(f"verify half -q -p swap -p total-stiffness {FEW}").out.count("\n") == 1
 
 

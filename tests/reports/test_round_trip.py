@@ -15,7 +15,7 @@ from handmade_report import ERROR, SLOPE, awkward, flat, outcome, question, run_
 from rich.console import Console, Group, RenderableType
 
 from contactverif import Finding, Measurement, MisuseError, Outcome, Verdict, load_formulation, load_properties
-from contactverif.cli.compare import changes_screen, last_line, regressions_text
+from contactverif.cli.compare import changes_screen, regressions_text
 from contactverif.cli.run_screen import counterexample_text, run_screen, run_table, summary
 from contactverif.contract.counterexample import counterexamples, failing_examples
 from contactverif.contract.result import NotLoaded, Result, Row, Run
@@ -117,7 +117,7 @@ def everything_shown(run: Run) -> dict[str, str]:
         comparison = Comparison.from_run(run, reference)
         tables = (results_table, errors_table, iterations_table)
         texts |= {table.__name__: text_of(table(comparison).terminal()) for table in tables}
-        texts["last line of the comparison"] = text_of(last_line(comparison))
+        texts["last line of the comparison"] = text_of(summary(comparison.candidates))
         texts["comparison"] = comparison_page(comparison, (), (), ())
     named = NamedRun.from_run("r.nc", run)
     changes = Changes.between(named, named)

@@ -180,10 +180,10 @@ def test_a_comparison_puts_the_reference_first_and_not_on_trial() -> None:
     run = small_run()
     comparison = Comparison.from_run(run, "vts-me")
     assert comparison.formulations == ("vts-me", "vts-ppt", "nts")
-    assert comparison.unexpected == ()  # vts-me promised to pass, but it is the reference
-    assert not comparison.promises_kept  # `mine` did not load
+    assert comparison.candidates.unexpected == ()  # vts-me promised to pass, but it is the reference
+    assert not comparison.candidates.promises_kept  # `mine` did not load
     comparison = Comparison.from_run(run, "vts-ppt")
-    assert [item.row.formulation for item in comparison.unexpected] == ["vts-me"]
+    assert [row.formulation for row in comparison.candidates.unexpected] == ["vts-me"]
     assert comparison.not_loaded == {"mine": "no module"}
     paired = comparison.pairs["vts-me", "patch.flat.transmission"]
     assert (paired.better, paired.equal, paired.worse) == (0, 1, 2)

@@ -1,7 +1,7 @@
 """A run as JUnit's XML, as servers read it that run tests: a suite for each formulation, a test case for each row.
 
-A row that makes the run fail is a failure, or an error where the plugin crashed. What is not asked, and what fails as
-stated, is skipped, with the reason. A failure without a promise is none of the test: its words are its output.
+A row that makes the run fail is a failure, or an error where the plugin crashed. What is not asked is skipped, with the
+reason, and so is what fails as stated or without a promise: a server shows it neither as a failure nor as a success.
 """
 
 from __future__ import annotations
@@ -15,7 +15,10 @@ from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 from contactverif_reports.files import whole
 from contactverif_reports.plot.text import as_text
 
-_SKIPPED = (Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.UNDECIDED)
+_SKIPPED = {  # {result: its words}
+    Result.FAIL: "fails, and promises nothing here",
+    **{each: each for each in (Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.UNDECIDED)},
+}
 
 
 def write_junit(run: Run, path: str | os.PathLike[str]) -> None:
@@ -51,9 +54,7 @@ def _end_of(row: Row, example: Counterexample | None) -> tuple[str, ...]:
         words = "\n".join([f"{row.unexpected}: {row.reason}", *drawing])
         return tag, row.reason or str(row.result), str(row.result), words
     if row.result in _SKIPPED:
-        return "skipped", f"{row.result}: {row.known or row.reason}".removesuffix(": ")
-    if row.verdict is Verdict.FAIL:
-        return "system-out", "", "", f"fails, and promises nothing here: {row.reason}"
+        return "skipped", f"{_SKIPPED[row.result]}: {row.known or row.reason}".removesuffix(": ")
     return ()
 
 

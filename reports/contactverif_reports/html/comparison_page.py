@@ -24,6 +24,7 @@ from contactverif_reports.comparisons import (
     results_table,
 )
 from contactverif_reports.html.pages import Axis, origin, render, strip, svg_inline, ticks
+from contactverif_reports.html.report_page import headline
 from contactverif_reports.plot.solved_scene import SolvedScene
 from contactverif_reports.regressions import Changes, changed_iterations_table, changes_table
 from contactverif_reports.tables import Column
@@ -59,7 +60,8 @@ def comparison_page(
         "compare.html.j2",
         found=comparison,
         candidates=comparison.formulations[1:],
-        wrong=comparison.unexpected,
+        run=comparison.candidates,
+        headline=headline(comparison.candidates),
         differ=[id_ for id_, every in verdicts.items() if len(every) > 1],
         results=results_table(comparison),
         errors=errors,

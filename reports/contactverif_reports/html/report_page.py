@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from markupsafe import Markup
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
-from contactverif.contract.property import CheckedNumber, checked_numbers
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of
+from contactverif.contract.property import checked_numbers
+from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of, describe
 from contactverif_reports.comparisons import RowNumbers, count_iterations
 from contactverif_reports.html.pages import Axis, render, strip, svg_inline, ticks
 from contactverif_reports.plot.text import as_text
@@ -24,19 +23,6 @@ _COLUMNS = 14  # Properties beside each other, so that a table fits on a page of
 _OPEN_SECTIONS = 8  # With more formulations than this, only sections with something unexpected are open.
 _MOST_NOTEBOOK_ROWS = 10  # Rows that fail and have a line each in a notebook.
 _PROMISES = {True: "passes", False: "fails", None: "–"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Example:
-    """A counterexample on the page."""
-
-    counterexample: Counterexample  # The case with its row.
-    figure: Markup  # The figure; empty where `text` draws the case.
-    text: str  # The drawing in text; empty where there is a figure.
-    numbers: tuple[CheckedNumber, ...]  # The measured numbers beside their tolerances.
-    # The reason of the failure where the numbers do not say it, else the place of the worst number, if it has one.
-    reason: str
-    replay: str  # The command that judges the case again.
 
 
 def report_page(run: Run, path: str | os.PathLike[str]) -> str:
@@ -73,34 +59,35 @@ def report_page(run: Run, path: str | os.PathLike[str]) -> str:
 
 
 def headline(run: Run) -> str:
-    """Say in one line how the run came out."""
+    """Say in one line how the run came out: what is wrong, or what fails all the same."""
     if run.promises_kept:
-        return f"{run.praise} {run.promises}"
+        return f"{run.conclusion} {run.promises}"
     n_signs, counts = len(run.opposite_signs), Counter(row.result for row in run.unexpected if not row.omitted)
     counts[Result.NOT_LOADED] = len(run.not_loaded)
     signs = ("formulation with the opposite sign", "formulations with the opposite sign")
     kinds = [(n_signs, signs), *((counts[result], text) for result, text in WRONG_RESULTS.items())]
+    n_others = sum(row.result is Result.FAIL and not row.is_trait for row in run.rows)
+    kinds.append((n_others, ("failure without a promise", "failures without a promise")))
     words = ", ".join(f"{count} {text[count > 1]}" for count, text in kinds if count)
     return f"{words}." if words else "Nothing was checked."
 
 
 def _section(
-    run: Run, name: str, cells: Mapping[tuple[str, str], RowNumbers], every: Sequence[Example], axis: Axis
+    run: Run, name: str, cells: Mapping[tuple[str, str], RowNumbers], every: Sequence[dict[str, Any]], axis: Axis
 ) -> dict[str, Any]:
     rows = list(run.rows_of(name))
-    examples = [example for example in every if example.counterexample.formulation == name]
-    example_of = {example.counterexample.property_id: example.counterexample.id for example in examples}
+    examples = [example for example in every if example["row"].formulation == name]
+    example_of = {example["row"].property_id: example["id"] for example in examples}
     inapplicable: dict[str, list[str]] = {}  # {reason: properties that do not apply}
     for row in rows:
         if row.result is Result.NOT_APPLICABLE:
             inapplicable.setdefault(row.reason, []).append(row.property_id)
     its_cells = [cells[name, row.property_id] for row in rows]
-    counts = Counter(row.result for row in rows)
     return {
         "formulation": name,
         "number": run.formulations.index(name) + 1,  # For anchors.
         "open": len(run.formulations) <= _OPEN_SECTIONS or any(row.unexpected for row in rows),
-        "counts": ", ".join(f"{counts[result]} {result}" for result in Result if counts[result]),
+        "words": describe(rows),
         "missing": [part for part, provided in run.provided.get(name, {}).items() if not provided],
         "lines": [
             {
@@ -118,8 +105,8 @@ def _section(
     }
 
 
-def _examples(run: Run, path: str) -> list[Example]:
-    """Return all counterexamples, as many of them drawn as figures as the page holds."""
+def _examples(run: Run, path: str) -> list[dict[str, Any]]:
+    """Return what the page shows of all counterexamples, as many of them drawn as figures as the page holds."""
     by_id = counterexamples(run)
     in_order = sorted(by_id, key=lambda id_: not by_id[id_].row.unexpected)
     figures = {id_: _figure(by_id[id_]) for id_ in in_order[:MOST_FIGURES]}
@@ -129,10 +116,19 @@ def _examples(run: Run, path: str) -> list[Example]:
         numbers = checked_numbers(counterexample.row.info, measurement)
         finding = measurement.finding if measurement is not None else None
         numbers_say_it = any(number.value == number.value and number.ratio > 1 for number in numbers)
-        reason = str(finding or "") if numbers_say_it else counterexample.reason
-        text = "" if id_ in figures else as_text(counterexample.case)
-        replay = counterexample.replay_command(path)
-        examples.append(Example(counterexample, figures.get(id_, Markup("")), text, numbers, reason, replay))
+        examples.append(
+            {
+                "id": id_,
+                "row": counterexample.row,
+                "label": counterexample.label,
+                "figure": figures.get(id_, ""),
+                "text": "" if id_ in figures else as_text(counterexample.case),
+                "numbers": numbers,
+                # The reason of the failure where the numbers do not say it, else the worst place, if it has one.
+                "reason": str(finding or "") if numbers_say_it else counterexample.reason,
+                "replay": counterexample.replay_command(path),
+            }
+        )
     return examples
 
 
