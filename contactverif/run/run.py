@@ -234,7 +234,7 @@ class Driver:
                 self._work_to_first_failure()
             elif self._stop == "foundation":
                 # All jobs of these properties end before it is known who is asked more, so that it depends on no clock.
-                if any(question.role == "foundation" for question in self._questions):
+                if any(question.role == "foundation" for question in self._variants.values()):
                     work(chain.from_iterable(self._parts_of_next()))
                 self._stop_wrong()
             number, count = self._share or (0, 1)

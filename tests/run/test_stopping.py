@@ -7,7 +7,7 @@ import pytest
 from subjects import Changed, ResidualAlone, load_property
 
 import contactverif_nts
-from contactverif.contract.result import Result, Run
+from contactverif.contract.result import NotLoaded, Result, Run
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Promises, Traits
 from contactverif.run.run import Stop, run
@@ -68,6 +68,11 @@ def test_everything_is_asked_if_the_user_wants_that(name: str) -> None:
 
 def test_a_known_failure_stops_nothing() -> None:
     assert not [row for row in judge_few("state", known="purity").rows if row.omitted]
+
+
+def test_who_does_not_load_is_asked_nothing() -> None:
+    plugin = NotLoaded("mine", "no module")
+    assert run([plugin], [load_property("purity")], examples=4, stop="foundation").not_loaded == (plugin,)
 
 
 def test_what_is_asked_alone_is_asked() -> None:
