@@ -25,7 +25,7 @@ from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SEGMENT, Interface
 from contactverif.contract.property import LAST_TURN, Outcome, Property, Verdict
-from contactverif.contract.result import NodalForces, NotLoaded, Result, Row, Run
+from contactverif.contract.result import OPPOSITE_SIGN, NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.isolation.remote import has_process, in_one_process, places
@@ -258,7 +258,8 @@ class Driver:
         subject.first_answers = subject.first_answers or first.answers  # In a second run the process is warm.
         self._opposite_signs |= {subject.name} if first.opposite_sign else set()
         self._first_calls[subject.name] = first.seconds or 0.0
-        self._report(replace(before, count=1))
+        remark = f"{subject.name}: {OPPOSITE_SIGN}" if first.opposite_sign else ""
+        self._report(replace(before, count=1, remark=remark))
 
     def _ask_first_round(self) -> None:
         """Ask the properties that state a turn about the first of their planned cases, and show at once what is wrong.

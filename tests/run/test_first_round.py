@@ -6,19 +6,26 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from subjects import ResidualAlone
 from test_run import ZERO, measure_residual, sizes, subject
 
 from contactverif import Case, Property, Subject
 from contactverif.contract.case import Cases
 from contactverif.contract.property import Measurement
-from contactverif.contract.result import Result
+from contactverif.contract.result import OPPOSITE_SIGN, Result
 from contactverif.run.run import Stop, run
 from contactverif.run.scheduler import Progress
+from contactverif_nts import nts_ar
 
 FIRST = replace(ZERO, id="patch.first", cases=Cases.random(lambda _: sizes()), turn=0, promise=lambda traits: True)
 SECOND = replace(FIRST, id="patch.second", turn=1)
 AGAIN = replace(FIRST, id="patch.again", turn=2, restarts=True)
 LATE = replace(FIRST, id="patch.late", turn=99)
+
+
+class Pulls(ResidualAlone):
+    def residual(self, *question: Any) -> Any:
+        return -super().residual(*question)
 
 
 def wrong_if_large(size: int) -> float:
@@ -37,6 +44,13 @@ def steps_of(questions: list[Property], answer: Callable[[int], Any], **options:
     log: list[Progress] = []
     run([subject(answer)], questions, examples=20, seed=1, progress=log.append, **options)
     return log
+
+
+def test_an_opposite_sign_is_told_at_once() -> None:
+    steps: list[Progress] = []
+    wrong = Subject("pulls", lambda *, penalty: Pulls(nts_ar(penalty=penalty)))
+    run([wrong], [FIRST], examples=1, seed=1, progress=steps.append, shrink="none")
+    assert next(step.remark for step in steps if step.remark) == f"pulls: {OPPOSITE_SIGN}"
 
 
 def test_what_is_wrong_is_shown_before_any_row_is_whole() -> None:
