@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
-import numpy as np
 from right import EXAMPLES_STRANGERS, SEED, SEEDS, SLOW, UNSTATED, is_pair
 from tables import FOLDER, SURVIVES, UNKNOWN, commits_of, markdown, read
 from zoo.right import STRANGERS as ALL_STRANGERS
@@ -64,11 +63,11 @@ few cases touch or are decided, and names the properties.
 """
 KILLS = """## Who catches whom
 
-{mutants} formulations are wrong on purpose, and each is caught. A row of the figure is one of them, a column a
-property: dark where the property is the one that is meant to catch it, light where it does so too.
+{mutants} formulations are wrong on purpose, and each is caught. A bar of the figure is how many of them a property
+catches; the dark part is caught by it alone.
 {survivors}
 
-![Wrong formulations against properties](kills.svg)
+![How many wrong formulations each property catches](kills.svg)
 
 *Meant* counts the wrong formulations that a property is meant to catch, *catches* those that it catches, and *alone*
 those that no other property catches. *Least shared* names, where that is none, a wrong formulation that few
@@ -365,18 +364,18 @@ def page() -> str:
 
 
 def draw() -> None:
-    """Draw the kill matrix."""
+    """Draw how many wrong formulations each property catches, and how many of them it alone."""
     ids, rows, _ = kill_rows()
-    rows.sort(key=lambda row: ids.index(row["caught by"]))
-    shades = np.array([[(row["caught by"] == name) + 0.45 * is_kill(row[name]) for name in ids] for row in rows])
-    mpl.rcParams.update({"svg.hashsalt": "contactverif", "svg.fonttype": "none"})
-    figure, axes = plt.subplots(figsize=(0.16 * len(ids) + 1, 0.045 * len(rows) + 2.4), layout="constrained")
-    axes.imshow(np.minimum(shades, 1), cmap="Blues", vmin=0, vmax=1.15, aspect="auto", interpolation="nearest")
-    axes.set_xticks(range(len(ids)), ids, rotation=90, fontsize=6)
-    axes.set_yticks([])
-    axes.set_ylabel(f"{len(rows)} wrong formulations")
-    for side in axes.spines.values():
-        side.set_visible(False)
+    alone, caught = caught_alone(), {name: sum(is_kill(row[name]) for row in rows) for name in ids}
+    order = sorted(ids, key=lambda name: (caught[name], len(alone[name])))
+    mpl.rcParams.update({"svg.hashsalt": "contactverif", "svg.fonttype": "none", "font.size": 9})
+    figure, axes = plt.subplots(figsize=(3.7, 0.18 * len(ids) + 1), layout="constrained")  # As wide as a phone.
+    axes.barh(order, [caught[name] for name in order], color="#9ecae1", label="others catch it too")
+    axes.barh(order, [len(alone[name]) for name in order], color="#08519c", label="caught by it alone")
+    axes.set(xlabel=f"of {len(rows)} wrong formulations", ylim=(-0.6, len(ids) - 0.4))
+    axes.tick_params(axis="y", length=0)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(loc="lower right", frameon=False)
     figure.savefig(FOLDER / FIGURE, metadata={"Date": None})
 
 
