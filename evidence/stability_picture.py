@@ -1,4 +1,4 @@
-"""Draw `reports/stability/stability.svg` from the file beside it: no formulation loses more digits than the state does."""
+"""Draw `reports/stability/stability.svg` from the file beside it: no formulation loses more digits than κ explains."""
 
 from pathlib import Path
 
