@@ -53,21 +53,17 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
 def _diagnose_numbering(subject: Subject) -> str:
     """Return with which numbers of nodes the forces on a mesh are not finite, if they are with others."""
     state = flat_state()
-    along, mesh = np.arange(len(state.along)), state.case.interface
-    against = np.concatenate([along[nodes][::-1] for nodes in state.sides])
-    words: dict[bool, str] = {}  # {whether the forces are finite: with which numbers}
-    for name, number, step in (
-        ("nodes are numbered along the surfaces", along, 1),
-        ("nodes are numbered against the surfaces", against, 1),
-        ("segments are listed from the last to the first", along, -1),
-    ):
-        sides = (Surface(number[side.faces][::step]) for side in (mesh.slave, mesh.master))
-        try:  # Either order of nodes is its own inverse.
-            residual_of(subject, Interface(mesh.nodes[number], *sides), state.case.positions[number].reshape(-1))
-            words.setdefault(True, name)
+    numbers, mesh = np.arange(len(state.along)), state.case.interface
+    words: dict[bool, str] = {}  # {whether the forces are finite: how nodes are numbered}
+    for name, step in (("along", 1), ("against", -1)):
+        order = np.concatenate([numbers[nodes][::step] for nodes in state.sides])  # Its own inverse.
+        sides = (Surface(order[side.faces]) for side in (mesh.slave, mesh.master))
+        try:
+            residual_of(subject, Interface(mesh.nodes[order], *sides), state.case.positions[order].reshape(-1))
+            words[True] = f"{name} them"
         except NonFiniteError:
-            words.setdefault(False, name)
-    return f"the forces are not finite where {words[False]}, and finite where {words[True]}" if len(words) > 1 else ""
+            words[False] = f"where nodes are numbered {name} the surfaces"
+    return f"the forces are not finite {words[False]}, and finite {words[True]}" if len(words) > 1 else ""
 
 
 def _diagnose_scale(subject: Subject) -> str:

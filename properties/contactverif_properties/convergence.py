@@ -255,10 +255,8 @@ PRESSURE = Quantity("error of the reported pressures", _CHORDS, _CHORD_REASON)
 
 @cache
 def _arc_cases() -> tuple[Case, ...]:
-    return tuple(
-        Arcs(convex_slave=convex).case(REFINEMENTS[0], name)
-        for name, convex in (("convex slave", True), ("concave slave", False))
-    )
+    names = {"convex slave": True, "concave slave": False}
+    return tuple(Arcs(convex_slave=convex).case(REFINEMENTS[0], name) for name, convex in names.items())
 
 
 @Property.define(

@@ -122,7 +122,7 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
     exact = exact_forces.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     areas = {"current": exact, "reference": exact * stretch ** (interface.dim - 1)}
-    exact = areas.pop(rule := str(subject.traits.rules.area))
+    exact = areas.pop(rule := subject.traits.rules.area or "current")
     ((follows, other),) = areas.items()
     total = exact_forces.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
     error = float(np.linalg.norm(total - exact))

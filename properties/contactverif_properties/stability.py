@@ -97,9 +97,8 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
     undecided = ""
     if excusable and max(values.values()) > roundoff.MOST_ROUNDINGS:
         undecided = explain_by_rounded_decision(near)
-    measurement = Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided)
-    measurement = replace(measurement, idle=not forces[: case.interface.n_unknowns].any())
-    return measurement.after(_moved_by(case))
+    idle = not forces[: case.interface.n_unknowns].any()
+    return Measurement(check_all(values, roundoff.MOST_ROUNDINGS), undecided, idle=idle).after(_moved_by(case))
 
 
 def refuse_unknown_forces(traits: Traits) -> str:

@@ -172,7 +172,7 @@ class Backwards(Nodes):
     ("make", "words"),
     [
         (LastAlone, r"gets 0\.\d+ times the force .* do several points add to one node \(`np.add.at`\)\?"),
-        (Backwards, "not finite where nodes are numbered against the surfaces, and finite where .* along the surfaces"),
+        (Backwards, "not finite where nodes are numbered against the surfaces, and finite along them"),
     ],
 )
 def test_forces_that_are_lost_and_numbers_that_make_nan_are_named(make: type[Nodes], words: str) -> None:
