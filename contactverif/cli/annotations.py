@@ -11,7 +11,6 @@ import ast
 import importlib.util
 import os
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import typer
@@ -19,7 +18,7 @@ import typer
 from contactverif.contract.errors import one_line
 from contactverif.contract.result import OPPOSITE_SIGN, Run
 from contactverif.isolation.file_reader import check_ordinary
-from contactverif.plugins.registry import FORMULATIONS
+from contactverif.plugins.registry import FORMULATIONS, entries_by_name, modules_of
 
 _INSTALLED = {"site-packages", "dist-packages"}  # An environment may lie in the working folder.
 _LARGEST = 1 << 18  # Bytes that are read of a file.
@@ -58,9 +57,8 @@ def factory_place(name: str) -> tuple[str, int] | None:
     None if the file is not below the working folder, or is that of an installed package.
     """
     inner = name.partition(":")[0].rpartition("/")[2]
-    for entry in entry_points(group=FORMULATIONS, name=inner):
-        module, _, attribute = entry.value.partition(":")
-        place = _follow(module.strip(), attribute.strip())
+    for entry in entries_by_name(FORMULATIONS).get(inner, ()):
+        place = _follow(entry.module, entry.attr) if modules_of([entry]) else None
         if place is not None:
             return place[0].relative_to(os.getcwd()).as_posix(), place[1]
     return None

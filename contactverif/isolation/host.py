@@ -220,10 +220,7 @@ class Host:
             self._flush_queue()
 
     def _has_answered(self) -> bool:
-        """Send what calls in lockstep have put into the queue, and return whether the process has answered it.
-
-        No end of the process counts here: what is asked is asked again alone.
-        """
+        """Flush the queue of calls in lockstep; no end of the process counts, since each is asked again alone."""
         n_ended, n_hangs = self.n_ended, _hangs[self._key]
         try:
             return self._flush_queue()

@@ -287,8 +287,7 @@ def _failure(question: int, error: BaseException) -> Failure:
 def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
     """Return the reply of a function that a copy of this process calls, or how the copy ended.
 
-    So no plugin sees what another one has done: the process that is copied loads none. If a copy has changed what the
-    next one would find, the process ends, too. Nothing ends the wait but the judge, if the reply is late.
+    So no plugin sees what another one has done. If a copy has changed what the next one would find, this process ends.
     """
     hide_memory(hidden=True)
     for name in ("contactverif.geometry.projection", "scipy.sparse"):

@@ -107,7 +107,8 @@ def code_digests(formulations: Sequence[str], properties: Sequence[str]) -> dict
     }
     modules = {"contactverif"}
     for group, names in named.items():
-        modules |= registry.modules_of(entry for entry in metadata.entry_points(group=group) if entry.name in names)
+        installed = registry.entries_by_name(group)
+        modules |= registry.modules_of(entry for name in names for entry in installed.get(name, ()))
     packages = sorted({module.partition(".")[0] for module in modules})
     files = sorted({path for text in formulations for path in registry.files_within(text)})  # They load these.
     digests = {f"{CODE}{package}": digest_files(registry.package_files(package)) for package in packages}

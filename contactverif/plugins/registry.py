@@ -116,6 +116,8 @@ def load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
         return NotLoaded(name, f"its name is {name!a}; needed at most {LONGEST_NAME} characters of ASCII")
     if len(entries) > 1:
         return NotLoaded(name, f"registered {len(entries)} times: {', '.join(map(_origin, entries))}")
+    if not modules_of(entries):
+        return NotLoaded(name, f"its entry point is {entries[0].value!r}; needed MODULE:OBJECT")
     try:
         return entries[0].load()
     except KeyboardInterrupt:
@@ -310,10 +312,9 @@ def _worker() -> tuple[str, ...]:
 
 
 def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
-    """Call a factory `make(*, penalty)` once, and return its formulation under a name, with every answer checked.
+    """Call a factory `make(*, penalty)` once, and return its formulation, with every answer checked, or why not.
 
-    It is `NotLoaded` if the factory raises an error or makes no formulation. A `MisuseError` about a name with options
-    or with an inner formulation goes on; in a mere name there is nothing that a user could have done wrong.
+    A `MisuseError` goes on where the name has options or an inner formulation, which a user may have got wrong.
     """
     try:
         return Subject(name, make)
@@ -436,17 +437,17 @@ def _check_options(text: str, make: Callable[..., Any], options: Mapping[str, An
     takes_any = not parameters or any(entry.kind is entry.VAR_KEYWORD for entry in parameters.values())
     for option, value in options.items():
         if option in _RESERVED:
-            raise MisuseError(f"option {option} of {text!r}", repr(value), f"nothing: the harness sets it; {names}")
+            raise MisuseError(f"option {option} of {text!a}", ascii(value), f"nothing: the harness sets it; {names}")
         if option in known:
             if needed := _needed_value(make, option, value):
-                raise MisuseError(f"option {option} of {text!r}", repr(value), f"{needed}; {names}")
+                raise MisuseError(f"option {option} of {text!a}", ascii(value), f"{needed}; {names}")
         elif not takes_any:
             near = difflib.get_close_matches(option, known, n=1)
             nearest = f" (nearest: {near[0]})" if near else ""
-            raise MisuseError(f"option of {text!r}", repr(option), f"an option that exists; {names}{nearest}")
+            raise MisuseError(f"option of {text!a}", ascii(option), f"an option that exists; {names}{nearest}")
     for name in _required_among(known):
         if name not in options:
-            raise MisuseError(f"options of {text!r}", f"no {name}", f"{name}=VALUE; {names}")
+            raise MisuseError(f"options of {text!a}", f"no {name}", f"{name}=VALUE; {names}")
 
 
 def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:

@@ -30,11 +30,8 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
     names = {"nts": "mine:first", "vts-ppt": "mine:second"}
-
-    def entries(group: str, name: str) -> list[EntryPoint]:
-        return [EntryPoint(name, names[name], group)] if name in names else []
-
-    monkeypatch.setattr("contactverif.cli.annotations.entry_points", entries)
+    entries = {name: [EntryPoint(name, value, "formulations")] for name, value in names.items()}
+    monkeypatch.setattr("contactverif.cli.annotations.entries_by_name", lambda group: entries)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.chdir(tmp_path)
     factory_place.cache_clear()
@@ -107,8 +104,8 @@ def test_a_source_that_cannot_be_read_ends_nothing(project: Path, spoil: Callabl
 def test_an_entry_point_that_names_no_module_has_no_place(
     project: Path, monkeypatch: pytest.MonkeyPatch, value: str
 ) -> None:
-    entries = [EntryPoint("nts", value, "formulations")]
-    monkeypatch.setattr("contactverif.cli.annotations.entry_points", lambda **_: entries)
+    entries = {"nts": [EntryPoint("nts", value, "formulations")]}
+    monkeypatch.setattr("contactverif.cli.annotations.entries_by_name", lambda group: entries)
     assert factory_place("nts") is None
 
 

@@ -2,6 +2,7 @@
 
 import sys
 import types
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any, Literal
 
@@ -95,10 +96,10 @@ FORMULATIONS: dict[str, Any] = {
 class Entry:
     """The part of an entry point that the registry reads, with a count of how often it was loaded."""
 
-    dist = None
+    dist, pattern, module = None, EntryPoint.pattern, "fake"
 
     def __init__(self, name: str, target: Any, value: str = "") -> None:
-        self.name, self.target, self.value = name, target, value or f"fake:{name}"
+        self.name, self.target, self.value = name, target, value or f"fake:{name.replace('-', '_')}"
         self.loads = 0
 
     def load(self) -> Any:
@@ -167,6 +168,7 @@ def test_options_are_read(text: str, options: dict[str, Any]) -> None:
         ("vts-me:N=4", ["'N'", "it has n, factor, area, on"]),
         ("vts-me:facto=4", ["'facto'", "nearest: factor"]),
         ("nts:n=4", ["'n'", "it has none"]),
+        ("vts-me:fact\u043er=4", [r"'fact\u043er'", "nearest: factor"]),
         ("vts-me:n=4.5", ["option n", "found 4.5", "a whole number"]),
         ("vts-me:n=true", ["option n", "found True", "a whole number"]),
         ("vts-me:factor=much", ["option factor", "'much'", "a number"]),
@@ -244,7 +246,7 @@ def test_an_entry_point_that_names_no_module_is_a_row(tmp_path: Path, monkeypatc
     entry = "[contactverif.formulations]\nodd = ../../x:!!\n"
     (tmp_path / "odd-1.0.dist-info" / "entry_points.txt").write_text(entry)
     registry._with_store(Limits(box=Box()), "odd")
-    assert "AttributeError" in reason_of(load_formulation("odd"))
+    assert reason_of(load_formulation("odd")) == "its entry point is '../../x:!!'; needed MODULE:OBJECT"
 
 
 def test_a_name_that_two_distributions_want_is_a_row(entries: dict[str, list[Entry]]) -> None:
@@ -299,8 +301,6 @@ def test_a_property_goes_by_its_id(entries: dict[str, list[Entry]], target: Any,
 
 def test_real_entry_points_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Load a real entry point of importlib.metadata, from a module that exists only here."""
-    from importlib.metadata import EntryPoint, EntryPoints
-
     module = types.ModuleType("a_strangers_plugin")
     module.make = plain  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "a_strangers_plugin", module)
