@@ -31,6 +31,7 @@ Resumed = Annotated[
 CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the report.", metavar="ID")]
 Share = Annotated[float, typer.Option(help="Share of the cases of each row that is judged again.", metavar="SHARE")]
 _MANY = 8  # Formulations of which the number is not known yet.
+_TYPED = {"names": "Formulations that load a file and may do so, such as c:file=mine.so."}
 _EVERY = "Take every installed formulation that wraps no other."
 
 
@@ -86,7 +87,7 @@ def verify(
          does not load
       2  the command line is wrong, or a file cannot be written; one line
          says what is needed
-      130  stopped by Ctrl-C, after the table of what was judged
+      130  stopped by Ctrl-C, or 143 by SIGTERM, after the table
 
     \bExamples
       contactverif verify vts-ppt --out vts-ppt.nc --out vts-ppt.html
@@ -177,7 +178,7 @@ def campaign(
       0  the shard is done, whatever merge will say of its outcomes
       1  a plugin does not load
       2  the command line is wrong, or the folder cannot be written
-      130  stopped by Ctrl-C; the same command goes on
+      130  stopped by Ctrl-C, or 143 by SIGTERM; the same command goes on
 
     \bExample
       contactverif campaign nts-ar --examples 100000 --shard 1/50 --out runs
@@ -196,13 +197,7 @@ def merge(
         ),
     ],
     *,
-    options: Annotated[
-        RunOptions,
-        Takes(
-            ["names", "shrink", "pictures", "known", "jobs", ISOLATION],
-            {"names": "Formulations of the shards that load a file, such as c:file=mine.so."},
-        ),
-    ],
+    options: Annotated[RunOptions, Takes(["names", "shrink", "pictures", "known", "jobs", ISOLATION], _TYPED)],
     audit: Annotated[
         bool, typer.Option("--audit", help="Audit the report, as for shards that strangers computed.")
     ] = False,
@@ -267,7 +262,7 @@ def compare(
     \bFor both
       2  the command line is wrong, or a file cannot be written; one line
          says what is needed
-      130  stopped by Ctrl-C, after the table of what was judged
+      130  stopped by Ctrl-C, or 143 by SIGTERM, after the table
 
     \bExamples
       contactverif compare mine --against vts-ppt
@@ -343,13 +338,7 @@ def audit(
     *,
     report: ReportPath,
     share: Share = 0.01,
-    options: Annotated[
-        RunOptions,
-        Takes(
-            ["names", PLACE, ISOLATION],
-            {"names": "Formulations of the report that load a file, such as c:file=mine.so."},
-        ),
-    ],
+    options: Annotated[RunOptions, Takes(["names", PLACE, ISOLATION], _TYPED)],
 ) -> None:
     """Derive all verdicts of a report again, and judge a sample again.
 

@@ -70,7 +70,7 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
     piece = Shard.parse(shard)
     typed = replace(options, names=select_names(options), keep_going=True)
     job = new_job(typed.with_settings(), fresh_seed=_CAMPAIGN_SEED, command=CAMPAIGN)
-    plan = piece.plan(job.plan())
+    plan = job.plan(shard=piece.text)
     made_folder(folder, "--out")
     journal_of_shard = folder.absolute() / piece.folder
     with watch_for_stops(replace(job, again="the same command")), open_shard(journal_of_shard, plan) as is_done:
@@ -189,12 +189,11 @@ class Job:
         """The file that the journal belongs to: the report, or else the page, or else another."""
         return next((self.files.names[suffix] for suffix in RUN_FILES if suffix in self.files.names), None)
 
-    def plan(self) -> Plan:
+    def plan(self, shard: str = "") -> Plan:
         """Return the plan for the header of a journal."""
-        versions = versions_of(self.options)
-        return Plan(
-            command=self.command, versions=versions, options=self.options, folder=os.getcwd(), machine=machine()
-        )
+        options, versions, folder = self.options, versions_of(self.options), os.getcwd()
+        command, here = self.command, machine()
+        return Plan(command=command, versions=versions, options=options, shard=shard, folder=folder, machine=here)
 
     @contextmanager
     def begin(self, load: Callable[[], Plugins]) -> Iterator[tuple[Plugins, Store]]:

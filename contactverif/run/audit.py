@@ -22,9 +22,6 @@ from contactverif.run.scheduler import Scheduler
 from contactverif.run.store import WITNESS, Store
 from contactverif.sampling.draw import Sampling
 
-_DERIVED = {"examples", "seed", "place"}  # The attributes from which the cases follow.
-_UNPROVEN = {"platform", "seconds"}  # They are compared or shown, and anybody can write them.
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Audit:
@@ -36,7 +33,6 @@ class Audit:
     n_outcomes: int  # The number of stored outcomes, and of those that were judged again.
     n_judged: int
     n_examples: int  # The number of witnesses and counterexamples, all of which were judged again.
-    unproven: tuple[str, ...]  # The attributes of the run that nothing tells again, such as its date.
     seconds: float
 
     def chance(self, n_forged: int) -> float:
@@ -103,7 +99,6 @@ def audit(
         n_outcomes=sum(len(row.outcomes) for row in run.rows),
         n_judged=sum(len(sample.words) for sample in samples) - n_witnesses,
         n_examples=len(examples) + n_witnesses,
-        unproven=tuple(sorted(run.provenance.keys() - _facts_of_today(run).keys() - _DERIVED | _UNPROVEN)),
         seconds=perf_counter() - start,
     )
 
@@ -120,15 +115,11 @@ def check_libraries(run: Run) -> None:
 
 def _find_changes(run: Run) -> tuple[str, ...]:
     """Return what is other today than in a run, of what the last bits of a number depend on."""
-    today = _facts_of_today(run)
+    digests = code_digests(run.formulations, list(run.properties))
+    today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
     stored = {name: run.provenance.get(name, "unknown") for name in today}
     changed = [name for name in today if stored[name] != today[name]]
     return tuple(f"{name}: {stored[name]} in the report, {today[name]} here" for name in changed)
-
-
-def _facts_of_today(run: Run) -> dict[str, str]:
-    digests = code_digests(run.formulations, list(run.properties))
-    return collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
 
 
 class DerivedOutcomes(Outcomes):

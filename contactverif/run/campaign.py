@@ -53,10 +53,6 @@ class Shard:
         """The shard as the command line has it."""
         return f"{self.number}/{self.count}"
 
-    def plan(self, plan: Plan) -> Plan:
-        """Return the plan of this shard of a run."""
-        return msgspec.structs.replace(plan, shard=self.text)
-
 
 class _EndMark(msgspec.Struct, frozen=True):
     n_outcomes: int

@@ -18,7 +18,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
 from secrets import compare_digest, token_bytes, token_hex
-from typing import IO, TypeVar
+from typing import IO, Any, TypeVar
 
 import msgspec
 import psutil
@@ -37,6 +37,7 @@ class RecordFile:
 
     def __init__(self, folder: Path) -> None:
         self.write_error = ""
+        self.forms: dict[Any, int] = {}  # The places of records to which later ones refer.
         self._end = 0
         self._file: IO[bytes] | None = None
         try:

@@ -128,21 +128,13 @@ _ENCODER = msgspec.msgpack.Encoder()
 _DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(FormRecord | OutcomeRecord | RejectedRecord)
 
 
-class _OutcomeFile(RecordFile):
-    """The file in which this process notes outcomes, and the places of their forms in it."""
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder)
-        self.forms: dict[schema.Form, int] = {}
-
-
 def _spell_out(item: Any) -> Any:
     if isinstance(item, str):
         return item.encode("utf-8", "backslashreplace").decode()
     return tuple(map(_spell_out, item)) if isinstance(item, tuple) else item
 
 
-_files: dict[tuple[str, str, int], _OutcomeFile] = {}  # The files into which this process writes.
+_files: dict[tuple[str, str, int], RecordFile] = {}  # The files into which this process writes.
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,13 +147,13 @@ class Writer:
     first: int  # The number of the first of the cases.
 
     @property
-    def file(self) -> _OutcomeFile:
+    def file(self) -> RecordFile:
         """The file of this process. A process that was forked has another one than its parent."""
         key = self.folder, self.session, os.getpid()
         if key not in _files:
             while len(_files) >= _MOST_FILES:
                 _files.pop(next(iter(_files))).close()
-            _files[key] = _OutcomeFile(Path(self.folder))
+            _files[key] = RecordFile(Path(self.folder))
         return _files[key]
 
     def add(self, place: int, outcome: Outcome) -> None:

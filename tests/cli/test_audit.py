@@ -44,8 +44,7 @@ def test_an_honest_report_agrees_bit_for_bit(ask: Ask, report: Path) -> None:
     assert re.fullmatch(r"seconds: \d+\.\d, and \d+\.\d in the run", lines[3])
     assert lines[4:] == [
         "chance to see one forged outcome among so many: 1: 11%, 10: 75%",
-        "not derived, as the report says it: command, commit, created, isolation,",
-        "  platform, profile, seconds",
+        "not derived: command, commit, date, isolation, platform, profile, seconds",
         "Nothing differs.",
     ]
     assert max(map(len, lines)) <= 80
