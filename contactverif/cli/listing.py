@@ -18,7 +18,7 @@ from contactverif.plugins.registry import describe_engines, load_formulations, l
 from contactverif.problems.catalogue import BLOCKS, SCENES, load_scene, options_of
 from contactverif.run.run_options import RunOptions
 from contactverif_reports.plot.text import blocks_as_text, silhouettes_as_text
-from contactverif_reports.tables import Column, Table
+from contactverif_reports.tables import PROMISES, Column, Table
 
 SOURCE = "Zavarise & De Lorenzis (2009)"
 MEANINGS = {
@@ -34,17 +34,14 @@ MEANINGS = {
     "force": "force on top of the disk, per unit of thickness",
 }
 _EVIDENCE = [entry.name for entry in fields(Evidence)]
-_PATCH_TEST = {True: "passes", False: "fails", None: "–"}  # The statement about any flat interface.
 _MARGIN = 4
 _NARROWEST, _WIDEST = 40, 96  # Columns of running text, whatever the terminal has.
 
 
 def list_installed(options: RunOptions, traits: bool) -> None:
     """Show four tables; of the traits the most important ones or all."""
-    formulations = load_formulations(options.limits())
-    _show_table(
-        "formulations", ("name", "in", "patch test", "promises"), (_formulation(item, traits) for item in formulations)
-    )
+    formulations = [_formulation(item, traits) for item in load_formulations(options.limits())]
+    _show_table("formulations", ("name", "in", "patch test", "promises"), formulations)
     questions = (
         (item.formulation, "", _not_loaded(item))
         if isinstance(item, NotLoaded)
@@ -79,13 +76,12 @@ def _formulation(item: Subject | Wrapper | NotLoaded, every_trait: bool) -> tupl
         verbs = {"/NAME": "wraps another", "=PATH": "loads a file", "=KIND": "has kinds"}
         verb = next(words for ending, words in verbs.items() if item.form.endswith(ending))
         return item.name, "", "", f"{verb}, {item.form}{f': {item.summary}' if item.summary else ''}"
-    statements = _statements(item.traits, every_trait) or [
-        "nothing else" if item.traits.promises.patch.flat is not None else "nothing"
-    ]
+    flat = item.traits.promises.patch.flat
+    statements = _statements(item.traits, every_trait) or ["nothing" if flat is None else "nothing else"]
     if missing := ", ".join(part for part in OPTIONAL_PARTS if part not in item.provides):
         statements.append(f"not provided: {missing}")
     dimensions = ", ".join(f"{each}-D" for each in item.traits.abilities.dimensions)
-    return item.name, dimensions, _PATCH_TEST[item.traits.promises.patch.flat], "; ".join(statements)
+    return item.name, dimensions, PROMISES[flat], "; ".join(statements)
 
 
 def _statements(traits: Traits, every_trait: bool) -> list[str]:

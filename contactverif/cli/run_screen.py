@@ -24,7 +24,7 @@ from contactverif.contract.result import CaseCounts, Coverage, Result, Row, Run
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.plot.text import as_text
-from contactverif_reports.tables import PLAIN_STYLE, STYLES, WRONG_RESULTS
+from contactverif_reports.tables import PLAIN_STYLE, PROMISES, STYLES, WRONG_RESULTS
 
 _MOST_ROWS = 12  # The rows of a part that have a line each.
 _MOST_WRONG = 8  # The same of those that are wrong beside the most telling one.
@@ -41,7 +41,6 @@ _PARTS = {  # The results that show no mistake and have a line for each row, and
     Result.UNDECIDED: "undecided",
     Result.NOT_JUDGED: "not judged",
 }
-_PROMISES = {True: "passes", False: "fails", None: "–"}
 COLUMNS = ("property", "promise", "result", "judged", "touch", "closest", "tolerance")
 _LEGEND = {
     "promise": "what the formulation states about itself: it passes, it fails, or – nothing",
@@ -384,7 +383,7 @@ def _entries(row: Row) -> tuple[str, ...]:
     if row.closest is not None:
         number = row.closest.number
         closest, tolerance = _short(number.value), f"{number.sign} {_short(number.tolerance)}"
-    return row.property_id, _PROMISES[row.promise], str(row.result), judged, touch, closest, tolerance
+    return row.property_id, PROMISES[row.promise], str(row.result), judged, touch, closest, tolerance
 
 
 def _short(number: float) -> str:

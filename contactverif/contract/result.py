@@ -71,13 +71,6 @@ _WAYS_TO_FAIL = {
     Result.FAIL: "without a promise",
     Result.FAILS_AS_STATED: "as it states",
 }
-_COUNTED = {
-    Result.UNDECIDED: "undecided",
-    Result.NOT_JUDGED: "not judged",
-    Result.OMITTED: "not asked",
-    Result.NOT_APPLICABLE: "do not apply",
-    Result.NOT_PROVIDED: "need a missing part",
-}
 _MOST_NAMED = 3  # Formulations that a conclusion names.
 # The probability below which a count is no chance. A run of a thousand rows accuses one by chance once in ten runs.
 BY_CHANCE = 1e-4
@@ -420,10 +413,7 @@ def overall(rows: Iterable[Row]) -> Result:
 
 
 def describe_failures(rows: Iterable[Row]) -> str:
-    """Return how many rows of a formulation fail, whoever promised it, and in which way; empty if none does.
-
-    Traits of the method are left out.
-    """
+    """Return how many rows of a formulation fail, traits of the method left out, and in which way; empty for none."""
     rows = [row for row in rows if not row.is_trait]
     failing = [row for row in rows if row.verdict in FAILED]
     if not failing:
@@ -436,16 +426,12 @@ def describe_failures(rows: Iterable[Row]) -> str:
     return f"{words}, {'and promises none of these' if counts[Result.FAIL] else _WAYS_TO_FAIL[failing[0].result]}"
 
 
-def describe(rows: Iterable[Row]) -> str:
+def describe(rows: Sequence[Row]) -> str:
     """Return what became of the rows of a formulation: what fails comes first, and what passes where nothing does."""
-    rows = list(rows)
-    counts = Counter(row.result for row in rows)
-    others = sum(row.result is Result.BROKEN_PROMISE and row.verdict not in FAILED for row in rows)
-    words = [describe_failures(rows) or (f"{counts[Result.PASS]} pass" if counts[Result.PASS] else "")]
-    words += [f"{others} broken promise{'s' * (others > 1)} without a failure"] if others else []
-    words += [f"{counts[result]} {text}" for result, text in _COUNTED.items() if counts[result]]
+    failures, counts = describe_failures(rows), Counter(row.result for row in rows if row.verdict not in FAILED)
+    others = (f"{counts[each]} {each}" for each in Result if counts[each] and not (failures and each is Result.PASS))
     mark = "✗ " if overall(rows) in (Result.BROKEN_PROMISE, Result.FAIL) else ""
-    return f"{mark}{'; '.join(filter(None, words))}" or "nothing was checked"
+    return f"{mark}{'; '.join(filter(None, (failures, ', '.join(others))))}" or "nothing was checked"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -35,7 +35,8 @@ class Check:
     def id(self) -> str:
         """Return formulation and property, such as `mine-patch.flat.transmission`."""
         name = self.subject.name if isinstance(self.subject, Subject) else self.subject.formulation
-        return f"{name}-{_id(self.question)}"
+        question = self.question.id if isinstance(self.question, Property) else self.question.formulation
+        return f"{name}-{question}"
 
     def __repr__(self) -> str:  # pytest prints the arguments of a test that fails.
         return f"<check {self.id}>"
@@ -94,14 +95,15 @@ def make_checks(
         for item in formulations
     ]
     return [
-        Check(subject, question, size, {id_: known[id_] for id_ in (_id(question),) if id_ in known})
+        Check(
+            subject,
+            question,
+            size,
+            {id_: reason for id_, reason in known.items() if id_ == getattr(question, "id", "")},
+        )
         for subject in subjects
         for question in questions
     ]
-
-
-def _id(question: Property | NotLoaded) -> str:
-    return question.id if isinstance(question, Property) else question.formulation
 
 
 def explain(row: Row, *, command: str, opposite_sign: bool = False, diagnosis: str = "") -> str:

@@ -25,17 +25,13 @@ def check_writable(path: str | os.PathLike[str], argument: str = "--out", form: 
     """Check before a long computation that its file can be written afterwards."""
     name = os.fspath(path)
     target = Path(os.path.realpath(path))  # `resolve` raises an error for links that form a loop.
-    file = f"the name of a file, {form}"
+    file, is_there = f"the name of a file, {form}", target.exists()
     for wrong, words, needed in (
         (not name or name.endswith(os.sep), f"{name!r}, which names no file", file),
         (target.is_dir(), f"{name}, a folder", file),
-        (target.exists() and not target.is_file(), f"{name}, which is no ordinary file", file),
+        (is_there and not target.is_file(), f"{name}, which is no ordinary file", file),
         (not target.parent.is_dir(), f"{name} in {target.parent}, which is no folder", "a folder that exists"),
-        (
-            target.exists() and not os.access(target, os.W_OK),
-            f"{name}, which is write-protected",
-            "a file that may be replaced",
-        ),
+        (is_there and not os.access(target, os.W_OK), f"{name}, which is write-protected", "one that may be replaced"),
     ):
         if wrong:
             raise MisuseError(argument, words, needed)
@@ -66,10 +62,8 @@ def made_folder(folder: Path, argument: str) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        words = (
-            f"{folder}, which is no folder" if isinstance(error, FileExistsError) else f"{folder} ({error.strerror})"
-        )
-        raise MisuseError(argument, words, "a folder that can be written") from None
+        reason = ", which is no folder" if isinstance(error, FileExistsError) else f" ({error.strerror})"
+        raise MisuseError(argument, f"{folder}{reason}", "a folder that can be written") from None
 
 
 @contextmanager

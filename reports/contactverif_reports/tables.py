@@ -32,6 +32,7 @@ WRONG_RESULTS = {  # {result that makes a run fail: (words for one row, words fo
     Result.OMITTED: ("property not asked", "properties not asked"),
     Result.NOT_LOADED: ("plugin not loaded", "plugins not loaded"),
 }
+PROMISES = {True: "passes", False: "fails", None: "–"}  # {what a formulation states about a property: its word}
 PLAIN_STYLE = "dim"  # The style of the other results in the terminal.
 
 

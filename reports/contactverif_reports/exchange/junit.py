@@ -10,15 +10,13 @@ import os
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
+from contactverif.contract.errors import printable
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run
 from contactverif_reports.files import whole
 from contactverif_reports.plot.text import as_text
 
-_SKIPPED = {  # {result: its words}
-    Result.FAIL: "fails, and promises nothing here",
-    **{each: each for each in (Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.UNDECIDED)},
-}
+_SKIPPED = (Result.FAIL, Result.FAILS_AS_STATED, Result.NOT_APPLICABLE, Result.NOT_PROVIDED, Result.UNDECIDED)
 
 
 def write_junit(run: Run, path: str | os.PathLike[str]) -> None:
@@ -54,19 +52,15 @@ def _end_of(row: Row, example: Counterexample | None) -> tuple[str, ...]:
         words = "\n".join([f"{row.unexpected}: {row.reason}", *drawing])
         return tag, row.reason or str(row.result), str(row.result), words
     if row.result in _SKIPPED:
-        return "skipped", f"{_SKIPPED[row.result]}: {row.known or row.reason}".removesuffix(": ")
+        words = "fails, and promises nothing here" if row.result is Result.FAIL else row.result
+        return "skipped", f"{words}: {row.known or row.reason}".removesuffix(": ")
     return ()
 
 
 def _add_case(suite: Element, formulation: str, name: str, seconds: float, *end: str) -> None:
-    case = SubElement(suite, "testcase", classname=_printable(formulation), name=name, time=f"{seconds:.3f}")
+    case = SubElement(suite, "testcase", classname=printable(formulation), name=name, time=f"{seconds:.3f}")
     if end:
         tag, message, kind, words = (*end, "", "")[:4]
-        attributes = {"message": _printable(message), "type": kind}
+        attributes = {"message": printable(message), "type": kind}
         element = SubElement(case, tag, {key: text for key, text in attributes.items() if text})
-        element.text = _printable(words) or None
-
-
-def _printable(text: str) -> str:
-    """Return a text without the characters that XML cannot have."""
-    return "".join(letter for letter in text if letter in "\n\t" or letter.isprintable())
+        element.text = printable(words) or None

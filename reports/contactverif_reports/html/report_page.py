@@ -15,14 +15,13 @@ from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, covera
 from contactverif_reports.comparisons import RowNumbers, count_iterations
 from contactverif_reports.html.pages import Axis, render, strip, svg_inline, ticks
 from contactverif_reports.plot.text import as_text
-from contactverif_reports.tables import WRONG_RESULTS
+from contactverif_reports.tables import PROMISES, WRONG_RESULTS
 
 MOST_FIGURES = 24  # Counterexamples that are drawn as figures, the unexpected ones first; the others are text.
 _WIDTH = 5.4  # The width of a figure in inches: on a phone its labels can still be read.
 _COLUMNS = 14  # Properties beside each other, so that a table fits on a page of paper.
 _OPEN_SECTIONS = 8  # With more formulations than this, only sections with something unexpected are open.
 _MOST_NOTEBOOK_ROWS = 10  # Rows that fail and have a line each in a notebook.
-_PROMISES = {True: "passes", False: "fails", None: "–"}
 
 
 def report_page(run: Run, path: str | os.PathLike[str]) -> str:
@@ -62,13 +61,12 @@ def headline(run: Run) -> str:
     """Say in one line how the run came out: what is wrong, or what fails all the same."""
     if run.promises_kept:
         return f"{run.conclusion} {run.promises}"
-    n_signs, counts = len(run.opposite_signs), Counter(row.result for row in run.unexpected if not row.omitted)
+    counts = Counter(row.result for row in run.rows if not (row.omitted or row.is_trait))
     counts[Result.NOT_LOADED] = len(run.not_loaded)
     signs = ("formulation with the opposite sign", "formulations with the opposite sign")
-    kinds = [(n_signs, signs), *((counts[result], text) for result, text in WRONG_RESULTS.items())]
-    n_others = sum(row.result is Result.FAIL and not row.is_trait for row in run.rows)
-    kinds.append((n_others, ("failure without a promise", "failures without a promise")))
-    words = ", ".join(f"{count} {text[count > 1]}" for count, text in kinds if count)
+    others = (Result.FAIL, ("failure without a promise", "failures without a promise"))
+    kinds = ((counts[result], text) for result, text in [*WRONG_RESULTS.items(), others])
+    words = ", ".join(f"{n} {text[n > 1]}" for n, text in [(len(run.opposite_signs), signs), *kinds] if n)
     return f"{words}." if words else "Nothing was checked."
 
 
@@ -92,7 +90,7 @@ def _section(
         "lines": [
             {
                 "cell": cell,
-                "promise": _PROMISES[cell.row.promise],
+                "promise": PROMISES[cell.row.promise],
                 "strip": strip(cell.margins, axis),
                 "example": example_of.get(cell.row.property_id, ""),
             }

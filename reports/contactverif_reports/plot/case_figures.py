@@ -104,9 +104,9 @@ def make_case_figure(
         labels = [f"ℓ={format_number(length, course.roundoff / unit)}" for length in (its_lengths / unit).tolist()]
         _plot_surface(axes, surface, positions, labels, pen, body=_BODY * size, side=side)
     _plot_arrows(axes, positions, forces, exact, longest=_ARROW * size)
-    names = ("along the slave", "across it") if course.rotation else ("x", "y")
-    xlabel, ylabel = (f"{name} / {unit_name}" if unit_name else name for name in names)
-    axes.set(xlabel=xlabel, ylabel=ylabel)
+    x, y = ("along the slave", "across it") if course.rotation else "xy"
+    unit_name = unit_name and f" / {unit_name}"
+    axes.set(xlabel=f"{x}{unit_name}", ylabel=f"{y}{unit_name}")
     axes.margins(0.05)
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
     facing = gaps.gap[gaps.facing]
