@@ -147,11 +147,11 @@ Each code was asked every question that its displacements answer
 ([what is asked](../../docs/how-to/whole-codes.md#what-is-asked)): the scenes of seed 1, up to {examples} random ones of
 a question, and all that have an exact solution. A cell says how it ended, with the number that is nearest to its
 tolerance or furthest beyond it, over the tolerance (below 1 passes), how many scenes could be judged of how many, and
-the seconds of a scene. A scene is not judged where the code says that it finds no solution.
+the seconds of a scene. A scene is not judged where the code says that it finds no solution, or takes no such supports.
 
 - **pass** and **fail**: the verdict over all scenes; **BROKEN PROMISE** where the engine states that it passes, or any
   code should. What is not among [the findings](README.md) was not examined yet: it may be a mistake of the adapter.
-- **not judged**: of more than a tenth of the scenes the code found no solution.
+- **not judged**, or **undecided** where nothing is promised: more than a tenth of the scenes was not judged.
 - **crashed**: it ended, or gave no answer within a minute.
 
 `tox -e engines` wrote this page, and `engines.csv` beside it, which has the reasons.

@@ -27,7 +27,9 @@ _FACES = {
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
 }
 _STIFF = 1e7  # The stiffness of springs that stand for supports, over E times a length.
-_MODULUS = 1e9
+# The least E, and E times a body's size squared, in the unit of force of the deck: ccx takes a residual below 1e-6 for
+# 0, in whatever unit, and its mortar methods need a large E.
+LEAST_MODULUS, LEAST_FORCE = 1e9, 1e10
 # The share of the mean force that may be out of balance, and of the step by which it may be corrected (5e-3 and 1e-2 by
 # default); the fifth number is the first one after nine iterations, the last one a residual without further tests.
 _FIELD = "1e-8, 1e-8, , , 1e-8, , , 1e-20"
@@ -41,9 +43,6 @@ class CalculiX:
     # methods. All have linear springs of the stiffness ε̂.
     kind: Kind = "surface"
     program: str = "ccx"
-    # Forces are given in a unit in which moduli are some 1e9. The tests of convergence of ccx hold absolute numbers:
-    # with forces of 1e-5 it ends, and says that it converged, while contact still changes.
-    scaled: bool = True
 
     @property
     def traits(self) -> EngineTraits:
@@ -53,7 +52,7 @@ class CalculiX:
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a deck, run ccx on it, and read the displacements that it prints."""
-        layer = make_layer(_in_larger_units(scene) if self.scaled else scene)
+        layer = make_layer(in_larger_units(scene))
         with tempfile.TemporaryDirectory() as folder:
             deck = Path(folder, "scene.inp")
             deck.write_text("\n".join(write_deck(layer, self.kind)) + "\n", encoding="ascii")
@@ -71,9 +70,9 @@ class CalculiX:
         return EngineAnswer(displacements, converged, iterations or -1, message)
 
 
-def _in_larger_units(scene: SceneArrays) -> SceneArrays:
-    """Return the scene with forces in a unit in which moduli are some 1e9; its displacements are the same."""
-    factor = 2.0 ** round(np.log2(_MODULUS / scene.young[~scene.rigid].max()))
+def in_larger_units(scene: SceneArrays) -> SceneArrays:
+    """Return the scene with forces in a unit in which moduli and forces are large; its displacements are the same."""
+    factor = 2.0 ** round(np.log2(max(LEAST_MODULUS, LEAST_FORCE / scene.unit**2) / scene.young[~scene.rigid].max()))
     forces = {name: getattr(scene, name) * factor for name in ("young", "load", "penalty")}
     return replace(scene, **forces)
 

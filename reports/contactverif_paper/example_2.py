@@ -38,7 +38,7 @@ from contactverif_paper.patch_tests import edges_of
 from contactverif_reports.html.pages import number
 
 PAPER = DiskProblem()
-ENERGY = 1e-15  # The paper's energy norm. Its unit is not said; here it is taken over the energy of the first step.
+ENERGY = 1e-15  # The paper's energy norm, which it states in units of its own; here over the energy of the first step.
 _MEGA = 1e6
 
 

@@ -1,6 +1,7 @@
 """The deck of CalculiX holds what the scene does; where the program is there, its answers are those of the scene."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,16 @@ from subjects import load_property
 from contactverif import Verdict, judge_case, load_scene
 from contactverif.contract.subject import EngineSubject
 from contactverif.problems.catalogue import load_scene_case
-from contactverif_engines.calculix import FIELD, CalculiX, Layer, make_layer, read_displacements, write_deck
+from contactverif_engines.calculix import (
+    FIELD,
+    LEAST_FORCE,
+    CalculiX,
+    Layer,
+    in_larger_units,
+    make_layer,
+    read_displacements,
+    write_deck,
+)
 
 needs_program = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not installed")
 
@@ -53,6 +63,13 @@ def test_the_faces_of_both_surfaces_are_faces_of_elements() -> None:
     slave = lines[lines.index("*SURFACE, NAME=SLAVE, TYPE=ELEMENT") + 1 :]
     count = next(number for number, line in enumerate(slave) if line.startswith("*"))
     assert count == len(load_scene("c").interface.slave)
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**-20])
+def test_forces_are_large_numbers_in_whatever_unit_of_length(unit: float) -> None:
+    scene = load_scene("c").arrays(lowered=True)
+    scene = in_larger_units(replace(scene, nodes=unit * scene.nodes, unit=unit * scene.unit))
+    assert scene.young.max() * scene.unit**2 >= LEAST_FORCE / 2  # A power of two may round it down.
 
 
 def test_the_last_displacements_count() -> None:
