@@ -24,7 +24,7 @@ from contactverif.contract.traits import Traits
 from contactverif_properties.states import FrozenState, random_directions
 
 # Tables have 14 digits and more, and the weights that NGSolve 6.2.2608 computes for up to 20 Gauss points add up to
-# 1 − 84u at worst, and to 1 − 79u for 6. 1e-14 is 90u, and places of integration that are wrong by as much add their part.
+# 1 − 84u at worst, and to 1 − 79u for 6. 1e-14 is 90u, and places of integration that are wrong as much add their part.
 WEIGHT_ROUNDINGS = 128
 WEIGHT_REASON = "Weights of integration are known to 1e-14."
 GAP_TOLERANCE = "u(8X/|g| + 4N + 128)"
