@@ -95,12 +95,7 @@ def make_checks(
         for item in formulations
     ]
     return [
-        Check(
-            subject,
-            question,
-            size,
-            {id_: reason for id_, reason in known.items() if id_ == getattr(question, "id", "")},
-        )
+        Check(subject, question, size, {id_: known[id_] for id_ in known if id_ == getattr(question, "id", "")})
         for subject in subjects
         for question in questions
     ]

@@ -218,6 +218,10 @@ def test_a_run_that_judges_nothing_does_not_say_that_all_was_judged() -> None:
     assert Run(idle).conclusion == "Nothing was judged of barrier: no property applies. What was judged is kept."
     judged = Row("mine", info, Verdict.PASS, True, planned=1, outcomes=(Outcome(named_case("a1"), Verdict.PASS),))
     assert Run((judged,)).conclusion == "Every promise is kept and every property was judged."
+    swap, patch = (Row("mine", load_property(id_).info, Verdict.FAIL, None) for id_ in ("swap", TRANSMISSION))
+    assert Run((judged, swap)).result == "pass"  # A trait of the method is no mistake.
+    words = "mine fails 1 of 2, the patch test among them, and promises none of these. No promise is broken."
+    assert (Run((judged, patch)).result, Run((judged, patch)).conclusion) == ("fail", words)
 
 
 def test_a_known_failure_that_passes_fails_the_run(ask: Ask) -> None:
