@@ -1,7 +1,5 @@
 """The work of `replay`, `draw` and `audit`: a stored case, a scene, or a whole report is judged or solved again."""
 
-from __future__ import annotations
-
 import shlex
 import textwrap
 from collections.abc import Sequence

@@ -3,8 +3,6 @@
 Each has an id that a shell takes as it is. It is spelled like formulation and property, so that it says what failed.
 """
 
-from __future__ import annotations
-
 import difflib
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Tell the kind of mistake of a formulation that fails, as far as a rule knows it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ The flat state comes first. Then the slave is moved along the master or tilted, 
 by a quarter, or places change by little: forces that are wrong on one of these alone show what they depend on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ The two have opposite signs wherever λ − c gap is near 0, so a row shows whic
 area is what a unit of the multiplier pushes the slave by, and 1 for a nodal force.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace

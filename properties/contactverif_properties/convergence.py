@@ -3,8 +3,6 @@
 The problems state their bounds, beside what right and wrong formulations measure. They stand nowhere else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache, partial
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Two scenes that have the same answer, as a whole code solves them: mirrored, in other units, beside other bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from math import cos, degrees, radians, sin

@@ -4,8 +4,6 @@ A formulation measures the gap along the master's normal or along the slave's, a
 `gap` and `force_along` say which. Gaps are computed in rationals from the stored nodes.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import sqrt
 from typing import Any

@@ -13,8 +13,6 @@ At a kink two right formulations may give different forces. What they have in co
   and none at a kink, since it may smooth the master there.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -4,8 +4,6 @@ Each state is one case. `Carry` says which node of the second state is which nod
 Multipliers are uniform, so that their order does not matter; only the rows of positions are compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

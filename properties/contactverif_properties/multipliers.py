@@ -1,7 +1,5 @@
 """Multipliers: their sign, their scale, whether they are unique, and whether the bodies resist all of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Distances from a solution are lengths: a multiplier counts as the length that changes the forces by as much.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The patch test where the interface is a circle, as of two rings that are shrunk on each other, or a broken line."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import product

@@ -4,8 +4,6 @@ Who passes the test of a class of meshes passes that of each smaller class. A fo
 alone is asked about all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -6,8 +6,6 @@ a is the accuracy that it states, M the stiffer body's oedometer modulus, U the 
 segment, p the exact pressure, and κ the condition of the bodies' condensed stiffness.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Answers that depend on the question alone: all methods are asked in turn, in two orders, and in a long life."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import NamedTuple

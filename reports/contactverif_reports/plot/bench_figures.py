@@ -4,8 +4,6 @@ At most six formulations have a colour and a name, the reference among them; the
 is as wide as a phone, so that a page shows its letters as large as they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import ceil, inf, isnan
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Figures of a case: its interface with forces, its faces from above, or its bodies. Importing it is slow."""
 
-from __future__ import annotations
-
 import os
 import re
 import textwrap

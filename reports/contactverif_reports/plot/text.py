@@ -1,7 +1,5 @@
 """Drawings of cases and scenes in a few lines of text, for a terminal."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable, Sequence
 from itertools import pairwise, zip_longest
