@@ -24,8 +24,8 @@ sleep_in_pair = before("pair")(lambda: time.sleep(LONG), "Sleep in the search.")
 
 @before("residual")
 def sleep_sometimes() -> None:
-    """Sleep at every fifth call."""
-    if next(_calls) % 5 == 0:
+    """Sleep at every third call."""
+    if next(_calls) % 3 == 0:
         time.sleep(LONG)
 
 
