@@ -104,10 +104,7 @@ def headline(provenance: Mapping[str, str]) -> str:
 
 
 def summary(run: Run, *, quiet: bool = False, status: int | None = None) -> Text:
-    """Say in the last lines what fails or is wrong, or else that every promise is kept, and how many there are.
-
-    What fails without breaking a promise gives an exit status of 0, which is said beside it.
-    """
+    """Say in the last lines what fails (and an exit status of 0 beside it), or is wrong, or that promises are kept."""
     if run.promises_kept:
         sentence = f"{'✗ ' if run.result is Result.FAIL else ''}{run.conclusion}"
         if status == 0 and run.result in (Result.FAIL, Result.FAILS_AS_STATED):
