@@ -108,13 +108,9 @@ def printable(text: str) -> str:
     if plain.replace("\n", "").isprintable() and (plain.isascii() or not _UNSEEN.search(plain)):
         return plain
     return "".join(
-        character if character in _SPACES or character.isprintable() else _escape(character)
-        for character in _UNSEEN.sub(lambda match: _escape(match[0]), plain)
+        character if character in _SPACES or character.isprintable() else ascii(character)[1:-1]
+        for character in _UNSEEN.sub(lambda match: ascii(match[0])[1:-1], plain)
     )
-
-
-def _escape(text: str) -> str:
-    return text.encode("unicode_escape").decode("ascii")
 
 
 def describe_error(error: BaseException) -> str:

@@ -285,10 +285,7 @@ def _failure(question: int, error: BaseException) -> Failure:
 
 
 def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
-    """Return the reply of a function that a copy of this process calls, or how the copy ended.
-
-    So no plugin sees what another one has done. If a copy has changed what the next one would find, this process ends.
-    """
+    """Return the reply of a copy of this process, which no other plugin has changed, or how the copy ended."""
     hide_memory(hidden=True)
     for name in ("contactverif.geometry.projection", "scipy.sparse"):
         import_module(name)  # What most plugins import is imported once.

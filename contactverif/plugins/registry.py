@@ -127,7 +127,7 @@ def load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
 
 
 def modules_of(entries: Iterable[EntryPoint]) -> set[str]:
-    """Return the modules that entry points name; one that is malformed names none."""
+    """Return the modules that entry points name; a malformed one names none."""
     return {entry.module for entry in entries if entry.pattern.match(entry.value)}
 
 
