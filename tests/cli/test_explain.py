@@ -22,7 +22,7 @@ INSTALLED = load_formulations()
 HOOKS = Path(__file__).parents[2] / "docs" / "hooks"
 PARTS = ("Question.", "Why it matters.", "How it is judged.", "Undecided.", "Source.", "Promised by:", "Usual causes:")
 WORDS = ("promise", "witness", "kink", "undecided", "idle", "locking", "patch test", "trait", "residual", "NTS")
-FOUND = {  # {name: the head of what it finds}
+HEAD_OF_NAME = {  # {name: the head of what it finds}
     **dict.fromkeys(("Traits", "promises", "WITNESSES"), "Trait, promise, witness"),
     "kinks": "Kink",
     "Patch tests": "Patch test",
@@ -77,7 +77,7 @@ def test_a_word_of_the_screen_is_a_term(name: str, ask: Ask) -> None:
     assert len(words(answer.out)) > 5
 
 
-@pytest.mark.parametrize(("name", "head"), FOUND.items())
+@pytest.mark.parametrize(("name", "head"), HEAD_OF_NAME.items())
 def test_a_name_is_found_in_the_plural_and_in_capitals(name: str, head: str, ask: Ask) -> None:
     assert ask("explain", name).out.partition("\n")[0] == head
 
