@@ -202,7 +202,7 @@ def new_journal(folder: Path, plan: msgspec.Struct, outputs: Sequence[Path] = ()
 
 def key_file() -> Path:
     """Return the file of the key with which this user signs journals, and which no plugin in a box sees."""
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state", "contactverif", "key")
+    return Path(os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state"), "contactverif", "key")
 
 
 def is_own(folder: Path) -> bool:
@@ -216,6 +216,8 @@ def is_own(folder: Path) -> bool:
 def _sign(folder: Path) -> bytes:
     """Return a digest of the header of a journal under the key of this user, which is made where there is none."""
     path = key_file()
+    if not path.is_absolute():
+        raise OSError("nobody knows the home of this user")
     if not path.exists():
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         part = path.with_name(token_hex(4))
