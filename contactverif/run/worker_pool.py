@@ -10,10 +10,12 @@ import signal
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import util
 from multiprocessing.process import BaseProcess
 from typing import Any
+
+import psutil
 
 from contactverif.contract.errors import MisuseError
 from contactverif.isolation.box import hold_folder, remove_abandoned_folders
@@ -73,6 +75,11 @@ def worker_pool(jobs: int, *, parent_judges: bool = False) -> Iterator[Executor 
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - before:
             worker.terminate()
+        for child in psutil.Process().children():
+            # A worker that the server has yet to start would find nothing of this process, and print a traceback.
+            with suppress(psutil.Error):
+                if any("multiprocessing.forkserver" in word for word in child.cmdline()):
+                    child.kill()
         raise
     pool.shutdown()
 

@@ -17,6 +17,7 @@ CAMPAIGNS = {
     "damaged_meshes.txt": "Damaged meshes",
     "forged_journals.txt": "Forged journals, of which all outcomes are judged again",
     "forged_reports.txt": "Forged reports, as `contactverif audit` sees them",
+    "forged_shards.txt": "Shards whose header asks for more than the user has typed",
     "ways.txt": "One seed in all ways",
 }
 

@@ -20,6 +20,7 @@ CAMPAIGNS = {
     "damaged_meshes.py": ("damaged_meshes.txt", 2000),
     "forged_journals.py": ("forged_journals.txt", 1000),
     "forged_reports.py": ("forged_reports.txt", 200),
+    "forged_shards.py": ("forged_shards.txt", 110),
     "ways.py": ("ways.txt", 40),
 }
 

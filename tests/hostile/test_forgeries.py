@@ -7,6 +7,7 @@ import random
 
 import forged_journals
 import forged_reports
+import forged_shards
 import pytest
 from catalogue import PLUGINS
 from containment import MODES
@@ -27,12 +28,22 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> forged_reports.Forgery:
     return forged_reports.Forgery(tmp_path_factory.mktemp("reports"))
 
 
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory: pytest.TempPathFactory) -> forged_shards.Forgery:
+    return forged_shards.Forgery(tmp_path_factory.mktemp("shards"))
+
+
 @pytest.mark.parametrize("kind", forged_journals.KINDS)
 def test_a_forged_journal_is_not_believed(journals: forged_journals.Forgery, kind: str) -> None:
     endings = {journals.attack(kind, random.Random(f"{kind}/{number}")) for number in range(2)}
     assert not endings & journals.harmful
     if kind in NAMED:
         assert endings == {"named"}
+
+
+@pytest.mark.parametrize("kind", ["isolation", "a scene file", "a program", "a pipe"])
+def test_a_merge_does_not_obey_a_shard(shards: forged_shards.Forgery, kind: str) -> None:
+    assert shards.attack(kind, random.Random(kind)) not in shards.harmful
 
 
 @pytest.mark.parametrize("kind", [kind for kind in forged_reports.KINDS if kind not in NUMBERS])
