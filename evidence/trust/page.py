@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 from right import EXAMPLES_STRANGERS, SEED, SEEDS, SLOW, UNSTATED, is_pair
-from tables import FOLDER, SURVIVES, UNKNOWN, commits_of, markdown, read
+from tables import FOLDER, SURVIVES, UNKNOWN, commits_of, count_old, markdown, read
 from zoo.right import STRANGERS as ALL_STRANGERS
 
 PAGE, FIGURE = "README.md", "kills.svg"
@@ -30,6 +30,9 @@ INTRODUCTION = """# Trust
 
 A verifier must catch what is wrong, and never accuse what is right. `tox -e trust` measures both and wrote this page
 from the tables beside it: {commits}.
+
+Each line of these tables keeps a digest of the properties that judged it (`judge`). {older} `tox -e trust` asks such
+lines anew, and no others.
 
 """
 CAMPAIGN = """## Nobody who is right is accused
@@ -357,10 +360,21 @@ def small_cases() -> str:
     return text + markdown(["wrong formulation", "caught by", "before", "today"], lines)
 
 
+def older() -> str:
+    """Return the sentence about lines of an older judge."""
+    counts = {name: count for name, count in count_old().items() if count[0]}
+    listed = ", ".join(
+        f"{'all' if old == every else old} of the {every} in `{name}`" for name, (old, every) in counts.items()
+    )
+    return (
+        f"The properties were changed since they judged {listed}." if counts else "All are of the properties of today."
+    )
+
+
 def page() -> str:
     """Return the whole page."""
     parts = [campaign(), strangers(), options(), kills(), on_faces(), unseen(), small_cases(), smallest(), damage()]
-    return INTRODUCTION.format(commits=commits_of(_TABLES)) + "\n".join(filter(None, parts))
+    return INTRODUCTION.format(commits=commits_of(_TABLES), older=older()) + "\n".join(filter(None, parts))
 
 
 def draw() -> None:

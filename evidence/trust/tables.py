@@ -8,15 +8,36 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
+sys.path.append(str(Path(__file__).parents[1]))
+
+from judges import entries, judge_of
+
 ROOT = Path(__file__).parents[2]
 FOLDER, TESTS = ROOT / "reports" / "trust", ROOT / "tests"
 COMMITS = "commits.csv"  # {table: commit}
 SURVIVES = "survives: "  # Before the name of a mutant that no property is meant to catch.
 UNKNOWN = "-"  # The cell of a property that was not asked.
+JUDGE = "judge"  # The column with the digest of the properties that judged a line.
+# {table: the head that names the one property that judged a line, behind a slash if there is one; "" where all did}
+JUDGED_BY = {
+    "campaign.csv": "seed/property",
+    "strangers.csv": "",
+    "options.csv": "",
+    "faces.csv": "formulation/property",
+    "kills.csv": "",
+    "face_kills.csv": "",
+    "smallest_errors.csv": "property",
+    "curved_damage.csv": "property",
+    "smallest_cases.csv": "caught by",
+}
 
 
 def read(name: str) -> list[dict[str, str]]:
-    """Return the lines of a table in `reports/trust`, none where it is missing."""
+    """Return the lines of a table in `reports/trust`, without their judges, none where it is missing."""
+    return [{head: cell for head, cell in row.items() if head != JUDGE} for row in _read(name)]
+
+
+def _read(name: str) -> list[dict[str, str]]:
     file = FOLDER / name
     if not file.exists():
         return []
@@ -24,25 +45,45 @@ def read(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
+def judge_today(name: str, row: dict[str, str]) -> str:
+    """Return the digest of the properties that judge a line of a table today."""
+    head = JUDGED_BY[name]
+    return judge_of(*([row[head].rpartition("/")[2]] if head else entries()))
+
+
+def is_old(name: str, row: dict[str, str]) -> bool:
+    """Return whether a line of a table is of an older judge."""
+    return name in JUDGED_BY and row.get(JUDGE) != judge_today(name, row)
+
+
+def count_old() -> dict[str, tuple[int, int]]:
+    """Return {table: how many of its lines are of an older judge, and of how many}."""
+    tables = {name: [is_old(name, row) for row in _read(name)] for name in JUDGED_BY}
+    return {name: (sum(old), len(old)) for name, old in tables.items()}
+
+
 def fill(
     name: str, heads: Iterable[str], keys: Iterable[str], cells: Callable[[str], list[str]], processes: int = 1
 ) -> None:
     """Write a table with a line for each key, in their order: the key, then its cells; the first head is the key's.
 
-    Lines that are there stay as they are, if the table has the same heads. Delete the file to begin anew. `processes`
-    share the keys, so `cells` is a function of a module.
+    Lines that are there stay as they are, if the table has the same heads and their judge is that of today. Delete the
+    file to begin anew. `processes` share the keys, so `cells` is a function of a module.
     """
-    heads, keys = list(heads), list(keys)
-    lines = {row[heads[0]]: [row[head] for head in heads] for row in read(name) if list(row) == heads}
-    lines = {key: line for key, line in lines.items() if key in keys}
+    keys = list(keys)
+    heads = [*heads, JUDGE] if name in JUDGED_BY else list(heads)
+    rows = {row[heads[0]]: row for row in _read(name) if list(row) == heads}
+    lines = {key: [*row.values()] for key, row in rows.items() if key in keys}
     _write(name, heads, lines, keys)
-    missing = [key for key in keys if key not in lines]
+    missing = [key for key in keys if key not in lines or is_old(name, rows[key])]
     if missing:
         keep_commit(name)
     # A process that dies ends this one, too; a `multiprocessing.Pool` would wait for its line for ever.
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for number, (key, line) in enumerate(zip(missing, pool.map(cells, missing), strict=True), 1):
             lines[key] = [key, *line]
+            if name in JUDGED_BY:
+                lines[key].append(judge_today(name, dict(zip(heads, lines[key], strict=False))))
             _write(name, heads, lines, keys)
             print(f"{number} of {len(missing)}: {key}", flush=True)
 

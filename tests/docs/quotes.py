@@ -25,6 +25,7 @@ import tempfile
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 from contactverif.plugins.registry import property_ids
@@ -52,6 +53,11 @@ WIDTH = "100"  # Columns of a quoted output.
 # The report that examples/read_report.py reads.
 REPORT = ("vts-me", "vts-ppt", "-p", "patch.flat.transmission", "--seed", "1", "--out", "report.nc")
 
+# What a number on a screen may differ by: seconds are left out, and what is rounding has other last bits where a
+# library of linear algebra, or a processor, adds in another order. All tolerances are exact.
+SECONDS = re.compile(r"\d[\d.]*(?:e[+-]?\d+)? ?(?:µs|ms|s|min|h)\b")
+ROUNDING, SLACK = 1e-6, 2.0  # Below the one, and beside "pass", an error may be this many times the other.
+_NUMBER = re.compile(r"((?:at most|at least|≤|≥|pass)? *)(?<![\w./])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w/])")
 _QUOTE = re.compile(
     r"^<!-- (output|source)(?: of (\S+?))?: *(.*?) *-->\n```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL
 )
@@ -169,7 +175,7 @@ def prepare(page: Path, folder: Path) -> None:
         shutil.copy(source, folder / "site")
 
 
-def outputs(page: Path, folder: Path, extra: Sequence[str] = ()) -> dict[str, subprocess.CompletedProcess[str]]:
+def outputs(page: Path, folder: Path) -> dict[str, subprocess.CompletedProcess[str]]:
     """Run the commands of a page whose output or picture is shown, and those that write the files they read."""
     prepare(page, folder)
     quoted = {quote.command for quote in quotes(page) if not quote.foreign}
@@ -180,12 +186,7 @@ def outputs(page: Path, folder: Path, extra: Sequence[str] = ()) -> dict[str, su
         is_shown = line in quoted or re.search(r"--out \S+\.svg", line)
         if line.startswith("contactverif ") and (is_shown or is_read):
             needed.insert(0, line)
-    results = {}
-    for line in needed:
-        program, *arguments = shlex.split(line)
-        more = extra if arguments[0] in ("verify", "compare") else ()
-        results[line] = call(program, *arguments, *more, folder=folder)
-    return results
+    return {line: call(*shlex.split(line), folder=folder) for line in needed}
 
 
 def excerpt(output: str, patterns: str) -> str:
@@ -227,6 +228,24 @@ def _pieces(lines: Sequence[str]) -> list[list[str]]:
             pieces.append([])
         pieces[-1].append(line)
     return pieces
+
+
+def unlike(quoted: str, printed: str) -> list[str]:
+    """Return the lines of a quotation that say something else than those that a command printed."""
+    pairs = zip_longest(*(SECONDS.sub("s", text).splitlines() for text in (quoted, printed)), fillvalue="")
+    return [f"{old} -> {new}" for old, new in pairs if old != new and not _alike(old, new)]
+
+
+def _alike(quoted: str, printed: str) -> bool:
+    """Return whether two lines differ in nothing but roundings."""
+    lines = [re.sub(r" +", " ", line) for line in (quoted, printed)]
+    if len({_NUMBER.sub("0", line) for line in lines}) == 2:
+        return False
+    for (before, old), (_, new) in zip(*map(_NUMBER.findall, lines), strict=True):
+        is_error = before.strip() == "pass" or (not before.strip() and float(old) < ROUNDING)
+        if old != new and not (is_error and float(old) <= SLACK * float(new) <= SLACK**2 * float(old)):
+            return False
+    return True
 
 
 def source_block(argument: str) -> str:

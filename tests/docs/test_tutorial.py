@@ -12,8 +12,20 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from quotes import DOCS, MINE_CLASSES, MINE_SOURCE, STEPS, blocks, call, commands, install_mine, outputs, quotes
-from test_docs import last_lines, rows
+from quotes import (
+    DOCS,
+    MINE_CLASSES,
+    MINE_SOURCE,
+    STEPS,
+    blocks,
+    call,
+    commands,
+    excerpt,
+    install_mine,
+    outputs,
+    quotes,
+    unlike,
+)
 
 QUICK = ("--examples", "6")  # The tutorial's commands ask for a hundred; its loops are plain Python.
 FEW = ("-p", "patch.flat.*", "-p", "tangent.directional")
@@ -65,7 +77,7 @@ def test_a_file_that_is_not_finished_is_a_row_that_did_not_load(run_program: Run
     install_mine(tmp_path / "site", MINE_CLASSES["NodeToSegment"])
     answer = run_program("contactverif", "verify", "mine-nodes", "mine-exact", "-v", *FORCE)
     assert answer.returncode == 1
-    assert rows(answer.stdout) == [("balance.force", "–", "pass")], "the others run"
+    assert re.search(r"balance\.force +– +pass", answer.stdout), "the others run"
     assert "not loaded" in answer.stdout
     assert "Exact" in answer.stdout
 
@@ -76,18 +88,9 @@ def test_a_step_of_the_tutorial_ends_as_it_says(name: str, tmp_path: Path) -> No
     for line in commands(page.read_text(encoding="utf-8")):
         assert line.startswith(("contactverif verify mine", "pip install -e contactverif-mine"))
     (quote,) = [quote for quote in quotes(page) if quote.kind == "output"]
-    finished = outputs(page, tmp_path, QUICK)[quote.command]
+    finished = outputs(page, tmp_path)[quote.command]
     assert finished.returncode == 0, finished.stdout + finished.stderr
-    assert what_does_not_apply(quote.block) == what_does_not_apply(finished.stdout) != []
-    assert last_lines(quote.block)[-1] == last_lines(finished.stdout)[-1]
-    for word in {"residual.md": ["slave   ●", "master  o"]}.get(name, []):
-        assert word in quote.block
-        assert word in finished.stdout
-
-
-def what_does_not_apply(printed: str) -> list[str]:
-    """Return how many properties do not apply. Of those without a promise a few cases may pass where a hundred fail."""
-    return re.findall(r"^(mine\S*): .*?(\d+ do not apply)$", printed, re.MULTILINE)
+    assert not unlike(quote.block, excerpt(finished.stdout, quote.argument))
 
 
 def test_the_steps_pasted_one_below_the_other_are_the_file() -> None:
@@ -122,7 +125,7 @@ def test_a_wrong_tangent_is_found_out(run_program: Run, tmp_path: Path) -> None:
             "contactverif", "verify", "mine-exact", "-p", property_id, "--seed", "1", "--examples", "15", "-v"
         )
         assert answer.returncode == 1
-        assert rows(answer.stdout) == [(property_id, "passes", "BROKEN PROMISE")]
+        assert re.search(rf"^ +{property_id} +passes +BROKEN PROMISE", answer.stdout, re.MULTILINE)
 
 
 def _counts(printed: str) -> list[tuple[str, int]]:

@@ -7,13 +7,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from contactverif.contract.arrays import IntArray
 from contactverif_paper.items import ITEMS
-from contactverif_paper.tangents import PRINTED_ITERATIONS, RULES
 
 FOLDER = Path(__file__).parents[2] / "reports" / "paper"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
-BASIC = "vts-ppt-basic"
 
 
 @cache
@@ -42,19 +39,6 @@ def test_the_table_of_groups_lists_the_stored_groups() -> None:
     assert listed <= set(read_paper().groups)
     assert {name.split("/")[1] for name in listed} == set(read_paper().children)
     assert set(read_paper().children) == {item.name for item in ITEMS} | {"statements", "figures"}
-
-
-def test_the_iterations_of_fig_30_are_the_stored_ones() -> None:
-    group = read_paper()["fig30_convergence"].to_dataset()
-    column = words(group.formulation).index(BASIC)
-    assert words(group.rule) == list(RULES)
-    counts: IntArray = group.iterations.values[..., column].astype(int)  # (n_rules, n_ratios)
-    ours, decade, end, energy = counts.tolist()
-    text = " ".join(README.split())
-    assert f"needs {PRINTED_ITERATIONS} iterations in Fig. 30" in text
-    assert f"needs {ours[0]} or {ours[1]} iterations until the residual is down to its own roundoff" in text
-    assert f"{min(decade + end)} to {max(decade + end)} until it reaches the last decades" in text
-    assert f"{energy[0]} or {energy[1]} to the energy norm of Example 2" in text
 
 
 def test_fig_39_fits_on_the_meshes_that_the_page_names() -> None:
