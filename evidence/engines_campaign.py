@@ -2,9 +2,9 @@
 
 `tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question, and the page `engines.md`;
 `tox -e libraries` writes `libraries.csv` and `libraries.md`. Engines that come as Python packages get environments of
-their own; `GETFEM_PYTHON` names the interpreter of GetFEM. A library is a package of the environment that runs this. A
-report that is complete is read and not made again, and one that was stopped goes on, so that the same command goes on
-with the whole.
+their own; `GETFEM_PYTHON` names the interpreter of GetFEM. A library is a package of the environment that runs this.
+Lines of today's judges stay. A report that is complete is read and not made again, and one that was stopped goes on,
+so that the same command goes on with the whole.
 """
 
 import csv
@@ -20,10 +20,15 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
+from origin import judge_of, keep_commit
+
+from contactverif.plugins.registry import property_ids
+
 FOLDER = Path(__file__).parents[1] / "reports" / "findings"
 COUNTS, NUMBERS = ("judged", "failed", "planned"), ("number", "value", "tolerance")
-HEADS = ("engine", "question", "verdict", *COUNTS, *NUMBERS, "seconds a case", "reason")
+HEADS = ("engine", "question", "verdict", *COUNTS, *NUMBERS, "seconds a case", "reason", "judge")
 PARTS = ("StructuralMechanics", "ContactStructuralMechanics", "LinearSolvers")
+Line = tuple[str, ...]
 KRATOS = ("KratosMultiphysics", *(f"Kratos{part}Application" for part in PARTS))
 
 
@@ -96,9 +101,10 @@ def _interpreter(folder: Path, packages: tuple[str, ...]) -> Path:
     return python
 
 
-def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
-    """Return the lines of an engine, from a report that is made or gone on with."""
-    report = folder / f"{choice.label.replace(':', '-').replace('=', '-').replace(',', '-')}.json"
+def ask(choice: Choice, questions: list[str], folder: Path, examples: int) -> list[Line]:
+    """Return the lines of an engine for some questions, from a report that is made or gone on with."""
+    label = choice.label.replace(":", "-").replace("=", "-").replace(",", "-")
+    report = folder / f"{label}-{judge_of(*questions)}.json"  # Other judges, another report.
     if not report.exists():
         journal = report.with_name(report.name + ".journal")
         name = choice.write_name(folder / "environments")
@@ -109,6 +115,7 @@ def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
             "1",
             "--examples",
             str(examples),
+            *(word for question in questions for word in ("-p", question)),
         ]
         arguments = ["--resume", str(report)] if journal.exists() else [*new, "--out", str(report), "--no-memory"]
         command = [sys.executable, "-m", "contactverif", "verify", *arguments, "--keep-going", "-q", "--jobs", "2"]
@@ -117,7 +124,7 @@ def ask(choice: Choice, folder: Path, examples: int) -> list[tuple[str, ...]]:
     return [line for row in document["rows"] if (line := _line(choice, row)) is not None]
 
 
-def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
+def _line(choice: Choice, row: dict[str, Any]) -> Line | None:
     """Return the line of a row; None where displacements do not answer the question."""
     if row["result"] == "not applicable":
         return None
@@ -126,7 +133,8 @@ def _line(choice: Choice, row: dict[str, Any]) -> tuple[str, ...] | None:
     numbers = ["" if closest[key] is None else f"{closest[key]:.2e}" for key in ("value", "tolerance")]
     seconds = f"{row['seconds'] / max(row['planned'], 1):.2g}"
     counts = (str(row[key]) for key in ("judged", "failed", "planned"))
-    return choice.label, row["property"], row["result"], *counts, closest["name"], *numbers, seconds, row["reason"]
+    cells = choice.label, row["property"], row["result"], *counts, closest["name"], *numbers, seconds, row["reason"]
+    return *cells, judge_of(row["property"])
 
 
 LIBRARIES_PAGE = """# Libraries of contact, question by question
@@ -160,7 +168,7 @@ the seconds of a scene. A scene is not judged where the code says that it finds 
 """
 
 
-def write_page(lines: list[tuple[str, ...]], examples: int, name: str = "engines", page: str = PAGE) -> None:
+def write_page(lines: list[Line], examples: int, name: str = "engines", page: str = PAGE) -> None:
     """Write the page: a table for each engine or library."""
     tables = []
     for engine in dict.fromkeys(line[0] for line in lines):
@@ -182,7 +190,11 @@ def main(folder: Path, examples: int, name: str = "engines") -> None:
     """Ask all engines whose program is there, or all libraries that are installed."""
     for place in (folder, FOLDER):
         place.mkdir(parents=True, exist_ok=True)
-    lines, (choices, page) = [], (LIBRARIES, LIBRARIES_PAGE) if name == "libraries" else (CHOICES, PAGE)
+    choices, page = (LIBRARIES, LIBRARIES_PAGE) if name == "libraries" else (CHOICES, PAGE)
+    file = FOLDER / f"{name}.csv"
+    with file.open(encoding="utf-8", newline="") as stream:
+        rows = [tuple(row.get(head, "") for head in HEADS) for row in csv.DictReader(stream)]
+    lines = {row[:2]: row for row in rows}  # {(engine, question): line}
     for choice in choices:
         if choice.library and find_spec(choice.library) is None:
             print(f"{choice.label}: {choice.library} is not installed")
@@ -193,10 +205,14 @@ def main(folder: Path, examples: int, name: str = "engines") -> None:
         if choice.variable and choice.variable not in os.environ:
             print(f"{choice.name}: {choice.variable} is not set")
             continue
-        lines += ask(choice, folder, examples)
-        with (FOLDER / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
-        write_page(lines, examples, name, page)
+        ids = property_ids(engines=not choice.library)
+        old = [id_ for id_ in ids if lines.get((choice.label, id_), ("",))[-1] != judge_of(id_)]
+        lines |= {line[:2]: line for line in ask(choice, old, folder, examples)} if old else {}
+        rows = [line for each in choices for line in lines.values() if line[0] == each.label]
+        with file.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([HEADS, *rows])
+        keep_commit(file)
+        write_page(rows, examples, name, page)
 
 
 if __name__ == "__main__":

@@ -39,7 +39,10 @@ from typing import Any
 
 os.environ |= {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
+sys.path.append(str(Path(__file__).parents[1]))
+
 import numpy as np
+from origin import keep_commit
 from scipy import sparse
 
 from contactverif import Interface, Subject, evaluate_both, load_formulation
@@ -341,6 +344,7 @@ def write(rows: list[dict[str, Any]], folder: Path, name: str) -> None:
         writer.writerows(
             {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
         )
+    keep_commit(folder / f"{name}.csv")
     draw(rows, folder / f"{name}.svg")
 
 
@@ -368,6 +372,7 @@ def write_steps(steps: dict[int, dict[str, float]], folder: Path) -> None:
         writer.writerow(["step of vts-ppt, µs a segment", *steps])
         for name in next(iter(steps.values())):
             writer.writerow([name, *(f"{step[name]:.4g}" for step in steps.values())])
+    keep_commit(folder / "steps.csv")
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ each system has all unknowns of both bodies. The largest takes some gigabytes, a
 """
 
 import csv
+import sys
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -19,6 +20,10 @@ from contactverif.studies.bench_cells import TURNS, evaluate
 from contactverif.studies.bench_plan import is_solved, largest_errors, vary
 from contactverif_reports.bench_costs import REFERENCE
 from contactverif_reports.bench_results import ERRORS, RULE, Cell
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from origin import keep_commit
 
 FILE = Path(__file__).parents[2] / "reports" / "bench" / "fine_waves.csv"
 FORMULATIONS = (REFERENCE, "sts", "nts-ar", "mortar", "chen-hisada", "mortar-lm")
@@ -75,6 +80,7 @@ def main() -> None:
             table.writerow(pool.apply(solve, run))
             file.flush()
             print(*run, flush=True)
+    keep_commit(FILE)
 
 
 if __name__ == "__main__":

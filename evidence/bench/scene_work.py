@@ -18,6 +18,10 @@ from unittest.mock import patch
 
 import numpy as np
 
+sys.path.append(str(Path(__file__).parents[1]))
+
+from origin import keep_commit
+
 from contactverif import Case, Property, Subject, judge_case, load_formulation, load_properties
 from contactverif.mechanics import bulk, newton
 from contactverif.mechanics.newton import Trace
@@ -150,6 +154,7 @@ def main(path: Path) -> None:
         table = csv.DictWriter(file, [entry.name for entry in fields(Work)])
         table.writeheader()
         table.writerows(asdict(row) for row in rows if row.scenes)
+    keep_commit(path)
 
 
 if __name__ == "__main__":

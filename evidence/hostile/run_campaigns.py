@@ -33,7 +33,7 @@ def main(counts: list[int]) -> int:
         command = [sys.executable, str(Path(__file__).parent / script), str(count)]
         finished = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
         (FOLDER / name).write_text(finished.stdout, encoding="utf-8")
-        keep_commit(name)
+        keep_commit(FOLDER / name)
         print(f"{script}: exit status {finished.returncode}\n{finished.stdout}", flush=True)
         harm = harm or finished.returncode != 0
     return int(harm)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 
-from tables import FOLDER, TESTS, install, markdown
+from tables import FOLDER, TESTS, install, keep_commit, markdown
 from zoo.springs import FRESH, KNOWN, Springs
 
 HEADS = ("formulation", "named", "first row", "first wrong row", "in all", "lines", "status", "diagnosis")
@@ -134,6 +134,7 @@ def main(names: list[str]) -> None:
     if not names:
         with (FOLDER / "bugs.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows([HEADS, *(answer.line for answer in answers)])
+        keep_commit(FOLDER / "bugs.csv")
         (FOLDER / "bugs.md").write_text(_page(answers), encoding="utf-8")
 
 

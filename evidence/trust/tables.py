@@ -1,7 +1,6 @@
 """Tables that campaigns fill a line at a time and continue after a stop, and what campaigns share beside them."""
 
 import csv
-import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -10,11 +9,10 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from judges import entries, judge_of
+from origin import entries, judge_of, keep_commit, read_commits
 
 ROOT = Path(__file__).parents[2]
 FOLDER, TESTS = ROOT / "reports" / "trust", ROOT / "tests"
-COMMITS = "commits.csv"  # {table: commit}
 SURVIVES = "survives: "  # Before the name of a mutant that no property is meant to catch.
 UNKNOWN = "-"  # The cell of a property that was not asked.
 JUDGE = "judge"  # The column with the digest of the properties that judged a line.
@@ -77,7 +75,7 @@ def fill(
     _write(name, heads, lines, keys)
     missing = [key for key in keys if key not in lines or is_old(name, rows[key])]
     if missing:
-        keep_commit(name)
+        keep_commit(FOLDER / name)
     # A process that dies ends this one, too; a `multiprocessing.Pool` would wait for its line for ever.
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for number, (key, line) in enumerate(zip(missing, pool.map(cells, missing), strict=True), 1):
@@ -94,17 +92,10 @@ def fill_all(*tables: tuple[str, Iterable[str], Callable[[str], list[str]], Iter
         fill(name, heads, keys, cells, processes=int(sys.argv[1]) if len(sys.argv) > 1 else 1)
 
 
-def keep_commit(name: str) -> None:
-    """Note with which commit a table was filled last."""
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], check=True, capture_output=True, text=True).stdout
-    commits = {row["table"]: [row["table"], row["commit"]] for row in read(COMMITS)} | {name: [name, commit.strip()]}
-    _write(COMMITS, ["table", "commit"], commits, sorted(commits))
-
-
 def commits_of(tables: Iterable[str]) -> str:
     """Return with which commit each of some tables was filled, in Markdown."""
-    tables = set(tables)
-    return ", ".join(f"`{row['table']}` at commit {row['commit']}" for row in read(COMMITS) if row["table"] in tables)
+    commits = read_commits()
+    return ", ".join(f"`{name}` at commit {commits[f'trust/{name}']}" for name in sorted(tables))
 
 
 def _write(name: str, heads: list[str], lines: dict[str, list[str]], keys: list[str]) -> None:

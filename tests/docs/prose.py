@@ -30,9 +30,9 @@ import pandas as pd
 import xarray as xr
 from quotes import ROOT, pages
 
-from contactverif import judge_case, load_formulation
+from contactverif import judge_case, load_formulation, load_properties
 from contactverif.contract.property import checked_numbers
-from contactverif.plugins.registry import the_property
+from contactverif.plugins.registry import formulation_names, the_property
 from contactverif_reports.bench_costs import ratios_at
 from contactverif_reports.netcdf.bench_file import read_bench
 
@@ -80,6 +80,17 @@ def fig30(rule: int) -> list[int]:
     """Return the iterations of the basic VTS-PPT in Fig. 30, up to one of the rules when to stop."""
     counts = read("paper/paper.nc")["fig30_convergence/iterations"].sel(formulation="vts-ppt-basic")
     return [int(count) for count in counts.values[rule]]
+
+
+@cache
+def most_in_space() -> int:
+    """Return how many properties a formulation on faces is asked at most."""
+    formulations = [load_formulation(name) for name in formulation_names() if name.endswith("-3d")]
+    in_space = [prop for prop in load_properties() if prop.cases_in_space is not None]
+    return max(
+        sum(not (prop.for_traits(each.traits).refusal_of(each) or prop.needs - each.provides) for prop in in_space)
+        for each in formulations
+    )
 
 
 @cache

@@ -32,11 +32,20 @@ def test_a_number_in_prose_is_that_of_its_source(page: Path) -> None:
     assert not prose.differences(page), "python tests/docs/prose.py writes them"
 
 
+def test_every_stored_table_names_its_commit() -> None:
+    tables = {path.relative_to(prose.REPORTS).as_posix() for path in prose.REPORTS.glob("*/*.csv")}
+    named = set(prose.read("commits.csv").table)
+    assert {name for name in tables if not name.endswith("_before.csv")} <= named
+    for path in prose.REPORTS.glob("*/*.nc"):
+        with netCDF4.Dataset(path) as data:
+            assert re.fullmatch("[0-9a-f]{40}", data.commit)
+
+
 @pytest.mark.parametrize(("file", "old", "new"), STORED)
 def test_a_stored_number_that_changes_is_found(
     file: str, old: str, new: str | tuple[int, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for path in (*prose.REPORTS.glob("*/*.csv"), *prose.REPORTS.glob("*/*.nc")):
+    for path in (*prose.REPORTS.rglob("*.csv"), *prose.REPORTS.glob("*/*.nc")):
         copy = tmp_path / path.relative_to(prose.REPORTS)
         copy.parent.mkdir(exist_ok=True)
         copy.write_bytes(path.read_bytes())

@@ -1,4 +1,6 @@
-"""The digest of a judge: of the code of a property, and of all that it names of exact answers, cases and mechanics.
+"""The origin of stored tables: with which commit they were made, and which judge each row is of.
+
+The digest of a judge is that of the code of a property, and of all that it names of exact answers, cases and mechanics.
 
 A row of a stored table keeps the digest of the properties that judged it. A row with another digest than that of today,
 or with none, is of an older judge. Comments, docstrings and the places of definitions are no part of a digest, so that
@@ -6,6 +8,8 @@ moving code makes no row old; nor are contracts and the run, which carry cases a
 """
 
 import ast
+import csv
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,6 +25,7 @@ JUDGES = (
 )
 GROUPS = ("contactverif.properties", "contactverif.engine_properties")
 DIGITS = 8
+COMMITS = ROOT / "reports" / "commits.csv"  # {table: commit}
 Place = tuple[str, str]  # A module, and a name in it.
 
 
@@ -119,3 +124,19 @@ def judge_of(*ids: str) -> str:
     begin = [resolve(entries()[name]) if name in entries() else None for name in ids]
     places = {place for each in begin if each for place in closure(each) if place[0].startswith(JUDGES)}
     return "" if None in begin else sha256("\n".join(sorted(map(text, places))).encode()).hexdigest()[:DIGITS]
+
+
+def read_commits() -> dict[str, str]:
+    """Return {stored table: commit with which it was made last}."""
+    with COMMITS.open(encoding="utf-8", newline="") as stream:
+        return {row["table"]: row["commit"] for row in csv.DictReader(stream)}
+
+
+def keep_commit(table: Path) -> None:
+    """Note with which commit a table is made, if it is a stored one."""
+    if not table.resolve().is_relative_to(COMMITS.parent):
+        return
+    answer = subprocess.run(["git", "rev-parse", "--short", "HEAD"], check=True, capture_output=True, text=True)
+    commits = read_commits() | {table.resolve().relative_to(COMMITS.parent).as_posix(): answer.stdout.strip()}
+    with COMMITS.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([("table", "commit"), *sorted(commits.items())])
