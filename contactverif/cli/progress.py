@@ -31,7 +31,7 @@ _PAUSE = 5.0  # Seconds between two lines about the whole, where there is no ter
 
 
 class _TimeColumn(TimeElapsedColumn):
-    """How long there is no news, if that is long, or the time that is left, where there is a guess, or that so far."""
+    """The time without news, if that is long, or that which is left, where there is a guess, or that so far."""
 
     def render(self, task: Task) -> Text:
         words = _patience(monotonic() - task.fields["since"]) or task.fields["left"]

@@ -151,11 +151,11 @@ class Job:
         loaders = begin_loading(self.options.names, self.limits(), executor)
         questions = load_properties(self.options.properties, engines=True)
         if self.options.quick:  # What does not load is told.
-            asked = tuple(each for each in questions if isinstance(each, NotLoaded) or each.turn < LAST_TURN)
-            if not asked:
+            cheap = tuple(each for each in questions if isinstance(each, NotLoaded) or each.turn < LAST_TURN)
+            if not cheap:
                 words = f"{len(questions)} properties, none of them of the first round"
                 raise MisuseError("--quick", words, "no --property, or -p 'balance.*'")
-            questions = asked
+            questions = cheap
         return Plugins([load() for load in loaders], questions)
 
     def limits(self) -> Limits | None:

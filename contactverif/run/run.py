@@ -269,14 +269,14 @@ class Driver:
         cases: dict[str, tuple[Case, ...]] = {}
         self._scheduler.work(self._first_round(cases))
         kinds = {kind for question in self._questions if question.id in cases for kind in question.kinds}
-        seen = {case.kind for each in cases.values() for case in each if case.kind}
+        of_cases = {case.kind for each in cases.values() for case in each if case.kind}
         words = f"first round: {len(cases)} of {len(self._questions)} properties, {FIRST_CASES} cases each"
-        words += f", of {len(seen)} of {len(kinds)} kinds" if kinds else ""
+        words += f", of {len(of_cases)} of {len(kinds)} kinds" if kinds else ""
         words += f"; {len(self._first_wrong) or 'none'} wrong{self._meter.price(self._first_calls)}"
         if cases:
             self._report(Progress("", "", "first round", 1, 1, remark=words))
 
-    def _first_round(self, asked: dict[str, tuple[Case, ...]]) -> Iterator[Job]:
+    def _first_round(self, cases_of: dict[str, tuple[Case, ...]]) -> Iterator[Job]:
         """Yield the jobs of the first round, and note the cases that each property is asked about."""
         variants = [each for each in dict.fromkeys(self._variants.values()) if each.turn < LAST_TURN]
         for question, subject in product(sorted(variants, key=attrgetter("turn")), self._subjects):
@@ -289,7 +289,7 @@ class Driver:
             cases = draw.draw_first(source, self._sampling.key(question), count)
             if isinstance(row, Row) or not cases or self._store.outcomes(subject.name, question.info, 0, count):
                 continue
-            asked[question.id], chunk = cases, CaseChunk(cases, 0)
+            cases_of[question.id], chunk = cases, CaseChunk(cases, 0)
             row.expect({0: chunk}, planned=self._sampling.examples, last=True)
             before = Progress(*key, "first round", 0, count)
             note = partial(self._note_first_cases, row, before)
@@ -678,6 +678,6 @@ class RunMeter:
             seconds[self._kinds[id_]] += self._seconds[id_]
         unit = measured / sum(_COSTS[kind] * count for kind, count in counts.items())
         costs = {kind: seconds[kind] / counts[kind] if counts[kind] else cost * unit for kind, cost in _COSTS.items()}
-        own = {id_: self._seconds[id_] / count for id_, count in self._cases.items() if count}
-        ahead = sum(count * own.get(id_, costs[self._kinds[id_]]) for id_, count in cases.items())
+        of_each = {id_: self._seconds[id_] / count for id_, count in self._cases.items() if count}
+        ahead = sum(count * of_each.get(id_, costs[self._kinds[id_]]) for id_, count in cases.items())
         return ahead * (perf_counter() - self._started) / measured

@@ -87,7 +87,7 @@ def test_rows_appear_on_standard_error_as_they_are_judged_and_those_with_bodies_
     answer = run_inline("verify nts -p patch.flat.solve -p purity -p balance.* --examples 2 --seed 1")
     # A slow machine has further lines of progress.
     rows = [line.partition(":")[0] for line in answer.err.splitlines() if " judged" in line]
-    assert rows == [f"nts {name}" for name in ("balance.force", "purity", "balance.moment", "patch.flat.solve")]
+    assert rows == [f"nts {name}" for name in ("balance.force", "balance.moment", "purity", "patch.flat.solve")]
     assert "nts balance.force: pass, 2/2 judged\n" in answer.err
     assert "nts: fails 1 of 4, as it states\n" in answer.out
     assert "2/2 judged" not in answer.out

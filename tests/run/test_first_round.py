@@ -32,7 +32,7 @@ def wrong_if_large(size: int) -> float:
     return float(size > 50)
 
 
-def counted(question: Property, calls: Counter[str]) -> Property:
+def count_calls(question: Property, calls: Counter[str]) -> Property:
     def measure(case: Case, subject: Subject) -> Measurement:
         calls[question.id] += 1
         return measure_residual(case, subject)
@@ -65,7 +65,7 @@ def test_what_is_wrong_is_shown_before_any_row_is_whole() -> None:
 def test_its_cases_are_the_first_planned_ones_and_are_judged_once() -> None:
     """The second process of a property waits for its whole row, so these few are asked twice."""
     calls = Counter[str]()
-    questions = [counted(question, calls) for question in (FIRST, AGAIN, LATE)]
+    questions = [count_calls(question, calls) for question in (FIRST, AGAIN, LATE)]
     watched = run([subject(wrong_if_large)], questions, examples=20, seed=1, progress=lambda step: None, shrink="none")
     assert calls == {"patch.first": 20, "patch.again": 25, "patch.late": 20}
     alone = run([subject(wrong_if_large)], questions, examples=20, seed=1, shrink="none")

@@ -4,11 +4,12 @@ import subprocess
 from importlib.metadata import entry_points
 
 import pytest
+
+# They import numpy, scipy and hypothesis before pytester notes which modules to forget again.
+import scipy.linalg  # noqa: F401
 from fresh_process import PYTHON
 
 from contactverif.plugins import registry
-
-# They import numpy and hypothesis before pytester notes which modules to forget again.
 from contactverif.sampling import hypothesis_draws  # noqa: F401
 
 pytest_plugins = ["pytester"]
@@ -17,6 +18,7 @@ CONFTEST = """
 import numpy as np
 import pytest
 from dataclasses import replace
+from importlib.metadata import EntryPoint
 from hypothesis import strategies as st
 from contactverif import Case, Interface, Measurement, PatchPromises, Promises, Property, Quantity, Traits
 from contactverif.plugins import registry
@@ -56,7 +58,7 @@ def silent(*, penalty): return Plugin(5, None)
 def lost(*, penalty): raise RuntimeError("no licence")
 
 class Entry:
-    dist = None
+    dist, pattern, module = None, EntryPoint.pattern, "fakes"
     def __init__(self, name, what): self.name, self.what, self.value = name, what, name
     def load(self): return self.what
 
