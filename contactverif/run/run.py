@@ -551,17 +551,18 @@ class Driver:
         for subject in self._subjects:
             rows = {id(row.row): row for row in self._open_rows() if row.subject is subject}
             failure = first_failure(row.row for row in rows.values())
-            if failure is None or failure.verdict is not Verdict.FAIL:
-                continue  # Crashes explain themselves.
-            row = rows[id(failure)]
-            if failure.breach and row.question.role != "foundation" and "not finite" not in failure.reason:
+            if failure is None or failure.verdict not in (Verdict.FAIL, Verdict.CRASHED):
                 continue
-            others = [wrong.property_id for wrong in wrong_rows(each.row for each in rows.values())]
-            self._report(Progress(subject.name, failure.property_id, "diagnosis", 0, 1))
-            if subject.traits.abilities.in_plane:  # The rules look at plane states.
+            row, crashed = rows[id(failure)], failure.verdict is Verdict.CRASHED
+            explains = failure.breach and row.question.role != "foundation" and "not finite" not in failure.reason
+            # The rules look at plane states. Crashes and most breaches of the contract explain themselves.
+            if subject.traits.abilities.in_plane and not (crashed or explains):
+                others = [wrong.property_id for wrong in wrong_rows(each.row for each in rows.values())]
+                self._report(Progress(subject.name, failure.property_id, "diagnosis", 0, 1))
                 note = partial(self._diagnoses.__setitem__, subject.name)
                 yield Job(diagnose, (subject, failure.property_id, others), note)
-            if self._shrink == "one":
+            # A process that ends or hangs takes long to ask again.
+            if self._shrink == "one" and (not crashed or failure.reason.startswith("exception")):
                 yield from self._shrink_row(row, shrinks=True)
 
     def _measure_forces(self) -> Iterator[Job]:

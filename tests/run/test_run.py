@@ -169,13 +169,26 @@ def test_cases_that_could_not_be_made_count_as_not_judged() -> None:
     assert row.reason == "0 of 100 cases judged; no more cases could be made"
 
 
+def crash_if_large(size: int) -> float:
+    if size > 3:
+        raise IndexError("too many")
+    return 0.0
+
+
+@pytest.mark.parametrize("answer", [crash_if_large, lambda size: np.nan if size > 3 else 0.0], ids=["crash", "nan"])
+def test_the_most_telling_failure_is_shrunk_also_if_it_crashes(answer: Callable[[int], float]) -> None:
+    (row,) = run([subject(answer)], [ZERO], examples=30, seed=1, shrink="one").rows
+    assert row.shrunk is not None
+    assert len(row.shrunk.case.interface.slave) == 4
+
+
 def test_all_planned_cases_are_judged_before_one_is_shrunk() -> None:
     log: list[Progress] = []
     row = one_row(subject(from_size(3)), progress=log.append)
     phases = ("first call (compiles)", "drawing", "judging", "shrinking", "diagnosis")
     assert [step.phase for step in log] == sorted((step.phase for step in log), key=phases.index)
     judging = [step for step in log if step.phase == "judging" and step.row is None]
-    assert [(step.count, step.planned) for step in judging] == [(count, 40) for count in range(1, 41)]
+    assert [(step.count, step.planned) for step in judging] == [(count, 40) for count in range(41)]
     assert {(step.formulation, step.property_id) for step in judging} == {("mine", "patch.zero")}
     assert sum(outcome.verdict is Verdict.FAIL for outcome in row.outcomes) > 20
 
