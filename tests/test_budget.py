@@ -58,7 +58,7 @@ BUDGET = {
     "paper": Weight(13, 3256, 2479),
 }
 SUM = Weight(257, 60619, 40236)
-TESTS = 47988  # Lines of tests and evidence.
+TESTS = 48000  # Lines of tests and evidence.
 COMMANDS = 14
 WORDS = 40000  # Words of Markdown, without the changelog and the stored results under reports/.
 SILENT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}

@@ -39,7 +39,7 @@ _ROOT = Path("/sys/fs/cgroup")
 _JOIN = 'while [ "$1" != -- ]; do echo $$ > "$1/cgroup.procs"; shift; done; shift; exec "$@"'
 _FOLDER_PREFIX = "contactverif-plugins-"
 _LOCK = ".held"
-_locks: list[int] = []  # The descriptor of the lock of this process.
+_locks: dict[str, int] = {}  # {folder of this process: the descriptor of its lock}
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,17 +272,17 @@ def plugin_folder() -> str:
 def hold_folder(folder: str) -> None:
     """Lock a temporary folder as long as this process lives."""
     with suppress(OSError):
-        _locks.append(os.open(os.path.join(folder, _LOCK), os.O_CREAT | os.O_RDWR, 0o600))
-        _lock(_locks[-1])
+        _locks[folder] = os.open(os.path.join(folder, _LOCK), os.O_CREAT | os.O_RDWR, 0o600)
+        _lock(_locks[folder])
 
 
 def remove_plugin_folder() -> None:
     """Remove the folder, if this process has one."""
     if plugin_folder.cache_info().currsize:
-        shutil.rmtree(plugin_folder(), ignore_errors=True)
+        shutil.rmtree(folder := plugin_folder(), ignore_errors=True)
         plugin_folder.cache_clear()
-    while _locks:
-        os.close(_locks.pop())
+        if folder in _locks:  # That of multiprocessing is held on: its server of workers serves the next run, too.
+            os.close(_locks.pop(folder))
 
 
 def _lock(descriptor: int) -> None:

@@ -371,7 +371,7 @@ def _pull_of_points(state: FrozenState) -> tuple[float, float] | None:
     turn=4,
     quantities=(PULL_OF_NODE,),
     promise=lambda traits: traits.promises.nodes_push,
-    usual_undecided=0.002,
+    usual_undecided=0.003,
 )
 def nodal_push(case: Case, subject: Subject) -> Measurement:
     """Every node is pushed, none is pulled.

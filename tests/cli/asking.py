@@ -27,7 +27,7 @@ class Answer(NamedTuple):
 Ask = Callable[..., Answer]
 _ROW = re.compile(
     r"^(\S+ [a-z0-9.-]*: ([A-Za-z ]+(, \d+/\d+ judged| again)(: .*)?|[a-z ()]+ \d+/\d+)"
-    r"|.*; [\d,]+ of some [\d,]+ in all.*)\n",
+    r"|.*; [\d,]+ of some [\d,]+ in all.*|first round: .*)\n",
     re.MULTILINE,
 )
 

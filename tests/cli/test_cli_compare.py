@@ -61,7 +61,7 @@ def read_page(path: Path) -> Page:
 def test_formulations_side_by_side(ask: Ask, tmp_path: Path) -> None:
     answer = ask(f"{QUICK} -v")
     assert answer.status == 0  # vts-me says itself that it fails the patch test
-    assert not [line for line in answer.err.splitlines() if "take" not in line]  # A busy machine makes calls slow.
+    assert answer.err == ""
     assert re.search(r"vts-me against vts-ppt: profile dev: 12 random cases for each property, seed 1", answer.out)
     assert re.search(r"patch.flat.transmission +pass +≠ fails as stated", answer.out)
     assert re.search(r"balance.force +fails as stated +≠ pass", answer.out)

@@ -37,7 +37,7 @@ def test_the_table_and_the_page_are_those_of_the_run(ask: Ask, tmp_path: Path) -
     *table, verdict, promises = answer.out.splitlines()
     assert len(table) > 8
     assert verified.out.splitlines()[: len(table)] == table
-    assert verified.out.splitlines()[-2:] == [verdict, promises]
+    assert verified.out.splitlines()[-2:] == [f"{verdict[:-1]} (exit 0).", promises]  # A report ends no run.
     assert ask("report", path, "--out", page) == (0, f"page: {page}\n", "")
     text = page.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")

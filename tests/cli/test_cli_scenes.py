@@ -160,7 +160,7 @@ def test_draw_says_what_to_try_where_newtons_method_diverges(
     assert "diverged" in answer.out
     assert f"mine: {End.DIVERGED.advice}" in " ".join(answer.out.split())
     assert max(len(line) for line in answer.out.splitlines() if not line.startswith("picture: ")) <= 80
-    assert "mine: " + End.DIVERGED.advice in (tmp_path / "c.svg").read_text()
+    assert End.DIVERGED.advice.partition(";")[0] in (tmp_path / "c.svg").read_text()
 
 
 def test_a_stored_scene_is_solved_by_who_failed_it_or_by_another(ask: Ask, scene_report: Path, tmp_path: Path) -> None:

@@ -106,8 +106,8 @@ def test_the_failures_that_are_known_come_from_traits_and_from_the_tables_of_pla
 
 def test_the_list_and_an_explanation_say_dimensions(ask: Ask) -> None:
     words = " ".join(ask("list").out.split())
-    assert " nts-3d 3-D fails the flat patch test" in words
-    assert " nts 2-D fails the flat patch test" in words
+    assert " nts-3d 3-D fails exact tangent" in words
+    assert " nts 2-D fails exact tangent" in words
     assert " hard.c 2-D Cases C" in words
     assert " balance.force 2-D, 3-D The forces" in words
     assert "Dimensions: in the plane, and in space, where a segment is a face" in ask("explain balance.force").out

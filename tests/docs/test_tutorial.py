@@ -50,8 +50,8 @@ def whole_project(tmp_path: Path) -> Path:
 def test_it_is_found(whole_project: Path, run_program: Run) -> None:
     printed = run_program("contactverif", "list").stdout
     words = " ".join(printed.split())  # Long lines are folded.
-    assert " mine 2-D nothing; not provided: pair, tangent, contact_points " in words
-    assert " mine-exact 2-D passes the flat patch test; exact tangent; not provided: pair, contact_points " in words
+    assert " mine 2-D – nothing; not provided: pair, tangent, contact_points " in words
+    assert " mine-exact 2-D passes exact tangent; not provided: pair, contact_points " in words
     assert " mine-nodes " in words
 
 

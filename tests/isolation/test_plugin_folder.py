@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from contactverif.isolation.box import plugin_folder, remove_plugin_folder
+from contactverif.isolation.box import hold_folder, plugin_folder, remove_abandoned_folders, remove_plugin_folder
 from contactverif.run.worker_pool import worker_pool
 
 HOLDER = """
@@ -50,6 +50,17 @@ def test_the_folder_of_a_killed_process_goes_and_that_of_a_living_one_stays(empt
     assert {*empty.iterdir()} == {other}
     mine = Path(plugin_folder())
     assert {*empty.iterdir()} == {mine}
+
+
+def test_the_folder_of_a_server_of_workers_is_held_beyond_a_run(empty: Path) -> None:
+    """The next run of a notebook uses the same server."""
+    folder = empty / "pymp-mine"
+    folder.mkdir()
+    hold_folder(str(folder))
+    plugin_folder()
+    remove_plugin_folder()
+    remove_abandoned_folders()
+    assert folder.exists()
 
 
 def test_the_next_run_removes_the_folder_of_a_server_of_workers_that_was_killed(empty: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from handmade_report import run_with_kinds, small_run
 
+from contactverif import verify
 from contactverif.contract.result import Run
 from contactverif_reports.netcdf.write import write
 
@@ -15,16 +16,16 @@ README = Path(__file__).parents[2] / "reports" / "README.md"
 
 def test_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
-    write(small_run(), "report.nc")
+    write(verify(["vts-me:n=4", "vts-ppt"], "patch.flat.*", examples=3, seed=1), "report.nc")
     examples = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert len(examples) == 2
     for example in examples:
         exec(compile(example, str(README), "exec"), {})
     printed = capsys.readouterr().out
-    assert "vts-me:n=4   objectivity    crashed" in printed
-    assert "vts-me_n_4.patch.flat.transmission · force error 0.25" in printed
-    assert "slave   ●─2─●─2─●───4───●───4───●" in printed
-    assert len(list(tmp_path.glob("*.svg"))) == 3
+    assert "vts-me_n_4.patch.flat.transmission.witness · error of a nodal force " in printed
+    assert "vts-me:n=4 patch.flat.transmission fail" in printed
+    assert "slave   ●─" in printed
+    assert [*tmp_path.glob("vts-me_n_4.patch.flat.transmission.*svg")]
 
 
 @pytest.mark.parametrize("make", [small_run, run_with_kinds])
