@@ -199,7 +199,7 @@ class Driver:
         self._rows: dict[_Key, OpenRow | Row] = {}
         self._first_calls: dict[str, float] = {}  # {formulation: seconds of a pairing and a residual}
         self._first: dict[_Key, dict[int, Outcome]] = {}  # The outcomes of the first round.
-        self._first_wrong: list[Row] = []
+        self._first_wrong: dict[_Key, Row] = {}  # What fails in it, or again.
         self._whole: _Key | None = None  # The row that is judged although its formulation is asked nothing more.
         # Properties with the same cases. Those that state a turn come first, and those that solve bodies last: they
         # take long.
@@ -299,14 +299,15 @@ class Driver:
                 yield Job(judge_cases, (question, subject, chunk, self._store.writer(*key, 0), {}), note, before)
 
     def _note_first_cases(self, row: OpenRow, before: Progress, judged: tuple[Sequence[Outcome], str]) -> None:
-        key, outcomes = (row.subject.name, row.question.id), judged[0]
+        key, (outcomes, write_error) = (row.subject.name, row.question.id), judged
+        self._store.write_error = self._store.write_error or write_error
         self._meter.measure(row.question.id, outcomes)
         if not row.question.restarts:
             self._first[key] = dict(enumerate(outcomes))
         row.add(0, outcomes)
         row.judge(on_scene=False)
         if row.row.verdict in (Verdict.FAIL, Verdict.CRASHED) and row.row.result is not Result.FAILS_AS_STATED:
-            self._first_wrong.append(row.row)
+            self._first_wrong[key] = row.row
             self._report(replace(before, count=before.planned, row=row.row))
 
     def _work_to_first_failure(self) -> None:
@@ -314,7 +315,7 @@ class Driver:
 
         All jobs of some properties end before the row is chosen, so that it depends on no clock.
         """
-        rows = [row for row in self._first_wrong if row.unexpected]
+        rows = [row for row in self._first_wrong.values() if row.unexpected]
         rows.sort(key=lambda row: next(each.turn for each in self._questions if each.id == row.property_id))
         while self._groups and not rows:
             self._scheduler.work(chain.from_iterable(self._parts_of_next()))
@@ -338,8 +339,9 @@ class Driver:
 
     def _note_earlier_failure(self, before: Progress, subject: Subject, question: Property, outcome: Outcome) -> None:
         if outcome.verdict in (Verdict.FAIL, Verdict.CRASHED):
-            self._fail_again[subject.name, question.id] = outcome
-            self._report(replace(before, count=1, row=row_of_case(question, subject, outcome)))
+            key = subject.name, question.id
+            self._fail_again[key], self._first_wrong[key] = outcome, row_of_case(question, subject, outcome)
+            self._report(replace(before, count=1, row=self._first_wrong[key]))
 
     def _stop_wrong(self) -> None:
         """Note the formulations of which the first properties have shown what may explain every failure to come."""

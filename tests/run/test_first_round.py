@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from subjects import ResidualAlone
-from test_run import ZERO, measure_residual, sizes, subject
+from test_run import ZERO, a_case, measure_residual, sizes, subject
 
 from contactverif import Case, Property, Subject
 from contactverif.contract.case import Cases
@@ -15,6 +15,7 @@ from contactverif.contract.property import Measurement
 from contactverif.contract.result import OPPOSITE_SIGN, Result
 from contactverif.run.run import Stop, run
 from contactverif.run.scheduler import Progress
+from contactverif.run.store import Store
 from contactverif_nts import nts_ar
 
 FIRST = replace(ZERO, id="patch.first", cases=Cases.random(lambda _: sizes()), turn=0, promise=lambda traits: True)
@@ -103,3 +104,12 @@ def test_a_run_can_stop_at_the_first_row_that_is_wrong(
     assert [row.property_id for row in result.rows if row.result is Result.BROKEN_PROMISE] == [failing][: bool(failing)]
     reasons = {row.reason for row in result.rows if row.omitted}
     assert reasons == ({f"not asked: mine {failing} is wrong (-x)"} if failing else set())
+
+
+def test_what_fails_again_is_the_first_row_that_is_wrong() -> None:
+    store = Store()
+    store.failures = {("mine", "patch.late"): a_case(55)}
+    right = replace(FIRST, cases=Cases.random(lambda _: sizes(50)))
+    stop: Stop = "failure"
+    result = run([subject(wrong_if_large)], [right, LATE], examples=20, seed=1, stop=stop, shrink="none", store=store)
+    assert [(row.judged, row.result) for row in result.rows] == [(0, Result.OMITTED), (20, Result.BROKEN_PROMISE)]
