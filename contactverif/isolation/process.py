@@ -92,6 +92,7 @@ class PluginProcess:
         if box is not None and self._group is not None:
             command = self._group.join(boxes.enclose(tuple(command), box, limits.memory))
         try:
+            self.output.start()  # Before the process, which nobody would end if there were no thread for its output.
             with PINNING.on_one_core():
                 self._child = Child.start(
                     command,
@@ -100,7 +101,6 @@ class PluginProcess:
                     files=[self._progress.fileno()],
                     output=self.output.end,
                 )
-            self.output.start()
         except (OSError, RuntimeError) as error:  # The user may have as many processes or threads as the system allows.
             self._progress.close()
             words = getattr(error, "strerror", error)

@@ -75,8 +75,9 @@ def worker_pool(jobs: int, *, parent_judges: bool = False) -> Iterator[Executor 
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - before:
             worker.terminate()
-        for child in psutil.Process().children():
-            # A worker that the server has yet to start would find nothing of this process, and print a traceback.
+        # A worker that the server has yet to start would find nothing of this process, and print a traceback. With the
+        # server the workers of another pool would end.
+        for child in () if before else psutil.Process().children():
             with suppress(psutil.Error):
                 if any("multiprocessing.forkserver" in word for word in child.cmdline()):
                     child.kill()

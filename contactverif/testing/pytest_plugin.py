@@ -4,6 +4,8 @@ Rule: every pytest run of a user who has installed contactverif loads this file.
 before a marked test is collected.
 """
 
+from __future__ import annotations  # Old versions of pytest lack some names of the annotations.
+
 import secrets
 from collections.abc import Iterator
 from typing import Any
