@@ -1,17 +1,17 @@
-"""Verify formulations on the interface of your own mesh, in any format that meshio reads.
+"""Verify formulations on the interface of your own mesh, in any format that meshlane reads.
 
 The slave and the master are physical groups of line elements. The harness keeps the mesh and draws random states on it.
 On the command line: `contactverif verify vts-ppt --mesh punch.msh --slave punch --master base`.
 """
 
-import meshio
+import meshlane
 import numpy as np
 
 from contactverif import load_formulation, load_properties, read_interface, verify
 
 # A punch of two triangles on a base of two squares. A real mesh comes from a mesh generator.
 points = np.array([[0, 0], [2, 0], [4, 0], [0, -1], [2, -1], [4, -1], [1, 0], [2.5, 0], [3, 0], [2, 1]], float)
-mesh = meshio.Mesh(
+mesh = meshlane.Mesh(
     np.column_stack([points, np.zeros(len(points))]),
     [
         ("quad", [[3, 4, 1, 0], [4, 5, 2, 1]]),

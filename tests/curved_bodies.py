@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import meshio
+import meshlane
 import numpy as np
 
 NUMBERS = {"top": (1, 1), "bottom": (2, 1), "arc": (3, 1), "lid": (4, 1), "base": (5, 2), "punch": (6, 2)}
@@ -25,13 +25,13 @@ def write_curved_bodies(path: Path, *, cells: str = "quad", with_base: bool = Tr
         parts = (("triangle", triangles), ("quad", quad[split:]))
         blocks += [(kind, part, number) for kind, part in parts if len(part)]
     tags = [np.full(len(part), number) for _, part, number in blocks]
-    mesh = meshio.Mesh(
+    mesh = meshlane.Mesh(
         np.column_stack([points, np.zeros(len(points))]),
         [(kind, part) for kind, part, _ in blocks],
         cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
         field_data={name: np.array(value) for name, value in NUMBERS.items()},
     )
-    meshio.write(path, mesh, file_format="gmsh22", binary=False)
+    meshlane.write(path, mesh, file_format="gmsh22", binary=False)
     return path
 
 

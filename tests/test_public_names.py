@@ -49,7 +49,19 @@ PUBLIC = {
 }
 NAMES = [(module, name) for module, names in PUBLIC.items() for name in sorted(names)]
 # Packages that take long to import, of which `import contactverif` needs none.
-HEAVY = {"numpy", "scipy", "numba", "skfem", "hypothesis", "xarray", "netCDF4", "matplotlib", "meshio", "typer", "rich"}
+HEAVY = {
+    "numpy",
+    "scipy",
+    "numba",
+    "skfem",
+    "hypothesis",
+    "xarray",
+    "netCDF4",
+    "matplotlib",
+    "meshlane",
+    "typer",
+    "rich",
+}
 HEAVY |= {"jax"}
 
 

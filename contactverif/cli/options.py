@@ -224,33 +224,29 @@ def read_place(options: RunOptions) -> Interface | Case | None:
         from contactverif.problems.catalogue import load_scene
 
         return load_scene(options.scene).case()
-    mesh, slave, master = options.mesh, options.slave, options.master
-    if mesh is None:
-        for option in ("slave", "master", "flip", "material", "support"):
+    if options.mesh is None and (options.slave is None or options.master is None):
+        for option in ("slave", "master", "pair", "flip", "material", "support"):
             if getattr(options, option):
-                raise MisuseError("--mesh", f"none, but --{option}", "--mesh FILE, which the tags belong to")
+                raise MisuseError("--mesh", f"none, but --{option}", "--mesh FILE, which the groups belong to")
         return None
-    if slave is None or master is None:
-        missing = "--slave" if slave is None else "--master"
-        raise MisuseError(
-            missing, "nothing", f"{missing} TAG, a physical group of lines, or of faces in space, of {mesh}"
-        )
-    from contactverif.meshes.mesh_file import read_interface
-    from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support, read_scene
+    from contactverif.meshes.mesh_file import read_sides
+    from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support, scene_of
 
+    slave, master, materials = options.slave, options.master, dict(map(parse_material, options.material))
+    sides = read_sides(options.mesh, slave=slave, master=master, pair=options.pair, flip=options.flip)
+    words = sides.words.splitlines()
+    place: Interface | Case = sides.interface
     try:
-        materials = dict(map(parse_material, options.material))
-        supports = dict(map(parse_support, options.support))
-        scene = read_scene(mesh, slave=slave, master=master, flip=options.flip, materials=materials, supports=supports)
+        scene = scene_of(sides, materials, dict(map(parse_support, options.support)))
     except MisuseError as error:
         if options.material or options.support:
             raise
-        interface = read_interface(mesh, slave=slave, master=master, flip=options.flip)
-        typer.echo(f"contactverif: no bodies are solved: {error}", err=True)
-        return interface
-    for line in describe_bodies(scene):
+        words.insert(0, f"the interface alone is asked, no bodies are solved: {error}")
+    else:
+        place, words = scene.case(), words + describe_bodies(scene)
+    for line in words:
         typer.echo(f"contactverif: {line}", err=True)
-    return scene.case()
+    return place
 
 
 @dataclass(frozen=True, slots=True)

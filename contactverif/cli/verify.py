@@ -257,7 +257,7 @@ def versions_of(options: RunOptions) -> dict[str, str]:
     """Return the versions of all libraries, and a digest of the code of the harness and of the plugins."""
     versions = collect_versions() | code_digests(options.names, options.properties)
     if options.scene_file is not None:
-        from contactverif.meshes.scene_file import digest_scene_file  # It imports meshio.
+        from contactverif.meshes.scene_file import digest_scene_file  # It imports meshlane.
 
         versions[f"{CODE}scene file"] = digest_scene_file(options.scene_file)
     return versions

@@ -23,7 +23,7 @@ from contactverif.isolation.limits import Limits
 
 _READ, _FAILED = b"+", b"-"  # The first byte of an answer.
 _LONGEST_REASON = 300  # Characters of a message from a library.
-# meshio reads a million nodes of a text format in 10 s, and the arrays of so many are 0.1 GB. A report with a million
+# meshlane reads a million nodes of a text format in 10 s, and the arrays of so many are 0.1 GB. A report with a million
 # cases takes half a minute and 1 GB. Both files have tens of megabytes.
 _LEAST_SECONDS, _BYTES_A_SECOND, _MEGABYTES = 20.0, 1e6, 4096
 _NOT_ORDINARY = {

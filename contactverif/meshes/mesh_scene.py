@@ -21,7 +21,9 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
 from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
-from contactverif.meshes.mesh_file import MeshSides, check_facing, corners_of_cells, describe_place, read_sides
+from contactverif.meshes.cell_sides import plane_cells
+from contactverif.meshes.facing import describe
+from contactverif.meshes.mesh_file import MeshSides, read_sides
 from contactverif.meshes.plain_mesh import unknown_group_error
 
 YOUNG, POISSON = 1.0, 0.3  # The material of a body that the user says nothing about.
@@ -36,10 +38,11 @@ Support = tuple[float | None, float | None]
 
 
 def read_scene(
-    path: str | Path,
+    path: str | Path | None,
     *,
-    slave: str,
-    master: str,
+    slave: str | None = None,
+    master: str | None = None,
+    pair: int = 0,
     flip: bool = False,
     materials: Mapping[str, Material] | None = None,
     supports: Mapping[str, Support] | None = None,
@@ -47,19 +50,21 @@ def read_scene(
     """Read the two bodies around the interface between two groups of 2-node lines from a mesh file.
 
     A body whose supports are not given is held where its boundary looks away from the contact. That of the slave is
-    pushed towards the master, unless some given support moves.
+    pushed towards the master, unless some given support moves. What the reader has to say goes to standard error.
 
     Parameters
     ----------
-    path : str | Path
-        A file that meshio reads.
-    slave, master : str
-        The name or the number of a group each.
+    path : str | Path | None
+        As in `read_interface`.
+    slave, master : str | None
+        As in `read_interface`.
+    pair : int
+        As in `read_interface`.
     flip : bool
         As in `read_interface`.
     materials : Mapping[str, tuple[float, float]] | None
         {group: (Young's modulus, Poisson's ratio)}. The bodies to which members of the group belong have this
-        material; the others have E = 1, ν = 0.3.
+        material; the others have that of the file, or else E = 1, ν = 0.3.
     supports : Mapping[str, tuple[float | None, float | None]] | None
         {group: displacement along x and y, a length each}; None where the nodes of the group are free to move.
 
@@ -79,19 +84,27 @@ def read_scene(
 
         scene = read_scene("punch.msh", slave="punch", master="base", materials={"base body": (1000.0, 0.3)})
     """
-    sides = read_sides(path, slave=slave, master=master, flip=flip)
+    sides = read_sides(path, slave=slave, master=master, pair=pair, flip=flip)
+    scene = scene_of(sides, materials or {}, supports or {})
+    sys.stderr.write(sides.words)
+    return scene
+
+
+def scene_of(sides: MeshSides, materials: Mapping[str, Material], supports: Mapping[str, Support]) -> Scene:
+    """Return the scene of the sides of a mesh; arguments and errors are those of `read_scene`."""
+    if sides.points.shape[1] == 3:
+        raise MisuseError("--mesh", "faces in space", "lines in a plane: bodies in space are not solved")
     parts = _parts(sides)
-    _set_materials(sides, parts, materials or {})
-    _set_supports(sides, parts, supports or {})
+    _set_materials(sides, parts, sides.mesh.materials, given=False)
+    _set_materials(sides, parts, materials, given=True)
+    _set_supports(sides, parts, supports)
     for part in parts:
         if len(part.cells) and not part.has_supports:
             part.fixed[_far_nodes(part)] = True
     scene = _scene(parts)
-    check_facing(scene.interface)
     if not any(part.imposed.any() for part in parts):
         _push_slaves(parts, scene)
         scene = _scene(parts)
-    sys.stderr.write(sides.mesh.warnings)
     return scene
 
 
@@ -133,7 +146,8 @@ class _Part:
 
 def _parts(sides: MeshSides) -> list[_Part]:
     """Return the bodies that slave or master lines belong to, slaves first, without material and supports."""
-    blocks = [turn_counter_clockwise(sides.points, corners) for corners in corners_of_cells(sides.mesh)]
+    corners = plane_cells(sides.mesh.cells).values()
+    blocks = [turn_counter_clockwise(sides.points, each) for each in corners]
     # Points that cells or lines join have the same label.
     joining = [*blocks, sides.slave, sides.master]
     first, second = np.vstack([np.column_stack([b[:, 0], corner]) for b in joining for corner in b.T[1:]]).T
@@ -142,7 +156,7 @@ def _parts(sides: MeshSides) -> list[_Part]:
     of_slave, of_master = np.unique(labels[sides.slave]), np.unique(labels[sides.master])
     if both := set(of_slave.tolist()) & set(of_master.tolist()):
         node = sides.slave[np.isin(labels[sides.slave[:, 0]], list(both))][0, 0]
-        actual = f"lines of the body that has slave lines too, at {describe_place(sides.points, node)}"
+        actual = f"lines of the body that has slave lines too, at {describe(sides.points[node])}"
         raise MisuseError("--master", actual, "slave and master on bodies without a common node")
     parts = []
     for side, lines, its_labels in (("slave", sides.slave, of_slave), ("master", sides.master, of_master)):
@@ -171,17 +185,19 @@ def _one_shape(blocks: list[IntArray]) -> IntArray:
 
 def _points_of_group(sides: MeshSides, option: str, name: str) -> IntArray:
     """Return the points of all members of a group."""
-    if name not in sides.groups:
-        raise unknown_group_error(sides.mesh, sides.groups, option, name)
-    members = zip(sides.mesh.cells, sides.groups[name], strict=True)
-    return np.unique(np.concatenate([block.data[part != 0].reshape(-1) for block, part in members]))
+    if name not in sides.mesh.groups:
+        raise unknown_group_error(sides.mesh, option, name)
+    return np.unique(np.concatenate([data.reshape(-1) for data in sides.mesh.groups[name].values()]))
 
 
-def _set_materials(sides: MeshSides, parts: list[_Part], materials: Mapping[str, Material]) -> None:
+def _set_materials(sides: MeshSides, parts: list[_Part], materials: Mapping[str, Material], *, given: bool) -> None:
+    """Give bodies their material; what the user gives goes before what the file says."""
+    for part in parts:
+        part.material_of = ""
     for name, (young, poisson) in materials.items():
         points = _points_of_group(sides, "--material", name)
         bodies = [part for part in parts if len(part.cells) and np.isin(part.numbers, points).any()]
-        if not bodies:
+        if not bodies and given:
             actual = f"{name!r}, no member of which belongs to an elastic body"
             raise MisuseError("--material", actual, "a group with members in the body of slave or master")
         if not (0 < young < np.inf and -1 < poisson < 0.5):

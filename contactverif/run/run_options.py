@@ -150,6 +150,7 @@ class RunOptions:
     master: Annotated[
         str | None, Option("Group of the mesh's master lines, or faces in space.", "TAG", group=PLACE)
     ] = None
+    pair: Annotated[int, Option("Number of the contact pair of the mesh, if it has several.", "N", group=PLACE)] = 0
     flip: Annotated[bool, Option("Exchange inside and outside of the mesh's lines.", group=PLACE)] = False
     material: Annotated[
         tuple[str, ...],

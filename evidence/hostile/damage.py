@@ -29,7 +29,7 @@ from tables import markdown
 SECONDS = 60.0  # Far beyond the time that a command takes for a whole file.
 MEGABYTES = 1500  # More than twice what a command takes for a whole file.
 ENDINGS = ("as before", "other numbers", "one line", "noise", "traceback", "crash", "hang", "memory")
-NOTICES = ("Warning: ", "the report names ")  # meshio says what it skips, and `replay` what it runs.
+NOTICES = ("Warning: ", "the report names ")  # meshlane says what it skips, and `replay` what it runs.
 GOOD = frozenset(ENDINGS[:3])
 
 

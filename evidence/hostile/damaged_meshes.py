@@ -12,14 +12,14 @@ from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
-import meshio
+import meshlane
 import numpy as np
 from damage import BYTES, Campaign, Ending, main, run_command
 
 from contactverif import MisuseError, read_interface
 
 PUNCH = Path(__file__).parents[2] / "tests" / "data" / "punch.msh"
-# {file: (format of meshio, options of its writer, the groups)}, without those that need a further package.
+# {file: (format of meshlane, options of its writer, the groups)}, without those that need a further package.
 NAMES, BY_NUMBER = ("punch", "base"), ("-1", "2")
 FORMATS = {
     "ascii22.msh": ("gmsh22", {"binary": False}, NAMES),
@@ -39,7 +39,7 @@ SUFFIXES = (".msh", ".vtk", ".vtu", ".inp", ".mesh", ".su2", ".xdmf", ".med", ".
 NUMBERS = (b"-1", b"0", b"99999999", b"9999999999999999999", b"nan", b"inf", b"1e400", b"x", b"", b"2147483648", b"1.5")
 
 
-def members(mesh: meshio.Mesh, tags: list[np.ndarray], number: int) -> list[np.ndarray]:
+def members(mesh: meshlane.Mesh, tags: list[np.ndarray], number: int) -> list[np.ndarray]:
     """Return for each block the lines of a group."""
     return [
         np.flatnonzero((np.abs(part) == number) & (block.dim == 1))
@@ -52,7 +52,7 @@ def write_meshes(folder: Path) -> dict[str, bytes]:
     files = {}
     for name, (format_, options, _) in FORMATS.items():
         with redirect_stdout(StringIO()):
-            mesh = meshio.read(PUNCH, file_format="gmsh")
+            mesh = meshlane.read(PUNCH, file_format="gmsh")
             tags = mesh.cell_data["gmsh:physical"]
             if format_ not in ("gmsh22", "gmsh"):
                 mesh.cell_data, mesh.point_data = {KEYS.get(format_, "gmsh:physical"): tags}, {}
@@ -61,7 +61,7 @@ def write_meshes(folder: Path) -> dict[str, bytes]:
                     if format_ == "abaqus"
                     else {}
                 )
-            meshio.write(folder / name, mesh, file_format=format_, **options)
+            meshlane.write(folder / name, mesh, file_format=format_, **options)
         files[name] = (folder / name).read_bytes()
     return files
 

@@ -28,12 +28,12 @@ for words in sys.argv[1:]:
         assert not end.code, end.code
 print("\\nmodules:", *sorted(sys.modules))
 """
-SLOW = {"numba", "hypothesis", "numpy", "xarray", "matplotlib", "scipy", "netCDF4", "meshio", "pytest", "pandas"}
+SLOW = {"numba", "hypothesis", "numpy", "xarray", "matplotlib", "scipy", "netCDF4", "meshlane", "pytest", "pandas"}
 PANELS = ["Cases", "Results", "Earlier runs", "Mesh or scene", "Processes of plugins"]
 FOR_SOLVING = (
     *("contactverif.mechanics", "contactverif.problems.blocks", "contactverif.problems.catalogue"),
     *("contactverif.problems.disk", "contactverif.problems.hertz", "contactverif.studies"),
-    *("matplotlib", "meshio", "scipy.sparse.linalg", "skfem", "xarray"),
+    *("matplotlib", "meshlane", "scipy.sparse.linalg", "skfem", "xarray"),
 )
 ON_INTERFACES = "balance.* patch.flat.resultant total-stiffness unilateral projection.place purity"
 

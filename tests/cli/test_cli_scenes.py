@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-import meshio
+import meshlane
 import netCDF4
 import numpy as np
 import pytest
@@ -122,7 +122,7 @@ def test_draw_writes_for_paraview(ask: Ask, tmp_path: Path) -> None:
     answer = ask("draw --scene c -f vts-ppt", "--out", tmp_path / "c.vtu", "--out", tmp_path / "c.svg")
     assert answer.status == 0
     assert answer.out.endswith(f"picture: {tmp_path / 'c.svg'}\nfor ParaView: {tmp_path / 'c.vtu'}\n")
-    mesh, scene = meshio.read(tmp_path / "c.vtu"), load_scene("c")
+    mesh, scene = meshlane.read(tmp_path / "c.vtu"), load_scene("c")
     assert len(mesh.points) == sum(len(body.nodes) for body in scene.bodies)
     assert mesh.cell_data["pressure"][0] == pytest.approx(100.0)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c.svg", "c.vtu"]
@@ -338,7 +338,7 @@ def test_a_stored_case_in_space_is_written_for_paraview(ask: Ask, tmp_path: Path
         answer = ask(f"{command} --case nts-3d.patch.flat.transmission.witness --out", picture, report)
         assert answer.status == status
         assert f"for ParaView: {picture}\n" in answer.out
-        assert "exact_force" in meshio.read(picture).point_data
+        assert "exact_force" in meshlane.read(picture).point_data
     ask(f"verify nts {words}", plane)
     answer = ask("replay --case nts.patch.flat.transmission.witness --out", picture, plane)
     check_mistake(answer, r".*a case without bodies; needed a .png.*")

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import meshio
+import meshlane
 import pytest
 from asking import Answer, Ask, check_mistake, install_formulations, run_inline
 from fresh_process import MAIN
@@ -389,7 +389,7 @@ def test_a_mesh_of_the_user_is_judged(ask: Ask) -> None:
 
 def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask, tmp_path: Path) -> None:
     """Without cells nobody knows on which side the base lies; --flip says that it is the other one."""
-    mesh = meshio.read(PUNCH)
+    mesh = meshlane.read(PUNCH)
     number = int(mesh.field_data["base"][0])
     indices = [index for index, block in enumerate(mesh.cells) if block.type in ("line", "triangle")]
     tags = [mesh.cell_data["gmsh:physical"][index] for index in indices]
@@ -400,8 +400,8 @@ def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask,
             turns = name == "turned.msh" and block.type == "line" and (tag == number).all()
             blocks.append((block.type, block.data[:, ::-1] if turns else block.data))
         data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-        copy = meshio.Mesh(mesh.points, blocks, cell_data=data, field_data=mesh.field_data)
-        meshio.write(tmp_path / name, copy, file_format="gmsh22", binary=False)
+        copy = meshlane.Mesh(mesh.points, blocks, cell_data=data, field_data=mesh.field_data)
+        meshlane.write(tmp_path / name, copy, file_format="gmsh22", binary=False)
         words = "verify nts --slave punch --master base -p balance.force --examples 2 --seed 1 --mesh"
         right, wrong = sorted(
             (ask(words, tmp_path / name, *flip) for flip in ((), ("--flip",))), key=lambda a: a.status

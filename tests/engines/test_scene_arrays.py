@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import meshio
+import meshlane
 import msgspec
 import numpy as np
 import pytest
@@ -97,7 +97,7 @@ def test_long_messages_too(size: int) -> None:
 def test_a_file_of_a_scene_holds_its_bodies_and_edges(name: str, tmp_path: Path) -> None:
     arrays = load_scene(name).arrays()
     write_arrays(arrays, tmp_path / "scene.vtu")
-    mesh = meshio.read(tmp_path / "scene.vtu")
+    mesh = meshlane.read(tmp_path / "scene.vtu")
     np.testing.assert_array_equal(mesh.points[:, :2], arrays.nodes)
     np.testing.assert_array_equal(mesh.point_data["load"][:, :2], arrays.load)
     edges = {role: np.vstack([block.data[roles == role] for block, roles in blocks(mesh, "line")]) for role in (1, 2)}
@@ -106,11 +106,11 @@ def test_a_file_of_a_scene_holds_its_bodies_and_edges(name: str, tmp_path: Path)
     assert sum(len(block.data) for block in mesh.cells if block.type != "line") == len(arrays.cells)
 
 
-def blocks(mesh: meshio.Mesh, kind: str) -> list[tuple[meshio.CellBlock, np.ndarray]]:
+def blocks(mesh: meshlane.Mesh, kind: str) -> list[tuple[meshlane.CellBlock, np.ndarray]]:
     pairs = zip(mesh.cells, mesh.cell_data["role"], strict=True)
     return [(block, roles) for block, roles in pairs if block.type == kind]
 
 
 def test_an_ending_that_nobody_knows_is_a_mistake(tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match=r"an ending that meshio writes, such as \.vtu"):
+    with pytest.raises(MisuseError, match=r"an ending that meshlane writes, such as \.vtu"):
         write_arrays(load_scene("c").arrays(), tmp_path / "scene.xyz1")

@@ -1,15 +1,17 @@
 """Meshes from elsewhere: every format that is promised, every way to be wrong, each with its message."""
 
+import gzip
 from collections.abc import Callable
 from pathlib import Path
 
-import meshio
+import meshlane
 import numpy as np
 import pytest
 
 from contactverif import Interface, MisuseError
 from contactverif.meshes.mesh_file import check_facing, read_interface
 
+Capture = pytest.CaptureFixture[str]
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"
 # Two blocks, one above the other, a gap of 0.5 between them; lines of the lower one run left to right.
 POINTS = [[0, 0], [4, 0], [4, 1], [2, 1], [0, 1], [1, 1.5], [3, 1.5], [3, 2.5], [1, 2.5]]
@@ -20,12 +22,12 @@ NAMES = {"punch": np.array([1, 1]), "base": np.array([2, 1]), "bodies": np.array
 
 def blocks(
     *, points: object = POINTS, upper: object = UPPER, lower: object = LOWER, cells: object = (), line: str = "line"
-) -> meshio.Mesh:
+) -> meshlane.Mesh:
     """Return the two blocks in memory, their groups as physical groups; without cells unless they are given."""
     parts = [(line, np.array(upper)), (line, np.array(lower))] + ([("quad", np.array(cells))] if len(cells) else [])
     tags = [np.full(len(data), number) for number, (_, data) in enumerate(parts, 1)]
     points = np.column_stack([points, np.zeros(len(points))]) if np.shape(points)[1] == 2 else np.array(points)
-    return meshio.Mesh(
+    return meshlane.Mesh(
         points, parts, cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}, field_data=dict(NAMES)
     )
 
@@ -34,8 +36,8 @@ def blocks(
 def read(tmp_path: Path) -> Callable[..., Interface]:
     """Return a function that writes a mesh as .msh 2.2 and reads its interface; the punch is the slave."""
 
-    def written_and_read(mesh: meshio.Mesh, *, slave: str = "punch", master: str = "base", **more: bool) -> Interface:
-        meshio.write(tmp_path / "mesh.msh", mesh, file_format="gmsh22", binary=False)
+    def written_and_read(mesh: meshlane.Mesh, *, slave: str = "punch", master: str = "base", **more: bool) -> Interface:
+        meshlane.write(tmp_path / "mesh.msh", mesh, file_format="gmsh22", binary=False)
         return read_interface(tmp_path / "mesh.msh", slave=slave, master=master, **more)
 
     return written_and_read
@@ -73,8 +75,8 @@ def test_a_number_is_as_good_as_a_name() -> None:
 @pytest.mark.parametrize("binary", [False, True], ids=["ascii", "binary"])
 @pytest.mark.parametrize("version", ["gmsh22", "gmsh"])
 def test_gmsh_formats(version: str, binary: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mesh = meshio.read(PUNCH, file_format="gmsh")
-    meshio.write(tmp_path / "punch.msh", mesh, file_format=version, binary=binary)
+    mesh = meshlane.read(PUNCH, file_format="gmsh")
+    meshlane.write(tmp_path / "punch.msh", mesh, file_format=version, binary=binary)
     capsys.readouterr()
     interface = read_interface(tmp_path / "punch.msh", slave="1", master="base")
     assert points_of(interface) == points_of(read_interface(PUNCH, slave="punch", master="base"))
@@ -149,14 +151,14 @@ def test_formats_that_number_their_groups(name: str, tmp_path: Path) -> None:
     if name == "mesh.mesh":
         mesh.cell_data = {"medit:ref": mesh.cell_data["gmsh:physical"]}
     mesh.field_data = {}
-    meshio.write(tmp_path / name, mesh)
+    meshlane.write(tmp_path / name, mesh)
     assert points_of(read_interface(tmp_path / name, slave="1", master="2")) == RIGHT
 
 
 def test_second_order_cells_tell_the_side_by_their_corners(read: Callable[..., Interface]) -> None:
     points = [*POINTS, [2, 1.5], [2, 2], [1, 2]]
     mesh = blocks(points=points, lower=[[2, 3], [3, 4]], upper=[[6, 5]])
-    mesh.cells.append(meshio.CellBlock("triangle6", np.array([[5, 6, 8, 9, 10, 11]])))
+    mesh.cells.append(meshlane.CellBlock("triangle6", np.array([[5, 6, 8, 9, 10, 11]])))
     mesh.cell_data = {key: [*value, np.array([9])] for key, value in mesh.cell_data.items()}
     assert points_of(read(mesh)) == RIGHT
 
@@ -187,7 +189,7 @@ BOTH_SIDES = r"--slave: found a line with cells on both sides, at \(2, 1\); need
 CHANGES = r"--master: found a chain that changes the side of its body, at \("
 WRONG = {
     "line3": (blocks(upper=[[5, 6, 7]], lower=[[4, 2, 3]], line="line3"), "--slave: found 'punch' with elements line3"),
-    "z": (blocks(points=with_z(1.0)), "--mesh: found z from 1 to 3; needed a mesh in a plane of constant z"),
+    "z": (blocks(points=with_z(1.0)), "--mesh: found lines of a mesh of 4 × 0.5 × 2; needed lines in a plane"),
     "nan": (blocks(points=NAN), "--mesh: found NaN or infinity among its coordinates"),
     "shared": (blocks(upper=[[3, 6]]), r"--master: found a node of the slave surface too, at \(2, 1\)"),
     "branch": (blocks(lower=[[4, 3], [3, 2], [3, 0]]), r"--master: found 3 lines that meet at \(2, 1\); needed chains"),
@@ -201,7 +203,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("mesh", "message"), WRONG.values(), ids=WRONG)
-def test_wrong_meshes(mesh: meshio.Mesh, message: str, read: Callable[..., Interface]) -> None:
+def test_wrong_meshes(mesh: meshlane.Mesh, message: str, read: Callable[..., Interface]) -> None:
     with pytest.raises(MisuseError, match=message):
         read(mesh)
 
@@ -214,7 +216,7 @@ UNKNOWN = "which is no group of the file; needed"
     [
         ("pnch", "base", rf"--slave: found 'pnch', {UNKNOWN} 'punch'\? The groups are .*'base'"),
         ("zzz", "base", rf"--slave: found 'zzz', {UNKNOWN} one of '1' \(line\), "),
-        ("punch", "base body", "--master: found 'base body' with elements quad, no lines"),
+        ("punch", "base body", "--master: found 'base body' with elements quad; needed a group of lines of two nodes"),
         ("punch", "punch", "--master: found 'punch', which is the slave too"),
         ("punch", "1", "--master: found a node of the slave surface too"),
     ],
@@ -227,8 +229,8 @@ def test_wrong_groups(slave: str, master: str, message: str) -> None:
 def test_a_file_without_groups(tmp_path: Path) -> None:
     mesh = blocks()
     mesh.cell_data, mesh.field_data = {}, {}
-    meshio.write(tmp_path / "mesh.vtk", mesh)
-    with pytest.raises(MisuseError, match=f"--slave: found 'punch', {UNKNOWN} groups in the"):
+    meshlane.write(tmp_path / "mesh.vtk", mesh)
+    with pytest.raises(MisuseError, match=f"--slave: found 'punch', {UNKNOWN} groups of line, vertex elements"):
         read_interface(tmp_path / "mesh.vtk", slave="punch", master="base")
 
 
@@ -238,7 +240,7 @@ def test_unreadable_files(name: str, text: str, tmp_path: Path, capsys: pytest.C
     (tmp_path / name).write_text(text)
     with pytest.raises(MisuseError, match="--mesh: found "):
         read_interface(tmp_path / name, slave="punch", master="base")
-    assert capsys.readouterr() == ("", "")  # meshio prints; the message is ours to print
+    assert capsys.readouterr() == ("", "")  # meshlane prints; the message is ours to print
 
 
 def test_no_such_file(tmp_path: Path) -> None:
@@ -253,3 +255,96 @@ def test_facing_is_asked_of_the_whole_surface() -> None:
     for wrong in ([[0, 0], [2, 0]], [[3, 0], [3, 2]]):
         with pytest.raises(MisuseError, match="do not oppose each other"):
             check_facing(Interface.from_chains(roof, wrong))
+
+
+# Files as they come from elsewhere. The base is at y = 0, the punch at y = 0.05 above it; both are 1 wide.
+def two_squares(*, base: int = 3, punch: int = 6, axes: str = "xy") -> meshlane.Mesh:
+    """Return a square of two cells under one of a cell; `base` and `punch` are the first nodes of the groups."""
+    corners = [[0, -1], [0.5, -1], [1, -1], [0, 0], [0.5, 0], [1, 0], [0.1, 0.05], [0.9, 0.05], [0.1, 1], [0.9, 1]]
+    points = np.zeros((10, 3))
+    points[:, ["xyz".index(axis) for axis in axes]] = corners
+    lower = [[0, 1], [1, 2]] if base == 0 else [[3, 4], [4, 5]]
+    upper = [[8, 9]] if punch == 8 else [[6, 7]]
+    parts = [
+        ("line", np.array(upper)),
+        ("line", np.array(lower)),
+        ("quad", np.array([[0, 1, 4, 3], [1, 2, 5, 4], [6, 7, 9, 8]])),
+    ]
+    tags = [np.full(len(data), number) for number, (_, data) in enumerate(parts, 1)]
+    names = {"punch": np.array([1, 1]), "base": np.array([2, 1])}
+    return meshlane.Mesh(points, parts, cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}, field_data=names)
+
+
+SIDES = ([[0.1, 0.05], [0.9, 0.05]], [[1, 0], [0.5, 0], [0, 0]])
+
+
+@pytest.mark.parametrize("axes", ["xy", "xz", "yz"])
+def test_a_mesh_may_lie_in_any_plane_of_two_axes(axes: str, read: Callable[..., Interface], capfd: Capture) -> None:
+    assert points_of(read(two_squares(axes=axes))) == SIDES
+    said = f"the mesh lies in a plane of its {axes[0]} and {axes[1]}, which are x and y here\n"
+    assert capfd.readouterr().err == ("" if axes == "xy" else said)
+
+
+def test_surfaces_that_turn_their_backs_to_each_other(read: Callable[..., Interface], capfd: Capture) -> None:
+    backs = r"--mesh: found the slave at \(0.5, 1\) and the master at \(0.5, -1\), with their bodies between them"
+    with pytest.raises(MisuseError, match=backs):
+        read(two_squares(base=0, punch=8))
+    deep = two_squares()
+    deep.points[6:8, 1] = -0.9  # A shrink fit: 0.9 of the base is in the punch.
+    assert points_of(read(deep))[0] == [[0.1, -0.9], [0.9, -0.9]]
+    lines_only = two_squares(base=0, punch=8)
+    lines_only.cells[:] = lines_only.cells[:2]
+    lines_only.cells[0].data[:] = [[9, 8]]
+    lines_only.cell_data = {key: parts[:2] for key, parts in lines_only.cell_data.items()}
+    read(lines_only)
+    assert "turn their backs to each other, or overlap by more than a line's length" in capfd.readouterr().err
+
+
+def test_faces_that_turn_their_backs_to_each_other(tmp_path: Path) -> None:
+    cube = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
+    points = np.vstack([cube, cube * [0.5, 0.5, 1] + [0.25, 0.25, 1.1]])
+    solids = np.array([[0, 1, 3, 2, 4, 5, 7, 6]]) + [[0], [8]]
+    faces = {"inner": ([[8, 10, 11, 9]], [[4, 5, 7, 6]]), "outer": ([[12, 13, 15, 14]], [[0, 2, 3, 1]])}
+    for name, (upper, lower) in faces.items():
+        parts = [("quad", np.array(upper)), ("quad", np.array(lower)), ("hexahedron", solids)]
+        mesh = meshlane.Mesh(
+            points, parts, cell_data={"role": [np.full(len(data), k) for k, (_, data) in enumerate(parts)]}
+        )
+        mesh.write(tmp_path / f"{name}.vtu")
+    groups = {"slave": "role=0", "master": "role=1"}
+    assert len(read_interface(tmp_path / "inner.vtu", **groups).slave) == 1
+    with pytest.raises(
+        MisuseError, match=r"--mesh: found the slave at \(0.5, 0.5, 2.1\) and the master at \(0.5, 0.5, 0\)"
+    ):
+        read_interface(tmp_path / "outer.vtu", **groups)
+
+
+def test_a_set_of_nodes_is_the_boundary_between_them(tmp_path: Path) -> None:
+    mesh = two_squares()
+    mesh.cells[:], mesh.cell_data = mesh.cells[2:], {}
+    mesh.point_sets = {"punch": np.array([6, 7]), "base": np.array([3, 4, 5, 1]), "single": np.array([0])}
+    mesh.write(tmp_path / "mesh.inp")
+    assert points_of(read_interface(tmp_path / "mesh.inp", slave="punch", master="base")) == SIDES
+    with pytest.raises(MisuseError, match="--slave: found 'single', a set of 1 nodes without an edge or a face"):
+        read_interface(tmp_path / "mesh.inp", slave="single", master="base")
+
+
+@pytest.mark.parametrize("head", [b"\xef\xbb\xbf", b" \n", b"\x1f\x8b"], ids=["mark", "blank", "gzip"])
+def test_what_stands_before_a_file(head: bytes, tmp_path: Path) -> None:
+    data, name = PUNCH.read_bytes(), "a.msh" + ".gz" * (head == b"\x1f\x8b")
+    (tmp_path / name).write_bytes(gzip.compress(data) if name.endswith("gz") else head + data)
+    assert len(read_interface(tmp_path / name, slave="punch", master="base").slave) == 5
+
+
+def test_two_files_of_a_surface_each(tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+    for name, z, nodes in (("base", 0.0, [0, 1, 2]), ("punch", 0.1, [0, 2, 1])):
+        meshlane.Mesh(points + [0, 0, z], [("triangle", np.array([nodes]))]).write(tmp_path / f"{name}.stl")
+    slave, master = str(tmp_path / "punch.stl"), str(tmp_path / "base.stl")
+    interface = read_interface(None, slave=slave, master=master)
+    assert interface.nodes[:, 2].tolist() == [0.1, 0.1, 0.1, 0, 0, 0]
+
+
+def test_a_hole_in_a_chain_is_said(read: Callable[..., Interface], capfd: Capture) -> None:
+    read(blocks(points=[*POINTS, [1.5, 1]], lower=[[2, 3], [9, 4]]))
+    assert capfd.readouterr().err == "--master is several chains: no line from (2, 1) to (1.5, 1)\n"

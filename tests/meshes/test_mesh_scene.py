@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import meshio
+import meshlane
 import numpy as np
 import pytest
 from curved_bodies import write_curved_bodies
@@ -112,12 +112,12 @@ def test_a_body_that_surrounds_its_contact_is_held_on_its_other_boundary(tmp_pat
     cells = np.vstack([outer, outer + 32])
     lines = np.vstack([np.column_stack([ring, after]), np.column_stack([ring, after]) + 48])
     tags = [np.full(16, 1), np.full(16, 2), np.full(32, 3)]
-    mesh = meshio.Mesh(
+    mesh = meshlane.Mesh(
         np.vstack([radius * circle for radius in (1.1, 2.0, 0.5, 1.0)]),
         [("line", lines[:16]), ("line", lines[16:]), ("quad", cells)],
         cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
     )
-    meshio.write(tmp_path / "rings.msh", mesh, file_format="gmsh22", binary=False)
+    meshlane.write(tmp_path / "rings.msh", mesh, file_format="gmsh22", binary=False)
     scene = read_scene(tmp_path / "rings.msh", slave="2", master="1", materials={"3": (5.0, 0.0)})
     assert [body.fixed.all(axis=1).sum() for body in scene.bodies] == [16, 16]
     assert [body.imposed.any() for body in scene.bodies] == [False, False]

@@ -4,14 +4,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import meshio
+import meshlane
 import numpy as np
 import pytest
 from subjects import load_property, load_subject
 
 from contactverif import Interface, MisuseError
 from contactverif.contract.interface import turns_of
-from contactverif.meshes.mesh_file import read_interface, read_sides
+from contactverif.meshes.mesh_file import read_interface
+from contactverif.meshes.mesh_scene import read_scene
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.given_interface import close_surfaces, node_directions
@@ -41,12 +42,12 @@ def read(tmp_path: Path) -> Read:
         tags = [np.full(len(data), number) for number, (_, data) in enumerate(parts, 1)]
         data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
         names = {"punch": np.array([1, 2]), "base": np.array([2, 2])}
-        mesh = meshio.Mesh(np.array(points), parts, cell_data=data, field_data=names)
+        mesh = meshlane.Mesh(np.array(points), parts, cell_data=data, field_data=names)
         file = tmp_path / f"mesh{suffix}"
         if suffix == ".vtu":
             mesh.write(file)
             return read_interface(file, slave="1", master="2", **flip)
-        meshio.write(file, mesh, file_format="gmsh22", binary=False)
+        meshlane.write(file, mesh, file_format="gmsh22", binary=False)
         return read_interface(file, slave="punch", master="base", **flip)
 
     return written_and_read
@@ -102,13 +103,13 @@ def test_a_face_inside_a_body_is_refused(read: Read) -> None:
 
 def test_a_group_that_is_missing_is_named(tmp_path: Path) -> None:
     tags = {"cell_tags": [np.array([1, 1, 2, 2])]}
-    mesh = meshio.Mesh(POINTS, [("triangle", np.concatenate(TRIANGLES))], cell_data=tags)
+    mesh = meshlane.Mesh(POINTS, [("triangle", np.concatenate(TRIANGLES))], cell_data=tags)
     mesh.write(tmp_path / "mesh.vtu")
     assert len(read_interface(tmp_path / "mesh.vtu", slave="1", master="2").master) == 2
     with pytest.raises(MisuseError, match=r"--master: found '3', which is no group of the file; needed one of '1'"):
         read_interface(tmp_path / "mesh.vtu", slave="1", master="3")
     with pytest.raises(MisuseError, match="--mesh: found faces in space; needed lines in a plane: bodies in space are"):
-        read_sides(tmp_path / "mesh.vtu", slave="1", master="2", flip=False)
+        read_scene(tmp_path / "mesh.vtu", slave="1", master="2")
 
 
 def test_a_slave_is_bent_onto_the_master_it_faces(read: Read) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import meshio
+import meshlane
 import numpy as np
 import pytest
 from handmade_scene import PRESSURE, bodies, make_solved_scene
@@ -270,9 +270,9 @@ def test_curves_are_told_apart_without_colours() -> None:
     assert len({str(pen.style) for pen in pens}) == len({pen.marker for pen in pens}) == 6
 
 
-def read_back(scene: SolvedScene, folder: Path) -> meshio.Mesh:
+def read_back(scene: SolvedScene, folder: Path) -> meshlane.Mesh:
     write_vtu(scene, scene.solutions[0], folder / "a.vtu")
-    return meshio.read(folder / "a.vtu")
+    return meshlane.read(folder / "a.vtu")
 
 
 def in_triangles(scene: SolvedScene) -> SolvedScene:
@@ -359,7 +359,7 @@ def test_a_file_that_fails_leaves_the_one_that_was_there(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Figure, "savefig", fail)
-    monkeypatch.setattr(meshio, "write", lambda path, mesh, file_format: fail(mesh, path))
+    monkeypatch.setattr(meshlane, "write", lambda path, mesh, file_format: fail(mesh, path))
     with pytest.raises(MisuseError, match="No space left"):
         WRITERS[name](target)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "before")]

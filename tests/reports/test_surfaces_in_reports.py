@@ -3,7 +3,7 @@
 from dataclasses import astuple
 from pathlib import Path
 
-import meshio
+import meshlane
 import numpy as np
 import pytest
 import xarray as xr
@@ -142,7 +142,7 @@ def test_forces_of_other_nodes_are_damage(failing_run: Run) -> None:
 def test_a_case_in_space_is_written_for_paraview(tmp_path: Path) -> None:
     subject, question = load_subject("nts-3d"), load_property("patch.flat.transmission")
     write_surfaces(CROSSED, forces_to_draw(question, CROSSED, subject), tmp_path / "case.vtu")
-    mesh = meshio.read(tmp_path / "case.vtu")
+    mesh = meshlane.read(tmp_path / "case.vtu")
     assert np.array_equal(mesh.points, CROSSED.positions)
     assert [len(block) for block in mesh.cells] == [4]
     assert np.concatenate(mesh.cell_data["side"]).tolist() == [0, 0, 1, 1]
@@ -151,7 +151,7 @@ def test_a_case_in_space_is_written_for_paraview(tmp_path: Path) -> None:
     assert mesh.point_data["pressure"].max() == pytest.approx(1.5 * pressure)
     assert mesh.point_data["force"][:4].sum(axis=0) == pytest.approx([0, 0, pressure])
     write_surfaces(CROSSED, None, tmp_path / "bare.vtu")
-    assert meshio.read(tmp_path / "bare.vtu").point_data.keys() == {"node"}
+    assert meshlane.read(tmp_path / "bare.vtu").point_data.keys() == {"node"}
 
 
 def test_quadrilaterals_have_the_pressure_of_their_forces(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_quadrilaterals_have_the_pressure_of_their_forces(tmp_path: Path) -> Non
     case = Case(interface, interface.nodes.ravel())
     forces = np.repeat([[0, 0, 1.5], [0, 0, -1.5]], 4, axis=0)
     write_surfaces(case, NodalForces(forces), tmp_path / "case.vtu")
-    mesh = meshio.read(tmp_path / "case.vtu")
+    mesh = meshlane.read(tmp_path / "case.vtu")
     assert mesh.point_data["pressure"] == pytest.approx(np.full(8, 3.0))
     assert "exact_force" not in mesh.point_data
 

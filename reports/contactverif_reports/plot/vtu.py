@@ -87,13 +87,13 @@ def write_surfaces(case: Case, forces: NodalForces | None, path: str | os.PathLi
 
 
 def _write(path: str | os.PathLike[str], **arrays: Any) -> None:
-    import meshio
+    import meshlane
 
     target = checked_name(path, (".vtu",))
-    mesh = meshio.Mesh(**arrays)
+    mesh = meshlane.Mesh(**arrays)
     try:
         with whole(target) as part:
-            meshio.write(part, mesh, file_format="vtu")
+            meshlane.write(part, mesh, file_format="vtu")
     except OSError as error:
         raise MisuseError("path", f"{target}: {error.strerror}", "a file that can be written") from error
 

@@ -1,0 +1,110 @@
+"""The sides of cells: the edges of cells in a plane, the faces of cells in space, each with its cell behind it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import SEGMENT, turns_of
+from contactverif.meshes.facing import describe
+from contactverif.meshes.plain_mesh import CORNERS, Group
+
+# {kind: the corners of its faces}; which way round is found by the middle of the cell.
+_FACES = {
+    "tetra": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)),
+    "pyramid": ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    "wedge": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "hexahedron": ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
+_PLANE = ("triangle", "quad", "polygon")
+
+
+def corners_of(cells: Group, bases: tuple[str, ...]) -> dict[str, IntArray]:
+    """Return the corners (n_cells, n_corners) of the cells of some kinds, also of those of higher order."""
+    found: dict[str, list[IntArray]] = {}
+    for kind, data in cells.items():
+        base = next((base for base in bases if base in kind.lower()), None)
+        if base is not None:  # Corners come first, nodes on edges last.
+            corners = data[:, : CORNERS.get(base)]
+            found.setdefault(base if base in CORNERS else kind, []).append(corners)
+    return {kind: np.concatenate(parts) for kind, parts in found.items()}
+
+
+def plane_cells(cells: Group) -> dict[str, IntArray]:
+    """Return the corners of the cells of two dimensions."""
+    return corners_of(cells, _PLANE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CellSides:
+    """The sides of all cells of a mesh, by the number of their corners."""
+
+    points: FloatArray
+    outer: dict[int, IntArray]  # Those of one cell: the boundary of all bodies, each with its body behind it.
+    inner: dict[int, IntArray]  # Those of several cells, their nodes ascending.
+
+    @classmethod
+    def of(cls, cells: Group, points: FloatArray) -> "CellSides":
+        """Return the sides of the cells of a mesh in a plane, or in space if its points have three coordinates."""
+        sides: dict[int, list[IntArray]] = {}
+        if points.shape[1] == 2:
+            for corners in plane_cells(cells).values():
+                x, y = np.moveaxis(points[corners] - points[corners[:, :1]], -1, 0)  # (n_cells, n_corners) each
+                twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+                turned = np.where(twice_area[:, None] < 0, corners[:, ::-1], corners)[twice_area != 0]
+                edges = np.stack([turned, np.roll(turned, -1, axis=1)], axis=-1).reshape(-1, 2)
+                sides.setdefault(SEGMENT, []).append(edges)
+        else:
+            for kind, corners in corners_of(cells, tuple(_FACES)).items():
+                middles = points[corners].mean(axis=1)
+                for face in _FACES[kind]:
+                    nodes = corners[:, face]
+                    ways = points[nodes].mean(axis=1) - middles
+                    out = (turns_of(points[nodes]).sum(axis=1) * ways).sum(axis=1)
+                    turned = np.where(out[:, None] < 0, nodes[:, ::-1], nodes)[out != 0]
+                    sides.setdefault(len(face), []).append(turned)
+        outer, inner = {}, {}
+        for count, parts in sides.items():
+            every = np.concatenate(parts)
+            ascending = np.sort(every, axis=1)
+            order = np.lexsort(ascending.T)
+            is_new = np.r_[True, (np.diff(ascending[order], axis=0) != 0).any(axis=1)][: len(every)]
+            counts = np.diff(np.r_[np.flatnonzero(is_new), len(every)])
+            outer[count] = every[np.sort(order[is_new][counts == 1])]
+            inner[count] = ascending[order[is_new][counts > 1]]
+        return cls(points, outer, inner)
+
+    def between(self, nodes: IntArray, count: int) -> IntArray:
+        """Return the boundary (n, count) all corners of which are in a set of nodes."""
+        outer = self.outer.get(count, np.empty((0, count), dtype=np.int64))
+        return outer[np.isin(outer, nodes).all(axis=1)]
+
+    def around(self, *elements: IntArray) -> IntArray:
+        """Return the boundary without some elements of a surface; quadrilaterals are split into triangles."""
+        excluded = {tuple(sorted(corners)) for part in elements for corners in part.tolist()}
+        parts = []
+        for count, outer in self.outer.items():
+            others = outer[[tuple(sorted(corners)) not in excluded for corners in outer.tolist()]]
+            parts += [others] if count != 4 else [others[:, :3], others[:, [0, 2, 3]]]
+        return np.vstack(parts) if parts else np.empty((0, self.points.shape[1]), dtype=np.int64)
+
+    def signs(self, argument: str, elements: IntArray) -> IntArray:
+        """Return 1 for each element (n, n_corners) with a cell behind it, −1 with one before it, 0 without a cell."""
+        count = elements.shape[1]
+        inner = self.inner.get(count, np.empty((0, count), dtype=np.int64))
+        inside = set(map(tuple, inner[np.isin(inner, elements).all(axis=1)].tolist()))
+        outer = {tuple(sorted(side)): side for side in self.between(np.unique(elements), count).tolist()}
+        signs = np.zeros(len(elements), dtype=np.int64)
+        for number, corners in enumerate(elements.tolist()):
+            key = tuple(sorted(corners))
+            if key in inside:
+                kind, needed = ("line", "lines") if count == SEGMENT else ("face", "faces")
+                actual = f"a {kind} with cells on both sides, at {describe(self.points[corners[0]])}"
+                raise MisuseError(argument, actual, f"{needed} on the boundary of a body")
+            if key in outer:
+                first, second, *_ = outer[key]
+                place = corners.index(first)
+                follows = place == 0 if count == SEGMENT else corners[(place + 1) % count] == second
+                signs[number] = 1 if follows else -1
+        return signs

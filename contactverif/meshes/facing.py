@@ -1,0 +1,116 @@
+"""Whether two surfaces of a mesh can touch: their normals oppose each other, and no body lies between them."""
+
+import numpy as np
+
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import ONE_SIDED, Interface, Surface, turns_of
+
+_RAYS = 50  # So many elements of a surface are asked what lies behind them.
+
+
+def check_facing(interface: Interface) -> None:
+    """Refuse two surfaces whose mean normals, weighted by length or area, do not oppose each other."""
+    slave, master = (_mean_normal(surface, interface.nodes) for surface in (interface.slave, interface.master))
+    if slave is None or master is None or slave @ master < 0:
+        return
+    words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in (slave, master)]
+    if interface.dim == 2:
+        side, cells, elements = "with its body on the left of its lines", "2-D", "lines"
+        turn = "; or turn the lines of one group in the mesher (Gmsh: a minus sign before its curves)"
+    else:
+        side, cells, elements, turn = "seen from outside its body", "volume", "faces", ""
+    needed = (
+        f"surfaces that face each other, each {side}. Keep the {cells} cells in the file, they tell the side{turn}; or "
+        f"give --flip where only one surface has cells beside it (it turns the {elements} without cells, and both "
+        "surfaces where neither or each has cells)"
+    )
+    actual = f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other"
+    raise MisuseError("--mesh", actual, needed)
+
+
+def _mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray | None:
+    """Return the mean normal (dim,) out of the body; None where the surface is closed, or nearly so in space."""
+    if nodes.shape[1] == 3:
+        turns = turns_of(nodes[surface.faces]).sum(axis=1)
+        mean: FloatArray = turns.sum(axis=0) / np.linalg.norm(turns, axis=1).sum()
+        return mean if np.linalg.norm(mean) >= ONE_SIDED else None
+    # The normals of a closed chain sum to zero whichever way it runs. The sum over an open one telescopes.
+    starts = surface.segments[surface.neighbours[:, 0] < 0, 0]
+    ends = surface.segments[surface.neighbours[:, 1] < 0, 1]
+    if not len(starts):
+        return None
+    along = nodes[ends].sum(axis=0) - nodes[starts].sum(axis=0)
+    normal: FloatArray = np.array([along[1], -along[0]]) / surface.lengths(nodes).sum()
+    return normal
+
+
+def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary: IntArray) -> str:
+    """Return in words where two surfaces turn their backs to each other; empty if they do not.
+
+    Most elements of the slave see no master before them, and behind them the slave's own body ends before the master
+    comes. In a shrink fit, however deep, the master comes first.
+
+    Parameters
+    ----------
+    points : FloatArray
+        (n_points, dim)
+    slave, master : IntArray
+        (n, n_corners) The elements of both surfaces, each with its body behind it.
+    boundary : IntArray
+        (n, n_corners) All other elements around the bodies. Where there are none, a body ends behind an element as far
+        away as the element is wide.
+    """
+    master, boundary = _simplices(master), _simplices(boundary)
+    of_master, of_boundary = _normals(points[master]), _normals(points[boundary])
+    asked = slave[np.unique(np.linspace(0, len(slave) - 1, _RAYS).astype(np.int64))]
+    origins, normals = points[asked].mean(axis=1), _normals(points[_simplices(asked)[: len(asked)]])
+    votes, places = 0, ""
+    for origin, normal, element in zip(origins, normals, asked, strict=True):
+        ways = _ways(origin, normal, points[master])[of_master @ normal < 0]
+        behind = -ways[ways < 0].max(initial=-np.inf)
+        is_back = not np.isfinite(ways[ways >= 0]).any() and np.isfinite(behind)
+        if is_back:
+            ends = -_ways(origin, normal, points[boundary])[of_boundary @ normal < 0]
+            width = np.ptp(points[element], axis=0).max()
+            is_back = behind > (ends[ends > 0].min(initial=np.inf) if len(boundary) else width)
+        votes += 1 if is_back else -1
+        if is_back and not places:
+            there = origin - behind * normal
+            places = f"the slave at {describe(origin)} and the master at {describe(there)}"
+    return places if votes > 0 else ""
+
+
+def describe(place: FloatArray) -> str:
+    """Return a position in words."""
+    return f"({', '.join(f'{part:g}' for part in place)})"
+
+
+def _simplices(elements: IntArray) -> IntArray:
+    """Return lines, and faces as triangles: first a triangle of each face, then the other ones of quadrilaterals."""
+    return np.vstack([elements[:, :3], elements[:, [0, 2, 3]]]) if elements.shape[1] == 4 else elements
+
+
+def _normals(corners: FloatArray) -> FloatArray:
+    """Return the unit normals (n, dim) out of the body of lines (n, 2, 2) or triangles (n, 3, 3)."""
+    if corners.shape[2] == 2:
+        along = corners[:, 1] - corners[:, 0]
+        normals = np.column_stack([along[:, 1], -along[:, 0]])
+    else:
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    units: FloatArray = normals / np.linalg.norm(normals, axis=1)[:, None]
+    return units
+
+
+def _ways(origin: FloatArray, direction: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return how far along a unit vector lines or triangles are met, negative if backwards; infinity if not."""
+    relative = corners - origin
+    if corners.shape[2] == 2:
+        weights = (relative @ [-direction[1], direction[0]])[:, ::-1] * [1, -1]
+    else:
+        across = np.linalg.svd(direction[None])[2][1:]  # Two unit vectors normal to the direction and to each other.
+        second, third = (np.roll(relative @ across.T, -step, axis=1) for step in (1, 2))
+        weights = second[..., 0] * third[..., 1] - second[..., 1] * third[..., 0]
+    total = weights.sum(axis=1)
+    is_met = ((weights >= 0).all(axis=1) | (weights <= 0).all(axis=1)) & (total != 0)
+    return np.where(is_met, (weights * (relative @ direction)).sum(axis=1) / np.where(is_met, total, 1.0), np.inf)
