@@ -501,16 +501,21 @@ def paper(
 
 
 @done_in("listing")
-def list_scenes() -> None:
-    """List the named scenes, with drawings, and their options.
+def list_scenes(
+    path: Annotated[Path | None, typer.Argument(help="A mesh file instead.", metavar="FILE")] = None,
+) -> None:
+    """List the named scenes and their options; or what is in a mesh file.
 
-    A scene with options is written NAME:OPTION=VALUE,OPTION=VALUE.
+    A scene with options is written NAME:OPTION=VALUE,OPTION=VALUE. Of a mesh
+    file it lists the groups, for --slave and --master, and contact pairs.
 
     \bExit status
       0  listed
+      2  the file cannot be read; one line says why
 
     \bExamples
       contactverif scenes
+      contactverif scenes deck.inp
       contactverif draw --scene b -f vts-me -f vts-ppt --out b.png
       contactverif verify vts-ppt --scene c-prime:refine=4 -p 'patch.*'
     """

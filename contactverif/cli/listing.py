@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 from rich.text import Text
@@ -96,8 +97,13 @@ def _statements(traits: Traits, every_trait: bool) -> list[str]:
     return statements + [f"{property_id} fails on {case}" for property_id, case in sorted(evidence.witnesses.items())]
 
 
-def list_scenes() -> None:
-    """Show all scenes, then the meaning of their options."""
+def list_scenes(path: Path | None) -> None:
+    """Show all scenes, then the meaning of their options; or what is in a mesh file."""
+    if path is not None:
+        from contactverif.cli.mesh_screen import show_mesh
+
+        show_mesh(path)
+        return
     width = max(_NARROWEST, min(columns(), _WIDEST))
     show(*(text for name in SCENES for text in _scene(name, width)), *_options(width))
 

@@ -1,8 +1,11 @@
 """The sides of cells: the edges of cells in a plane, the faces of cells in space, each with its cell behind it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
@@ -34,6 +37,15 @@ def corners_of(cells: Group, bases: tuple[str, ...]) -> dict[str, IntArray]:
 def plane_cells(cells: Group) -> dict[str, IntArray]:
     """Return the corners of the cells of two dimensions."""
     return corners_of(cells, _PLANE)
+
+
+def label_bodies(parts: Iterable[IntArray], n_points: int) -> IntArray:
+    """Return a label of each point (n_points,); those that cells or lines join have the same one."""
+    ends = [np.column_stack([part[:, 0], corner]) for part in parts for corner in part.T[1:]]
+    first, second = np.vstack([np.empty((0, 2), dtype=np.int64), *ends]).T
+    graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(n_points, n_points))
+    labels: IntArray = csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+    return labels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

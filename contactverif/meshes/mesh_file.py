@@ -84,7 +84,7 @@ def read_sides(
     mesh = read_mesh(path) if path is not None else _two_files(slave, master)
     if path is not None and slave is None and master is None and mesh.pairs:
         slave, master = _pair(mesh, pair)
-    plane = _planar(mesh)
+    plane = planar(mesh)
     points, kinds = (mesh.points, _FACE_KINDS) if plane is None else (plane, ("line",))
     names = {"--slave": slave, "--master": master}
     for option, name in names.items():
@@ -102,7 +102,7 @@ def read_sides(
     if len(shared):
         actual = f"a node of the slave surface too, at {describe(points[shared[0]])}"
         raise MisuseError("--master", actual, "surfaces without a common node: two nodes where the bodies touch")
-    oriented, words = [], mesh.warnings + _plane_words(mesh, points)
+    oriented, words = [], mesh.warnings + plane_words(mesh, points)
     for option, side in sides.items():
         neighbours = _neighbours(option, points, side)
         words += _chain_words(option, points, side, neighbours)
@@ -164,7 +164,7 @@ def _two_files(slave: str | None, master: str | None) -> PlainMesh:
     return PlainMesh(np.concatenate(points), cells, groups, warnings=words)
 
 
-def _planar(mesh: PlainMesh) -> FloatArray | None:
+def planar(mesh: PlainMesh) -> FloatArray | None:
     """Return the positions (n_points, 2) of a mesh in a plane of two axes; None for one in space.
 
     The axes keep their order: a mesh in x and z is seen with x to the right and z up.
@@ -179,7 +179,7 @@ def _planar(mesh: PlainMesh) -> FloatArray | None:
     return np.delete(mesh.points, thin[0], axis=1) if thin else None
 
 
-def _plane_words(mesh: PlainMesh, points: FloatArray) -> str:
+def plane_words(mesh: PlainMesh, points: FloatArray) -> str:
     """Return which axes of the file are x and y here; empty where they are the same ones."""
     for axes in ("xz", "yz"):
         if mesh.points.shape[1] == 3 and points.shape[1] == 2:

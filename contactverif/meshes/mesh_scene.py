@@ -12,8 +12,6 @@ from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.body import Body
@@ -21,7 +19,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
 from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
-from contactverif.meshes.cell_sides import plane_cells
+from contactverif.meshes.cell_sides import label_bodies, plane_cells
 from contactverif.meshes.facing import describe
 from contactverif.meshes.mesh_file import MeshSides, read_sides
 from contactverif.meshes.plain_mesh import unknown_group_error
@@ -148,11 +146,7 @@ def _parts(sides: MeshSides) -> list[_Part]:
     """Return the bodies that slave or master lines belong to, slaves first, without material and supports."""
     corners = plane_cells(sides.mesh.cells).values()
     blocks = [turn_counter_clockwise(sides.points, each) for each in corners]
-    # Points that cells or lines join have the same label.
-    joining = [*blocks, sides.slave, sides.master]
-    first, second = np.vstack([np.column_stack([b[:, 0], corner]) for b in joining for corner in b.T[1:]]).T
-    graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(len(sides.points),) * 2)
-    labels = csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+    labels = label_bodies([*blocks, sides.slave, sides.master], len(sides.points))
     of_slave, of_master = np.unique(labels[sides.slave]), np.unique(labels[sides.master])
     if both := set(of_slave.tolist()) & set(of_master.tolist()):
         node = sides.slave[np.isin(labels[sides.slave[:, 0]], list(both))][0, 0]

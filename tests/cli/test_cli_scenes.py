@@ -52,6 +52,13 @@ CASE = "vts-me.patch.flat.transmission"
 # scenes
 
 
+def test_scenes_of_a_mesh_file_lists_its_groups(ask: Ask) -> None:
+    answer = ask("scenes tests/data/punch.msh")
+    assert re.search(r"punch or 1 +5 lines +2 +A", answer.out)
+    assert {"A" * 10, "B" * 10} <= {word[:10] for word in answer.out.split()}
+    assert "verify NAME --mesh tests/data/punch.msh --slave GROUP --master GROUP" in answer.out
+
+
 @pytest.mark.parametrize("columns", [1, 10])
 def test_a_terminal_that_is_too_narrow_cuts_what_it_shows(ask: Ask, columns: int) -> None:
     answer = ask("scenes", columns=columns)
@@ -235,7 +242,7 @@ def test_a_mesh_of_which_no_scene_can_be_made_is_an_interface_and_the_reason_is_
     path = write_curved_bodies(tmp_path / "curved.msh")
     on_one_body = f"--mesh {path} --slave lid --master bottom"  # Both look away from the other body.
     answer = ask(f"verify vts-ppt {on_one_body} --flip -p units -p newton.units {FEW}")
-    assert "contactverif: no bodies are solved: " in answer.err
+    assert "contactverif: the interface alone is asked, no bodies are solved: " in answer.err
     assert "  elastic bodies: newton.units\n" in answer.out
 
 

@@ -369,7 +369,10 @@ def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) 
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     canvas = np.full(len(places), " ")
     for name, body in (("master", master), ("slave", slave)):
-        canvas[_is_inside(body, places)] = _INKS[name]
+        following = np.roll(body.cells, -1, axis=1)
+        edges = {(a, b) for a, b in np.stack([body.cells, following], axis=-1).reshape(-1, 2).tolist()}
+        outer = body.nodes[np.array([edge for edge in edges if edge[::-1] not in edges])]
+        canvas[is_inside(outer, places)] = _INKS[name]
     arrows = [" "] * columns
     for place in slave.nodes[(slave.load != 0).any(axis=1)]:
         arrows[min(int((place[0] - left) / row * _ASPECT), columns - 1)] = "↓"
@@ -381,11 +384,8 @@ def silhouettes_as_text(case: Case, slave: Body, master: Body, width: int = 72) 
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _is_inside(body: Body, places: FloatArray) -> BoolArray:
-    """Return (n_places,) whether a place lies in a body: a ray from it crosses the boundary an odd number of times."""
-    following = np.roll(body.cells, -1, axis=1)
-    edges = {(a, b) for a, b in np.stack([body.cells, following], axis=-1).reshape(-1, 2).tolist()}
-    outer = body.nodes[np.array([edge for edge in edges if edge[::-1] not in edges])]  # (n_edges, 2, 2)
+def is_inside(outer: FloatArray, places: FloatArray) -> BoolArray:
+    """Return (n_places,) whether a place is in a body: a ray crosses an odd number of its edges (n_edges, 2, 2)."""
     (x1, y1), (x2, y2) = outer[:, 0].T, outer[:, 1].T
     x, y = places.T[:, :, None]
     crosses = (y1 > y) != (y2 > y)

@@ -1,0 +1,87 @@
+"""The work of `scenes FILE`: what is in a mesh file, by the names that `--slave` and `--master` take."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from rich.text import Text
+
+from contactverif.cli.console import columns, line, show
+from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.meshes.cell_sides import CellSides, label_bodies
+from contactverif.meshes.mesh_file import planar, plane_words
+from contactverif.meshes.plain_mesh import Group, PlainMesh, read_mesh
+from contactverif_reports.plot.text import is_inside
+from contactverif_reports.tables import Column, Table
+
+_WORDS = {
+    "vertex": "nodes",
+    "line": "lines",
+    "triangle": "triangles",
+    "quad": "quadrilaterals",
+    "tetra": "tetrahedra",
+    "hexahedron": "hexahedra",
+}
+_INKS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_ROWS, _ASPECT = 16, 2.2  # Rows of a drawing; a character is so many times as high as wide.
+
+
+def show_mesh(path: Path) -> None:
+    """Show the groups, the contact pairs and the materials of a mesh file, and draw a plane one."""
+    mesh = read_mesh(path)
+    plane = planar(mesh)
+    points, kinds = (mesh.points, ("triangle", "quad")) if plane is None else (plane, ("line",))
+    labels = label_bodies(mesh.cells.values(), len(points))
+    cells = [data for kind, data in mesh.cells.items() if kind not in ("vertex", "line")]
+    bodies = {label: number for number, label in enumerate(dict.fromkeys(_labels(labels, cells)), 1)}
+    able = [name for name, group in mesh.groups.items() if not group.keys().isdisjoint((*kinds, "vertex"))]
+    names: dict[tuple[object, ...], list[str]] = {}  # Gmsh's groups have a name and a number.
+    for name, group in mesh.groups.items():
+        names.setdefault(tuple((kind, data.tobytes()) for kind, data in group.items()), []).insert(0, name)
+    drawn = (each[0] for each in names.values() if not set(kinds).isdisjoint(mesh.groups[each[0]]))
+    inks = {} if plane is None else dict(zip(drawn, _INKS, strict=False))
+    listed = Table([Column("group", wrap=True), Column("of", wrap=True), Column("body"), Column("")], str(path))
+    for name, *others in names.values():
+        group = mesh.groups[name]
+        of_bodies = sorted({bodies[label] for label in _labels(labels, group.values()) if label in bodies})
+        words = ", ".join(map(str, of_bodies[:5])) + (" …" if len(of_bodies) > 5 else "")
+        listed.add(
+            " or ".join([name, *others]), _count(group), words, inks.get(name, "" if name in able else "not a side")
+        )
+    show(line(f"{len(points)} nodes; {_count(mesh.cells)}; bodies: {len(bodies)}"), listed.terminal())
+    said = (mesh.warnings + ("" if plane is None else plane_words(mesh, points))).splitlines()
+    said += [f"contact pair {n}: slave {slave}, master {master}" for n, (slave, master) in enumerate(mesh.pairs, 1)]
+    said += [f"material of {name}: E = {young:g}, ν = {poisson:g}" for name, (young, poisson) in mesh.materials.items()]
+    show(*map(line, said), *(() if plane is None else _drawing(mesh, points, inks)))
+    typed = "" if mesh.pairs else " --slave GROUP --master GROUP"
+    more = " --pair N" if len(mesh.pairs) > 1 else ""
+    show(line(f"to ask about it: contactverif verify NAME --mesh {path}{typed}{more}"))
+
+
+def _labels(labels: IntArray, parts: Iterable[IntArray]) -> list[int]:
+    """Return the labels of the first nodes of some cells, in their order."""
+    return [int(label) for part in parts for label in labels[part[:, 0]]]
+
+
+def _count(group: Group) -> str:
+    return ", ".join(f"{len(data)} {_WORDS.get(kind, kind)}" for kind, data in group.items()) or "nothing"
+
+
+def _drawing(mesh: PlainMesh, points: FloatArray, inks: dict[str, str]) -> Iterator[Text]:
+    """Yield a drawing to scale: bodies filled, and lines of groups by the letter of the table."""
+    outer = CellSides.of(mesh.cells, points).outer.get(2, np.empty((0, 2), dtype=np.int64))
+    lines = {ink: mesh.groups[name]["line"] for name, ink in inks.items()}
+    used = points[np.unique(np.concatenate([outer.reshape(-1), *(part.reshape(-1) for part in lines.values())]))]
+    if not len(used):
+        return
+    (left, low), (right, high) = used.min(axis=0), used.max(axis=0)
+    row = max((high - low) / _ROWS, (right - left) * _ASPECT / columns())
+    n_columns, n_rows = int((right - left) * _ASPECT / row) + 1, int((high - low) / row) + 1
+    x, y = left + (np.arange(n_columns) + 0.5) * row / _ASPECT, high - (np.arange(n_rows) + 0.5) * row
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    canvas = np.where(is_inside(points[outer], places), "░", " ").reshape(n_rows, n_columns)
+    for ink, part in lines.items():
+        for share in np.linspace(0, 1, max(n_columns, n_rows)):
+            along, down = ((1 - share) * points[part[:, 0]] + share * points[part[:, 1]]).T
+            canvas[((high - down) / row).astype(int), ((along - left) / row * _ASPECT).astype(int)] = ink
+    yield from (line("".join(each).rstrip()) for each in canvas.tolist())
