@@ -59,6 +59,8 @@ _OLD_OPTIONS = ("--report", "--html", "--picture", "--vtu")  # Options of earlie
 _STOPPED, _CLOSED_PIPE, _MISUSE = (130, 143), 128 + signal.SIGPIPE, 2  # Exit statuses, as shells and typer have them.
 _MOST_COLUMNS = 10_000
 _LEAST_MEMORY = 1 << 30  # Bytes of address space. The libraries of a plugin take about half of them.
+# What typer says of a value, with pydantic or without: what it has found, unless it leaves that out, and what it needs.
+_BAD_VALUE = re.compile(r"(?:Value error, )?(?:(.*) is not|Input should be) (one of .*|a valid \w+)")
 _COMMAND = re.compile(r"((?:^|[\r\n])[^\S\r\n]*:(?=:)|#(?=#\[))")  # White space alone stands before the first colon.
 
 
@@ -172,6 +174,10 @@ def _words_of_usage_error(error: Exception) -> str:
     if option in _OLD_OPTIONS:
         return f"{option}: found an option of an earlier version; needed --out FILE, whose ending says what is written"
     words = format_message()
+    if match := _BAD_VALUE.match(getattr(error, "message", "")):
+        found = match[1] or repr(getattr(error.__cause__, "errors", list)()[0]["input"])
+        name = error.param.opts[0]  # type: ignore[attr-defined]
+        return str(MisuseError(name, found, match[2].replace("'", "").rstrip(".")))
     command_path = getattr(getattr(error, "ctx", None), "command_path", "contactverif")
     return f"{words} (see {command_path} --help)" if words else ""  # Without arguments typer has shown the help.
 

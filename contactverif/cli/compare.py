@@ -217,11 +217,12 @@ def _compare_formulations(job: verify.Job, screen: Screen) -> int:
             study = run_comparison(reference, plugins.subjects[1:], plugins.questions, **options)
         if not screen.quiet:
             _show_verdicts(study, screen)
-        costs, last = _time_evaluations(plugins), summary(study.comparison.candidates, quiet=True)
+        is_timed = not screen.quiet or PAGE in job.files.paths  # What nobody reads is not waited for.
+        costs, last = _time_evaluations(plugins) if is_timed else (), summary(study.comparison.candidates, quiet=True)
         missing = partial(find_missing, study.run, *plugins, job.sampling)
         write = partial(_write_file, study, plugins, costs)
         end = verify.end_run(job, store, missing, write, promises_kept=study.comparison.candidates.promises_kept)
-        if not costs:
+        if is_timed and not costs:
             end = end._replace(status=verify.STOPPED)
             last.append("\nStopped before the time of an evaluation was known; all else is above.", "yellow")
     if job.pictures is not None:

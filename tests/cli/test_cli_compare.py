@@ -104,6 +104,7 @@ def test_the_verdicts_stay_if_nobody_waits_for_the_times(
     assert "an evaluation takes" not in answer.out
     assert answer.out.splitlines()[-1] == "Stopped before the time of an evaluation was known; all else is above."
     assert "No evaluation was timed." in read_page(tmp_path / "r.html").text
+    assert ask(f"{QUICK} -q").status == 0  # Without a page nothing is timed that is not printed.
     assert ask("report", tmp_path / "r.nc").status == 0
 
 

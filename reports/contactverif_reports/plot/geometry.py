@@ -67,8 +67,8 @@ class Course:
     def rotation(self) -> str:
         """Return the angle of a straight interface to the x axis in words; empty for none."""
         angle = float(np.degrees(np.arctan2(self.direction[1], self.direction[0])))
-        is_rotated = self.nearly_flat and abs(angle) > 1e-9
-        return f"rotated by {format_number(angle, 1e-9)}°" if is_rotated else ""
+        slack = float(np.degrees(self.roundoff / np.ptp(self.along)))  # Rounded ends of a line turn it by so much.
+        return f"rotated by {format_number(angle, slack)}°" if self.nearly_flat and abs(angle) > slack else ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
