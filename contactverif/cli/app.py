@@ -7,6 +7,8 @@ import re
 import signal
 import sys
 from collections.abc import Callable
+from glob import escape, iglob
+from importlib.metadata import Distribution
 from typing import Annotated
 
 import typer
@@ -14,7 +16,7 @@ import typer
 from contactverif import __version__
 from contactverif.cli import commands
 from contactverif.cli.options import spell_out
-from contactverif.contract.errors import ContactverifError, MisuseError, name_line, one_line
+from contactverif.contract.errors import ContactverifError, MisuseError, describe_error, name_line, one_line
 from contactverif.isolation.confine import ONE_THREAD, address_space
 
 app = typer.Typer(
@@ -98,6 +100,7 @@ def main() -> None:
         if address_space() < _LEAST_MEMORY:
             needed = f"at least {_LEAST_MEMORY >> 10} kB: with less, OpenBLAS may wait for memory for ever"
             raise MisuseError("ulimit -v", f"{address_space() / 1024:.0f} kB", needed)
+        _check_entry_points()
         status = app(prog_name="contactverif", standalone_mode=False)
         sys.stdout.flush()
     except Exception as error:
@@ -105,6 +108,19 @@ def main() -> None:
     if status in _STOPPED:
         typer.echo("contactverif: stopped", err=True)
     sys.exit(status or 0)
+
+
+def _check_entry_points() -> None:
+    """Check that the entry points of all distributions can be read: numba and hypothesis read those of everybody."""
+    for folder in sys.path:
+        for name in iglob(f"{escape(folder or '.')}/*.*-info/entry_points.txt"):
+            try:
+                if not os.path.isfile(name):  # Python would wait for what somebody writes into a pipe.
+                    raise OSError("no ordinary file")
+                _ = Distribution.at(os.path.dirname(name)).entry_points
+            except Exception as error:  # Python raises what it likes, such as a TypeError.
+                needed = "a file of entry points, which Python can read; remove this distribution or install it anew"
+                raise MisuseError(name, describe_error(error), needed) from None
 
 
 def obey_nothing(stream: io.TextIOWrapper) -> None:

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from contactverif.cli import begin_work
 from contactverif.cli.options import (
     EARLIER,
     Screen,
@@ -101,6 +102,7 @@ def verify(
     _start_processes(options)
     from contactverif.cli.verify import verify
 
+    begin_work()
     return verify(options, screen, resume)
 
 

@@ -12,10 +12,10 @@ from rich.text import Text
 
 from contactverif.cli.console import columns, line, show
 from contactverif.contract.result import NotLoaded
-from contactverif.contract.subject import OPTIONAL_PARTS, Subject
+from contactverif.contract.subject import ENGINE, OPTIONAL_PARTS, Subject
 from contactverif.contract.traits import Evidence, Traits
 from contactverif.isolation.remote import Wrapper
-from contactverif.plugins.registry import describe_engines, load_formulations, load_problems, load_properties
+from contactverif.plugins.registry import formulation_names, load_formulations, load_problems, load_properties
 from contactverif.problems.catalogue import BLOCKS, SCENES, load_scene, options_of
 from contactverif.run.run_options import RunOptions
 from contactverif_reports.plot.text import blocks_as_text, silhouettes_as_text
@@ -41,7 +41,8 @@ _NARROWEST, _WIDEST = 40, 96  # Columns of running text, whatever the terminal h
 
 def list_installed(options: RunOptions, traits: bool) -> None:
     """Show four tables; of the traits the most important ones or all."""
-    formulations = [_formulation(item, traits) for item in load_formulations(options.limits())]
+    installed, count = load_formulations(options.limits(), engines=True), len(formulation_names())
+    formulations = (_formulation(item, traits) for item in installed[:count])
     _show_table("formulations", ("name", "in", "patch test", "promises"), formulations)
     questions = (
         (item.formulation, "", _not_loaded(item))
@@ -55,7 +56,13 @@ def list_installed(options: RunOptions, traits: bool) -> None:
         for name, item in load_problems().items()
     )
     _show_table("problems", ("name", "what bench solves"), problems)
-    _show_table("engines", ("name", "what it is"), describe_engines().items())
+    engines = (
+        (item.formulation.removeprefix(ENGINE), _not_loaded(item))
+        if isinstance(item, NotLoaded)
+        else (item.name.removeprefix(ENGINE), getattr(item, "summary", ""))
+        for item in installed[count:]
+    )
+    _show_table("engines", ("name", "what it is"), engines)
 
 
 def _show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:

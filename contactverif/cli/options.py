@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin,
 import typer
 
 from contactverif.api.run_files import JSON, JUNIT, PAGE, PARAVIEW, PICTURES, REPORT, either
+from contactverif.cli import begin_work
 from contactverif.contract.errors import MisuseError
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, Option, RunOptions, declared_options, group_names
 
@@ -98,7 +99,9 @@ def done_in(module: str) -> Callable[[Callable[..., None]], Callable[..., int | 
     def decorate(command: Callable[..., None]) -> Callable[..., int | None]:
         @functools.wraps(command)
         def work(**values: Any) -> int | None:
-            status: int | None = getattr(import_module(f"contactverif.cli.{module}"), command.__name__)(**values)
+            work_of_module = getattr(import_module(f"contactverif.cli.{module}"), command.__name__)
+            begin_work()
+            status: int | None = work_of_module(**values)
             return status
 
         return work

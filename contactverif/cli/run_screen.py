@@ -184,7 +184,8 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
         examples = counterexamples(run).values() if first.verdict in (Verdict.FAIL, Verdict.CRASHED) else ()
         example = next((each for each in examples if each.row is first), None)
         if example is None:
-            yield fold(f"{first.property_id}: {first.result}: {_remark(first)}", width, STYLES[first.result], indent=2)
+            words = f"{first.property_id}: {first.result}: {_remark(first) or first.reason}"
+            yield fold(words, width, STYLES[first.result], indent=2)
         else:
             yield counterexample_text(example, report, width)
         yield Text("")
@@ -227,15 +228,23 @@ def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -
 def _words(row: Row, room: int) -> str:
     """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none.
 
-    Where there is no room for all, it is the name of the number that is cut.
+    What was done to the case, or the place, follows if there is room. If there is too little, the number's name is cut.
     """
     before = f"{row.unexpected}; " if row.unexpected not in ("", results.BROKEN_BY_FAILING, results.NOT_JUDGED) else ""
     behind = f"; known: {row.known}" if row.known else ""
     if row.verdict is not Verdict.FAIL or row.breach or row.closest is None or row.fails_in_words:
         return _shorten(f"{before}{row.reason}{behind}".removesuffix("; "), room)
-    number = row.closest.number
-    behind = f" {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}{behind}"
-    return _shorten(f"{before}{_shorten(number.quantity.name, room - len(before) - len(behind))}{behind}", room)
+    number, outcome = row.closest.number, row.witness if row.closest.case is None else row.outcomes[row.closest.case]
+    behind = f" {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}{behind}{_asked(row)}"
+    words = _shorten(f"{before}{_shorten(number.quantity.name, room - len(before) - len(behind))}{behind}", room)
+    finding = outcome.measurement.finding if outcome and outcome.measurement else None
+    places = (str(finding), finding.place, finding.place.partition(", ")[0]) if finding else ()
+    return next((f"{words}; {each}" for each in places if each and len(words) + 2 + len(each) <= room), words)
+
+
+def _asked(row: Row) -> str:
+    """Return how many cases a row has, if its run was stopped."""
+    return f"; {row.judged} of {row.planned} cases judged" if len(row.outcomes) < row.planned else ""
 
 
 def _shorten(words: str, room: int) -> str:
@@ -269,7 +278,7 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     """
     row, outcome = example.row, example.outcome
     words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
-    title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}"
+    title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}{_asked(row)}"
     text = indent_below(
         "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
         *chain.from_iterable(words),

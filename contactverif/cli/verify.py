@@ -189,6 +189,11 @@ class Job:
         """The file that the journal belongs to: the report, or else the page, or else another."""
         return next((self.files.names[suffix] for suffix in RUN_FILES if suffix in self.files.names), None)
 
+    @property
+    def journal(self) -> Path | None:
+        """The folder of the journal."""
+        return self.output and journal_folder(self.files.paths[self.output.suffix.lower()])
+
     def plan(self, shard: str = "") -> Plan:
         """Return the plan for the header of a journal."""
         options, versions, folder = self.options, versions_of(self.options), os.getcwd()
@@ -203,15 +208,14 @@ class Job:
         may end us, and then leaves no file.
         """
         first = load() if self.options.isolation is Isolation.INLINE else None
-        if self.output is None:
+        if (folder := self.journal) is None:
             yield first or load(), Store()
             return
         plan, outputs = self.plan(), tuple(self.files.paths.values())
-        folder = journal_folder(self.files.paths[self.output.suffix.lower()])
         with hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs) as aside:
             if aside:
-                folder_aside = self.output.parent / aside
-                echo(f"contactverif: the journal of a run that was stopped is now {folder_aside}", to_stderr=True)
+                words = f"contactverif: the journal of a run that was stopped is now {folder.with_name(aside)}"
+                echo(words, to_stderr=True)
             keep_earlier(folder, outputs)
             store = Store(plan, folder, self.sources)
             try:
@@ -407,7 +411,9 @@ def watch_for_stops(job: Job) -> Iterator[None]:
 
 def print_resume_hint(job: Job) -> None:
     """Print the line that goes on with a run."""
-    if job.again or job.output is not None:
+    if job.journal is not None and not job.again and not job.journal.exists():
+        typer.echo("nothing was judged")
+    elif job.again or job.output is not None:
         line = job.again or f"contactverif {job.command} --resume {shlex.quote(str(job.output))}"
         typer.echo(f"what was judged is kept; to go on: {line}")
     else:

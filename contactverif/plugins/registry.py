@@ -199,15 +199,6 @@ def has_engine(names: Sequence[str]) -> bool:
     return any(name.startswith(ENGINE) for name in names)
 
 
-def describe_engines() -> dict[str, str]:
-    """Return the installed engines, sorted, each with the first line of its docstring, or why it does not load."""
-    words = {}
-    for name, entries in entries_by_name(ENGINES).items():
-        make = load_entry(name, entries)
-        words[name] = f"not loaded: {make.reason}" if isinstance(make, NotLoaded) else _first_line(make)
-    return words
-
-
 def load_subject(text: str, limits: Limits | None = None) -> Subject | NotLoaded:
     """Load the formulation or the engine that a text names, as `load_formulation` does."""
     return load_engine(text, limits) if text.startswith(ENGINE) else load_formulation(text, limits)
@@ -324,14 +315,22 @@ def subject_of(name: str, make: Callable[..., Any]) -> Subject | NotLoaded:
         return NotLoaded(name, str(error))
 
 
-def load_formulations(limits: Limits | None = None) -> tuple[Subject | Wrapper | NotLoaded, ...]:
-    """Load all installed formulations with the defaults of their options; one that needs an option is `NotLoaded`."""
-    names = formulation_names()
+def load_formulations(
+    limits: Limits | None = None, *, engines: bool = False
+) -> tuple[Subject | Wrapper | NotLoaded, ...]:
+    """Load all installed formulations with the defaults of their options; with `engines` also those, which follow."""
+    names = [*formulation_names(), *(f"{ENGINE}{name}" for name in (entries_by_name(ENGINES) if engines else ()))]
     return tuple(map(load_with_defaults, names) if limits is None else remote.survey(_worker(), names, limits))
 
 
 def load_with_defaults(name: str) -> Subject | Wrapper | NotLoaded:
-    """Load what is installed under a name, with the defaults of its options: a wrapper or loader stands for itself."""
+    """Load what is installed under a name, with the defaults of its options.
+
+    A wrapper or loader stands for itself, and so does an engine, whose factory is not called.
+    """
+    if name.startswith(ENGINE):
+        factory = load_entry(plain := name.removeprefix(ENGINE), entries_by_name(ENGINES)[plain])
+        return factory if isinstance(factory, NotLoaded) else Wrapper(name, _first_line(factory), "")
     make = load_entry(name, entries_by_name(FORMULATIONS)[name])
     parameters = _parameters_of(make) if callable(make) else {}
     forms = {option: form for option, form in _NEEDED.items() if option in _required_among(parameters)}

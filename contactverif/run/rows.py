@@ -19,7 +19,7 @@ from typing import TypedDict
 from contactverif.contract import schema
 from contactverif.contract.case import Case, needs_of_place
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Outcome, Outcomes, Property, Verdict
+from contactverif.contract.property import FAILED, Outcome, Outcomes, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
 from contactverif.contract.traits import RULES, traits_behind
@@ -55,7 +55,7 @@ class RowOutcomes(Outcomes):
 
     def keeps_whole(self, number: int, outcome: Outcome) -> bool:
         """Return whether an outcome stays as it is if it gets this number; of failures the first few do."""
-        failed = outcome.verdict in (Verdict.FAIL, Verdict.CRASHED)
+        failed = outcome.verdict in FAILED
         return number < self._n_whole or (failed and self._n_failures < FAILURES)
 
     def may_keep_whole(self, first: int, outcomes: Iterable[Outcome]) -> bool:
@@ -176,14 +176,22 @@ class OpenRow:
         verdict, reason = verdict_of_row(row, self, on_scene=on_scene)
         self.row = replace(row, verdict=verdict, reason=reason)
 
-    def stop(self, examples: int) -> None:
-        """Make the row of a run, with so many random cases, that was stopped before all cases were judged."""
+    def stop(self, examples: int, asked: OpenRow | None) -> None:
+        """Make the row of a run, with so many random cases, that was stopped before all cases were judged.
+
+        Of cases that were `asked` in the first round count those that are not judged again.
+        """
+        if asked is not None and not len(self.outcomes):
+            self.outcomes, self.n_finished = asked.outcomes, self.n_finished + asked.n_finished
         outcomes = tuple(chain(self.outcomes, *(self._waiting[first] for first in sorted(self._waiting))))
         planned = self.planned or (examples if self.listed is None else len(self.listed))
-        reason = f"stopped: {self.n_finished} of {planned} cases judged"
-        reason += ", the witness not yet" if self.n_finished == planned else ""
+        stopped = f"stopped: {self.n_finished} of {planned} cases judged"
+        stopped += ", the witness not yet" if self.n_finished == planned else ""
         row = self._row_of(outcomes, planned, self._witness_outcome)
-        self.row = replace(row, verdict=Verdict.NOT_JUDGED, reason=reason)
+        verdict, reason = judge.verdict_over_all(row)
+        if verdict not in FAILED:
+            verdict, reason = Verdict.NOT_JUDGED, stopped
+        self.row = replace(row, verdict=verdict, reason=reason)
 
     def _row_of(self, outcomes: Sequence[Outcome], planned: int, witness: Outcome | None) -> Row:
         seconds = sum(outcome.seconds for outcome in outcomes)

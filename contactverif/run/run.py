@@ -61,7 +61,7 @@ _Key = tuple[str, str]  # A formulation, and the id of a property.
 
 
 class RunStopped(KeyboardInterrupt):
-    """The user has stopped a run: a row that is not complete is not judged, and its reason says so."""
+    """The user has stopped a run: a row that is not complete is not judged, unless one of its cases fails."""
 
     def __init__(self, run: Run) -> None:
         super().__init__("the run was stopped")
@@ -198,7 +198,7 @@ class Driver:
         self._share, self._shrink, self._stop = share, shrink, stop
         self._rows: dict[_Key, OpenRow | Row] = {}
         self._first_calls: dict[str, float] = {}  # {formulation: seconds of a pairing and a residual}
-        self._first: dict[_Key, dict[int, Outcome]] = {}  # The outcomes of the first round.
+        self._first: dict[_Key, OpenRow] = {}  # The rows of the first round, with a few of their cases.
         self._first_wrong: dict[_Key, Row] = {}  # What fails in it, or again.
         self._whole: _Key | None = None  # The row that is judged although its formulation is asked nothing more.
         # Properties with the same cases. Those that state a turn come first, and those that solve bodies last: they
@@ -302,8 +302,7 @@ class Driver:
         key, (outcomes, write_error) = (row.subject.name, row.question.id), judged
         self._store.write_error = self._store.write_error or write_error
         self._meter.measure(row.question.id, outcomes)
-        if not row.question.restarts:
-            self._first[key] = dict(enumerate(outcomes))
+        self._first[key] = row
         row.add(0, outcomes)
         row.judge(on_scene=False)
         if row.row.verdict in (Verdict.FAIL, Verdict.CRASHED) and row.row.result is not Result.FAILS_AS_STATED:
@@ -356,7 +355,7 @@ class Driver:
                 self._stopped[name] = f"{property_id} fails"
 
     def result(self, not_loaded: tuple[NotLoaded, ...], profile: str) -> Run:
-        """Return the run with all rows as far as they are judged; one that is not complete says so."""
+        """Return the run with all rows as far as they are judged."""
         sampling = self._sampling
         provenance = collect_provenance(profile=profile, examples=sampling.examples, seed=sampling.seed)
         provenance |= places(self._subjects)
@@ -365,9 +364,10 @@ class Driver:
         provenance |= self._store.provenance()
         while self._groups:
             self._open_next()
-        for row in self._rows.values():
+        for key, row in self._rows.items():
             if isinstance(row, OpenRow) and not row.complete:
-                row.stop(sampling.examples)
+                row.stop(sampling.examples, self._first.get(key))
+                self._shrink_row(row, shrinks=False)
         rows = [self._rows[subject.name, question.id] for subject, question in product(self._subjects, self._questions)]
         return Run(
             rows=tuple(row.row if isinstance(row, OpenRow) else row for row in rows),
@@ -491,7 +491,8 @@ class Driver:
         """Yield the job to judge the cases of a chunk that are not judged yet."""
         name, question = row.subject.name, row.question
         stored = self._store.outcomes(name, question.info, chunk.first, chunk.count)
-        stored |= self._first.get((name, question.id), {}) if chunk.first == 0 else {}
+        if chunk.first == 0 and not question.restarts and (asked := self._first.get((name, question.id))):
+            stored |= dict(enumerate(asked.outcomes))
         if len(stored) == chunk.count:
             yield from self._add(row, chunk.first, [stored[place] for place in range(chunk.count)])
         else:

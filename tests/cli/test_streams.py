@@ -45,12 +45,15 @@ def test_a_full_disk_is_one_line_and_rows_that_nobody_can_read_do_not_stop_a_run
 
 
 _INTERRUPTS = """
-import sys
+import signal, sys
 
 class Interrupts:
     def find_spec(self, name, path=None, target=None):
         if name == "typer":
-            raise KeyboardInterrupt
+            try:
+                signal.raise_signal({number})
+            except KeyboardInterrupt:  # Python drops one that arrives in a callback of its import machinery.
+                pass
 
 sys.meta_path.insert(0, Interrupts())
 from contactverif.cli import main
@@ -61,7 +64,8 @@ main()
 @pytest.mark.parametrize(
     ("shell", "words", "status", "line"),
     [
-        ("exec", ["-c", _INTERRUPTS], 130, "stopped"),
+        ("exec", ["-c", _INTERRUPTS.format(number=2)], 130, "stopped, and nothing was judged"),
+        ("exec", ["-c", _INTERRUPTS.format(number=15)], 143, "stopped, and nothing was judged"),
         ("exec", ["-OO", "-m", "contactverif", "list"], 2, "python: found -OO, which drops the docstrings; needed .*"),
         ("ulimit -v 350000; exec", ["-m", "contactverif", "list"], 2, "ulimit -v: found 350000 kB; needed at least .*"),
     ],

@@ -10,10 +10,12 @@ from subjects import ResidualAlone
 from test_run import ZERO, a_case, measure_residual, sizes, subject
 
 from contactverif import Case, Property, Subject
+from contactverif.cli.run_screen import run_screen
 from contactverif.contract.case import Cases
+from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.property import Measurement
 from contactverif.contract.result import OPPOSITE_SIGN, Result
-from contactverif.run.run import Stop, run
+from contactverif.run.run import RunStopped, Stop, run
 from contactverif.run.scheduler import Progress
 from contactverif.run.store import Store
 from contactverif_nts import nts_ar
@@ -61,6 +63,23 @@ def test_what_is_wrong_is_shown_before_any_row_is_whole() -> None:
     assert [judged for *_, judged in rows[2:]] == [20, 20, 20]
     (remark,) = [step.remark for step in steps if step.phase == "first round" and step.remark]
     assert remark == "first round: 2 of 3 properties, 5 cases each; 2 wrong"
+
+
+def test_what_it_found_stays_in_the_rows_of_a_run_that_is_stopped() -> None:
+    def press(step: Progress) -> None:
+        if step.phase == "judging":
+            raise KeyboardInterrupt
+
+    questions = [FIRST, replace(AGAIN, measure=lambda case, subject: Measurement()), LATE]
+    with pytest.raises(RunStopped) as stopped:
+        run([subject(lambda size: 1.0)], questions, examples=20, seed=1, progress=press)
+    first, again, late = stopped.value.run.rows
+    assert (first.result, first.judged, first.planned) == (Result.BROKEN_PROMISE, 5, 20)
+    assert counterexample_of(first) is not None
+    assert (again.result, again.reason) == (Result.NOT_JUDGED, "stopped: 5 of 20 cases judged")
+    assert (late.result, late.reason) == (Result.NOT_JUDGED, "stopped: 0 of 20 cases judged")
+    screen = "\n".join(map(str, run_screen(stopped.value.run, 80)))
+    assert "shrunk; 5 of 20 cases judged\n" in screen
 
 
 def test_its_cases_are_the_first_planned_ones_and_are_judged_once() -> None:
