@@ -3,9 +3,10 @@
 import os
 import signal
 import sys
+import threading
 from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_works = threading.Event()
 
 
 def main() -> None:
@@ -14,9 +15,9 @@ def main() -> None:
     Python may drop an interrupt that arrives there. So until a command works, a signal ends this process at once. It
     has written nothing, and what it has started ends with it.
     """
-    for number in _SIGNALS:
+    for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _leave)
+            signal.signal(number, _stop)
     try:
         from contactverif.cli import app
 
@@ -28,15 +29,11 @@ def main() -> None:
 
 def begin_work() -> None:
     """Let a signal interrupt this process from now on, which then says what was done."""
-    for number in _SIGNALS:
-        if signal.getsignal(number) is _leave:
-            signal.signal(number, _interrupt)
+    _works.set()
 
 
-def _leave(number: int, frame: FrameType | None) -> None:
+def _stop(number: int, frame: FrameType | None) -> None:
+    if _works.is_set():
+        raise KeyboardInterrupt(number)
     os.write(2, b"contactverif: stopped, and nothing was judged\n")
     os._exit(128 + number)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt(number)

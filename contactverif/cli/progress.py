@@ -58,6 +58,7 @@ class Bar:
             disable=not console.is_terminal,
         )
         self._task: TaskID | None = None
+        self._printed = set[str]()  # The lines of rows.
         self._interrupted = 0  # The number of the signal that stops the run.
         self._of_run: scheduler.RunProgress | None = None
         self._last, self._since = "", monotonic()  # The last step, and when it was new.
@@ -90,7 +91,10 @@ class Bar:
             judged = f", {row.judged}/{row.planned} judged" if row.planned else " again"
             result = row.result, STYLES.get(row.result, PLAIN_STYLE)
             behind = f"{judged}{f': {row.reason}' if row.reason else ''}"
-            self._print(Text.assemble(f"{row.formulation} {row.property_id}: ", result, behind))
+            line = Text.assemble(f"{row.formulation} {row.property_id}: ", result, behind)
+            if line.plain not in self._printed:  # The first round may have judged all of its cases.
+                self._printed.add(line.plain)
+                self._print(line)
         if step.remark:
             self._print(Text(step.remark))
             return

@@ -19,7 +19,7 @@ from contactverif.cli.console import columns, echo, fold, indent_below, line, sh
 from contactverif.cli.options import OutputFiles, Screen
 from contactverif.contract import result as results
 from contactverif.contract.counterexample import Counterexample, counterexamples, failing_examples
-from contactverif.contract.property import Outcome, PropertyInfo, Verdict, checked_numbers
+from contactverif.contract.property import Finding, Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import CaseCounts, Coverage, Result, Row, Run
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
 from contactverif_reports.netcdf.read import read_run
@@ -145,11 +145,13 @@ def _remark(row: Row) -> str:
 
 def _finding(row: Row) -> str:
     """Return the sentence that a property says of the case with the closest number although it passes."""
-    if row.verdict is not Verdict.PASS or row.closest is None or row.closest.case is None:
-        return ""
-    measurement = row.outcomes[row.closest.case].measurement
-    finding = measurement.finding if measurement is not None else None
+    finding = _closest_finding(row) if row.verdict is Verdict.PASS else None
     return "" if finding is None or finding.found else str(finding)
+
+
+def _closest_finding(row: Row) -> Finding | None:
+    outcome = None if row.closest is None or row.closest.case is None else row.outcomes[row.closest.case]
+    return None if outcome is None or outcome.measurement is None else outcome.measurement.finding
 
 
 # The screen of few lines.
@@ -210,7 +212,7 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
 
 
 def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -> Iterator[Text]:
-    """Yield a line for each row below a title; of many rows the last ones have their names alone."""
+    """Yield a line for each row below a title, and if it is wrong its place; of many rows the last have names alone."""
     if not rows:
         return
     yield Text(f"{title}:", style="bold")
@@ -218,9 +220,13 @@ def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -
     names = max(len(row.property_id) for row in listed)
     for row in listed:
         room = max(width - names - 4, _LEAST_WORDS)
-        text = line(f"  {row.property_id:{names}}  {_words(row, room)}".rstrip())
+        words, place = _words(row, room), _place(row, room) if row.unexpected else ""
+        fits = len(words) + len(f"; {place}") <= room
+        text = line(f"  {row.property_id:{names}}  {words}{f'; {place}' if place and fits else ''}".rstrip())
         text.stylize(STYLES.get(row.result, ""), 2, 2 + len(row.property_id))
         yield text
+        if place and not fits:
+            yield line(f"{'':{names + 4}}{place}")
     if others := rows[len(listed) :]:
         yield fold(f"and {len(others)} more: {', '.join(row.property_id for row in others)}", width, indent=2)
 
@@ -228,18 +234,24 @@ def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -
 def _words(row: Row, room: int) -> str:
     """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none.
 
-    What was done to the case, or the place, follows if there is room. If there is too little, the number's name is cut.
+    Where there is no room for all, it is the name of the number that is cut.
     """
     before = f"{row.unexpected}; " if row.unexpected not in ("", results.BROKEN_BY_FAILING, results.NOT_JUDGED) else ""
     behind = f"; known: {row.known}" if row.known else ""
     if row.verdict is not Verdict.FAIL or row.breach or row.closest is None or row.fails_in_words:
         return _shorten(f"{before}{row.reason}{behind}".removesuffix("; "), room)
-    number, outcome = row.closest.number, row.witness if row.closest.case is None else row.outcomes[row.closest.case]
+    number = row.closest.number
     behind = f" {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}{behind}{_asked(row)}"
-    words = _shorten(f"{before}{_shorten(number.quantity.name, room - len(before) - len(behind))}{behind}", room)
-    finding = outcome.measurement.finding if outcome and outcome.measurement else None
-    places = (str(finding), finding.place, finding.place.partition(", ")[0]) if finding else ()
-    return next((f"{words}; {each}" for each in places if each and len(words) + 2 + len(each) <= room), words)
+    return _shorten(f"{before}{_shorten(number.quantity.name, room - len(before) - len(behind))}{behind}", room)
+
+
+def _place(row: Row, room: int) -> str:
+    """Return what was done to the case of the number in a line, and what is found there, as far as there is room."""
+    in_words = row.verdict is not Verdict.FAIL or row.breach or row.fails_in_words
+    if in_words or (finding := _closest_finding(row)) is None:
+        return ""
+    forms = (str(finding), finding.place, finding.place.partition(", ")[0])
+    return next((each for each in forms if len(each) <= room), "")
 
 
 def _asked(row: Row) -> str:

@@ -40,9 +40,9 @@ from contactverif.run.campaign import Shard, mark_done, open_shard, read_shards
 from contactverif.run.failure_memory import FailureMemory
 from contactverif.run.journal import hold_journal, is_own, journal_folder, keep_earlier, new_journal, remove_journal
 from contactverif.run.rows import find_missing
-from contactverif.run.run import RunStopped, run, run_failures, run_share
+from contactverif.run.run import Driver, RunStopped, run, run_failures
 from contactverif.run.run_options import PLACE, Isolation, RunOptions, declared_options, group_names, read_settings
-from contactverif.run.scheduler import WorkerError, begin_loading
+from contactverif.run.scheduler import Scheduler, WorkerError, begin_loading
 from contactverif.run.store import OF_USER, STORED, Plan, Store, agree, check_versions, read_plan
 from contactverif.run.worker_pool import check_jobs, default_jobs, worker_pool
 from contactverif.sampling.draw import Sampling
@@ -86,10 +86,13 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
         subjects = [item for item in plugins.subjects if isinstance(item, Subject)]
         questions = [item for item in plugins.questions if isinstance(item, Property)]
         with Bar() as bar:
-            store = Store(plan, journal_of_shard, [journal_of_shard])
-            run_share(subjects, questions, job.sampling, bar.show_progress, store, share=piece.share)
+            store, scheduler = Store(plan, journal_of_shard, [journal_of_shard]), Scheduler(None, bar.show_progress)
+            driver = Driver(subjects, questions, job.sampling, scheduler, store, share=piece.share)
+            driver.work()
+            driver.check_written()
         print_plugin_output()
-        _print_remarks(store)
+        for remark in store.remarks:
+            _warn(remark)
         n_outcomes = mark_done(journal_of_shard, plan)
     echo(f"shard {piece.text} is done: {n_outcomes} outcomes")
     return 0
@@ -221,7 +224,8 @@ class Job:
             try:
                 yield first or load(), store
             finally:
-                _print_remarks(store)
+                for remark in store.remarks:  # They name the rows whose stored outcomes do not count.
+                    _warn(remark)
 
 
 def new_job(options: RunOptions, *, fresh_seed: int | None = None, command: str = VERIFY) -> Job:
@@ -430,13 +434,6 @@ def print_isolation(provenance: Mapping[str, str]) -> None:
         typer.echo(f"The plugins ran in a {place}.")
     elif place != Isolation.INLINE:
         typer.echo(f"The plugins ran in a {place} without a box: {why_no_box() or 'as --isolation says'}.")
-
-
-def _print_remarks(store: Store) -> None:
-    """Name the rows whose stored outcomes do not count."""
-    for remark in store.remarks:
-        _warn(remark)
-    store.remarks.clear()
 
 
 def _warn(words: str) -> None:

@@ -124,13 +124,10 @@ class Host:
         """Make a formulation there, and return its number and the number of the process."""
         if self._process is None:
             wait_in_lockstep(lambda: False)  # A call in lockstep starts no process: all begin anew, one after another.
-            self._load_again()
+            if not isinstance(self.load(), Loaded):
+                raise PluginError("import: it loaded before, and does not any more", "channel")
         self._queue.append((Make(self._next_number(), penalty), None))
         return self._number, self.n_started
-
-    def _load_again(self) -> None:
-        if not isinstance(self.load(), Loaded):
-            raise PluginError("import: it loaded before, and does not any more", "channel")
 
     def _next_number(self) -> int:
         self._number += 1

@@ -79,8 +79,8 @@ def audit(
     for row, opened in zip(derived, rows, strict=True):
         if isinstance(opened, OpenRow):
             differences.append(find_missing_cases(row, opened.listed, opened.question, sampling))
-    for each in (difference for sample in samples for difference in sample.differences):
-        differences.append(f"{each.formulation} {each.property_id}: {each.words}")
+    for sample in samples:
+        differences += [f"{sample.row.subject.name} {sample.row.question.id}: {words}" for words in sample.differences]
     examples = list(counterexamples(run).values())
     for example in examples:
         subject, question = subject_of[example.formulation], question_of[example.property_id]

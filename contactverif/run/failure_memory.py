@@ -18,14 +18,13 @@ import numpy as np
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of, typeable
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Verdict
+from contactverif.contract.property import FAILED, Verdict
 from contactverif.contract.result import Result, Row
 from contactverif.plugins.provenance import code_digests
 
 FOLDER = Path(".contactverif")
 _OWNER = "owner"  # The array that says whose failure a file holds.
 _LARGEST = 1 << 24  # Bytes of all arrays. A case that a person may draw has a thousandth of it.
-_FAILED = Verdict.FAIL, Verdict.CRASHED
 _SETTLED = Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED  # Nothing fails any more, or nothing is asked.
 Failures = Mapping[tuple[str, str], Case]  # {(formulation, property id): case}
 
@@ -52,7 +51,7 @@ class FailureMemory:
                     path.unlink(missing_ok=True)
                     continue
                 remembered = row.promise is not False and row.witness is not None  # Its case fails again.
-                example = counterexample_of(row) if row.verdict in _FAILED and not remembered else None
+                example = counterexample_of(row) if row.verdict in FAILED and not remembered else None
                 if example is not None:
                     self._write(path, example.case, _owner(row.formulation, row.property_id))
 

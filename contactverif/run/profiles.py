@@ -14,7 +14,7 @@ from contactverif.contract.errors import MisuseError, unknown_name_error
 MOST_EXAMPLES = 10**9
 FIRST_CASES = 5  # The number of cases of a property in the first round.
 # The failures that are shrunk: those that nobody stated, all, or none. The others show a witness or the first case.
-Shrink = Literal["one", "new", "all", "none"]  # The failures that are shrunk.
+Shrink = Literal["one", "new", "all", "none"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,6 @@ from functools import partial
 from itertools import product
 from math import ceil, isfinite
 from random import SystemRandom
-from typing import NamedTuple
 
 from contactverif.contract.case import Case
 from contactverif.contract.property import Outcome, Property, Verdict
@@ -34,14 +33,6 @@ def choose_share(numbers: Sequence[int], share: float = SHARE) -> list[int]:
     return sorted(SystemRandom().sample(numbers, min(len(numbers), max(1, ceil(share * len(numbers))))))
 
 
-class Difference(NamedTuple):
-    """A stored outcome that is not what is judged today."""
-
-    formulation: str
-    property_id: str
-    words: str  # The case and how it differs.
-
-
 @dataclass(frozen=True, slots=True)
 class Sample:
     """The stored outcomes of a row that are judged again, by the number of the case; `WITNESS` is the witness."""
@@ -51,12 +42,11 @@ class Sample:
     words: dict[int, str] = field(default_factory=dict)  # How each differs that was judged again; empty if it does not.
 
     @property
-    def differences(self) -> list[Difference]:
-        """The outcomes that differ; an outcome of a case that the run does not have is one of them."""
+    def differences(self) -> list[str]:
+        """The cases that differ, and how; an outcome of a case that the run does not have is one of them."""
         names = {number: "the witness" if number == WITNESS else f"case {number}" for number in sorted(self.outcomes)}
         words = {number: self.words.get(number, _NO_CASE) for number in names}
-        ids = self.row.subject.name, self.row.question.id
-        return [Difference(*ids, f"{name}: {words[number]}") for number, name in names.items() if words[number]]
+        return [f"{name}: {words[number]}" for number, name in names.items() if words[number]]
 
     def note(self, numbers: Sequence[int], words: Sequence[str]) -> None:
         """Note how the outcomes of some cases differ."""
@@ -118,7 +108,7 @@ def recheck_store(
     for key in sorted(key for key, sample in samples.items() if sample.differences):
         differences, n_again = samples[key].differences, len(samples[key].outcomes)
         store.n_rechecked += counts[key] - n_again
-        words = f"{len(differences)} of {n_again} stored outcomes that were judged again differ, {differences[0].words}"
+        words = f"{len(differences)} of {n_again} stored outcomes that were judged again differ, {differences[0]}"
         store.reject(*key, f"{' '.join(key)}: {words}; all {counts[key]} are judged again")
 
 

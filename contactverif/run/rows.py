@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import chain, product
 from math import sqrt
-from typing import TypedDict
 
 from contactverif.contract import schema
 from contactverif.contract.case import Case, needs_of_place
@@ -381,7 +380,7 @@ def shrink_case(
         smallest = outcome
         return True
 
-    draw.shrink(**_drawing(sampling, question), first=goal.first, fails=fails)
+    draw.shrink(*sampling.of(question), first=goal.first, fails=fails)
     return smallest
 
 
@@ -389,28 +388,11 @@ def shrink_case(
 # What is planned, and what is missing of it
 
 
-class _Drawing(TypedDict):
-    source: CaseSource
-    seed: str
-    examples: int
-
-
-def _drawing(sampling: Sampling, question: Property) -> _Drawing:
-    source = sampling.source(question)
-    assert source is not None
-    return {"source": source, "seed": sampling.key(question), "examples": sampling.examples}
-
-
 def draw_planned(
     sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
 ) -> PlannedCases:
     """Draw a block of the cases of a property, and of all properties with the same strategy."""
-    return draw.draw_block(**_drawing(sampling, question), number=number, progress=count)
-
-
-def draws_blocks(sampling: Sampling, question: Property) -> bool:
-    """Return whether the cases of a property are drawn block by block; otherwise the first block has all of them."""
-    return draw.draws_blocks(**_drawing(sampling, question))
+    return draw.draw_block(*sampling.of(question), number=number, progress=count)
 
 
 def find_missing_cases(row: Row, listed: Sequence[Case] | None, question: Property, sampling: Sampling) -> str:
@@ -419,7 +401,7 @@ def find_missing_cases(row: Row, listed: Sequence[Case] | None, question: Proper
     planned = count if listed is None else len(listed)
     if listed is None and count != sampling.examples:  # A strategy may have fewer cases than were wanted.
         number = min(count, sampling.examples - 1) // draw.BLOCK
-        number = number if draws_blocks(sampling, question) else 0
+        number = number if draw.draws_blocks(*sampling.of(question)) else 0
         block = draw_planned(sampling, question, number)
         planned = number * draw.BLOCK + len(block.cases) if block.last else sampling.examples
     missing = "" if count == planned > 0 else f"outcomes of {count} of {planned} cases"

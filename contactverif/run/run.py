@@ -40,7 +40,6 @@ from contactverif.run.rows import (
     WHOLE,
     OpenRow,
     draw_planned,
-    draws_blocks,
     judge_cases,
     lacks_witness,
     open_row,
@@ -136,21 +135,6 @@ def check_known(known: Mapping[str, str], properties: Sequence[Property | NotLoa
     for property_id in known:
         if property_id not in ids:
             raise unknown_property_error("known failure", property_id, ids)
-
-
-def run_share(
-    subjects: Sequence[Subject],
-    questions: Sequence[Property],
-    sampling: Sampling,
-    progress: Callable[[Progress], None],
-    store: Store,
-    *,
-    share: tuple[int, int],
-) -> None:
-    """Judge what the store of a share of a run (its number from 0, the number of all shares) does not have yet."""
-    driver = Driver(subjects, questions, sampling, Scheduler(None, progress), store, share=share)
-    driver.work()
-    driver.check_written()
 
 
 def run_failures(
@@ -445,7 +429,7 @@ class Driver:
             number += 1
             if self._share is not None or number * BLOCK >= sampling.examples:
                 return
-        if number and self._share is not None and not draws_blocks(sampling, question):
+        if number and self._share is not None and not draw.draws_blocks(*sampling.of(question)):
             return  # Where a strategy runs out of cases, the first block has all of them.
         before = Progress(rows[0].subject.name, question.id, "drawing", 0, sampling.examples)
         yield Job(draw_chunks, (sampling, question, number), partial(self._add_drawn, rows, number), before)

@@ -131,7 +131,8 @@ class Scheduler:
                 job = next((running.pop(future) for future in reversed([*running]) if future.cancel()), None)
                 is_full = True
             if job is not None:
-                stays = is_full or (self._takes_part and (job.is_local or not self._has_workers))
+                are_starting = self._start is not None and not self._start.done()
+                stays = is_full or (self._takes_part and (job.is_local or are_starting))
                 future = None if stays else _submit(self._executor, job.function, *job.arguments)
                 if future is not None:
                     running[future] = job
@@ -144,10 +145,6 @@ class Scheduler:
                 job = running.pop(future)
                 here = partial(job.function, *job.arguments, **self._counting(job.progress))
                 waiting.appendleft(iter(job.then(_fetch(future, here)) or ()))
-
-    @property
-    def _has_workers(self) -> bool:
-        return self._start is None or self._start.done()
 
     def _wait(self, running: Mapping[Future[bytes], Job], *, is_patient: bool) -> Iterable[Future[bytes]]:
         while running:

@@ -66,6 +66,12 @@ class Sampling:
         """Return the seed of the cases of a property, which properties with the same strategy have in common."""
         return f"{self.seed}/{strategy_name(question)}"
 
+    def of(self, question: Property) -> tuple[CaseSource, str, int]:
+        """Return what the cases of a property follow from, one that can be checked: their source, seed and number."""
+        source = self.source(question)
+        assert source is not None
+        return source, self.key(question), self.examples
+
     def group(self, question: Property) -> tuple[str, bool]:
         """Return what properties have in common if their cases are the same: the seed, and what makes them."""
         return self.key(question), question.bodies
@@ -115,7 +121,7 @@ def number_of_blocks(examples: int) -> int:
 
 
 def draw_block(
-    source: CaseSource, *, seed: str, examples: int, number: int, progress: Callable[[int], None] | None = None
+    source: CaseSource, seed: str, examples: int, *, number: int, progress: Callable[[int], None] | None = None
 ) -> PlannedCases:
     """Draw one block of the planned cases, numbered from 0. Where the engine draws, the first block has all cases."""
     if isinstance(source, tuple):
@@ -135,12 +141,12 @@ def draw_first(source: CaseSource, seed: str, count: int) -> tuple[Case, ...]:
     return tuple(draw.case for draw in draws or ())
 
 
-def draws_blocks(source: CaseSource, *, seed: str, examples: int) -> bool:
+def draws_blocks(source: CaseSource, seed: str, examples: int) -> bool:
     """Return whether cases are drawn block by block; otherwise the first block has all cases."""
     return not isinstance(source, tuple) and _draw_block(source, seed, examples, 0) is not None
 
 
-def draw_case(source: CaseSource, *, seed: str, examples: int, number: int) -> Case:
+def draw_case(source: CaseSource, seed: str, examples: int, *, number: int) -> Case:
     """Return the case with this number of those of `draw_cases`."""
     if isinstance(source, tuple):
         return source[number]
@@ -152,13 +158,10 @@ def with_case(sampling: Sampling, question: Property, number: int, outcome: Outc
     """Return the outcome with this number in its row with its case, which is drawn once more if it was not kept."""
     if isinstance(outcome.case_or_summary, Case):
         return outcome
-    source = sampling.source(question)
-    assert source is not None
-    case = draw_case(source, seed=sampling.key(question), examples=sampling.examples, number=number)
-    return replace(outcome, case_or_summary=case)
+    return replace(outcome, case_or_summary=draw_case(*sampling.of(question), number=number))
 
 
-def shrink(source: CaseSource, *, seed: str, examples: int, first: int, fails: Callable[[Case], bool]) -> None:
+def shrink(source: CaseSource, seed: str, examples: int, *, first: int, fails: Callable[[Case], bool]) -> None:
     """Call `fails` with smaller and smaller cases; the last case for which it returns True is the smallest.
 
     `first` is the number of the first case that fails. The cases before it are not judged again. A formulation that

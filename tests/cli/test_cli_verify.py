@@ -267,6 +267,7 @@ def test_a_wrong_formulation_shows_one_mesh_and_a_line_for_all_else(ask: Ask) ->
     assert "BROKEN PROMISE" not in others
     assert "  patch.flat.resultant  " in others
     assert TRANSMISSION in others
+    assert "\n                           on a reference " in others  # What was done to the case, below its number.
     assert answer.out.endswith(" more.\n")
     assert ask(f"verify half {CHEAP} --show all").out.count("half, patch.flat.") > 2
 

@@ -1,5 +1,6 @@
 """The mistakes of a user: each is one line that says what is needed, and nothing is judged, solved or written."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,17 @@ MISTAKES = {  # {command line: argument, found, needed}
     "new mine --c --fortran": r"NAME: found --c and --fortran; needed one of them",
     "new mine --3d --c": r"NAME: found --3d and --c; needed one of them",
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"[group]\nno value", None], ids=["binary", "malformed", "pipe"])
+def test_entry_points_that_cannot_be_read_are_named(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, content: bytes | None
+) -> None:
+    file = tmp_path / "odd-1.0.dist-info" / "entry_points.txt"
+    file.parent.mkdir()
+    os.mkfifo(file) if content is None else file.write_bytes(content)
+    monkeypatch.syspath_prepend(tmp_path)
+    check_mistake(ask("list"), f"{file}: found .*; needed a file of entry points, .*")
 
 
 @pytest.mark.parametrize("line", MISTAKES, ids=lambda line: line.replace(str(ROOT), "")[-60:])

@@ -5,9 +5,12 @@ import subprocess
 
 import pytest
 from fresh_process import PYTHON
+from subjects import load_property
 
 from contactverif.cli import progress
 from contactverif.cli.progress import Bar
+from contactverif.contract.property import Verdict
+from contactverif.contract.result import Row
 from contactverif.run.scheduler import Progress, RunProgress
 
 
@@ -57,6 +60,13 @@ def test_a_case_that_takes_long_is_told(bar: Bar, capsys: pytest.CaptureFixture[
 def test_a_remark_is_a_line_of_its_own(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
     bar.show_progress(Progress("", "", "first round", 1, 1, remark="first round: 3 wrong"))
     assert capsys.readouterr().err == "first round: 3 wrong\n"
+
+
+def test_a_row_that_the_first_round_has_told_in_full_is_told_once(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:
+    row = Row("mine", load_property("swap").info, Verdict.FAIL, True, reason="wrong", planned=5)
+    for phase in ("first round", "judging"):
+        bar.show_progress(Progress("mine", "swap", phase, 5, 5, row=row, remark="said"))
+    assert capsys.readouterr().err == "mine swap: BROKEN PROMISE, 0/5 judged: wrong\nsaid\nsaid\n"
 
 
 def test_work_without_rows_has_such_lines_too(bar: Bar, capsys: pytest.CaptureFixture[str]) -> None:

@@ -74,7 +74,7 @@ from contactverif.plugins.registry import load_formulations, standalone_names
 from contactverif.run.run_options import Isolation, RunOptions
 
 limits = RunOptions(isolation=Isolation(sys.argv[1])).limits()
-for item in load_formulations(limits):
+for item in load_formulations(limits, engines=True):
     print(getattr(item, "name", None) or f"{item.formulation}: {item.reason}")
 print(*standalone_names(limits))
 end_all()
@@ -92,7 +92,9 @@ def test_every_name_is_there_whatever_the_others_do(tmp_path: Path, place: str) 
     for name, source in PLUGINS.items():
         (tmp_path / f"{modules[name]}.py").write_text(f"{source}\nfrom contactverif_nts import nts\n")
     lines = [f"{name} = {module}:nts" for name, module in modules.items()]
-    (about / "entry_points.txt").write_text("\n".join(["[contactverif.formulations]", *lines, ""]))
+    engine = "b-ends = odd_b_ends:nts"
+    text = "\n".join(["[contactverif.formulations]", *lines, "[contactverif.engines]", engine, ""])
+    (about / "entry_points.txt").write_text(text)
     (tmp_path / "survey.py").write_text(PROGRAM)
     path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
     answer = subprocess.run(
@@ -105,7 +107,9 @@ def test_every_name_is_there_whatever_the_others_do(tmp_path: Path, place: str) 
     *items, standalone = answer.stdout.splitlines()
     assert set(PLUGINS) <= set(standalone.split())
     assert {"vts-ppt", "mortar", "two-pass"} <= set(items)
-    assert "b-ends: import: its process ended with status 3" in items
+    for name in ("b-ends", "engine/b-ends"):
+        assert f"{name}: import: its process ended with status 3" in items
+    assert "engine/control" in items
     # It killed the process whose copy it was in, and the survey went on with a new one.
     assert any(item.startswith("c-kills: ") for item in items)
     assert any(item.startswith("e-answers: import: ") for item in items)
