@@ -194,7 +194,6 @@ def regressions_text(changes: regressions.Changes) -> Text:
 
 
 def _load(job: verify.Job, executor: Executor | None) -> verify.Plugins:
-    """Load the reference, which is the first formulation and has to load, all others, and the properties."""
     reference, *names = job.options.names
     if not names:
         others = ", ".join(name for name in registry.formulation_names() if name != reference)
@@ -232,7 +231,6 @@ def _compare_formulations(job: verify.Job, screen: Screen) -> int:
 
 
 def _time_evaluations(plugins: verify.Plugins) -> tuple[Cost, ...]:
-    """Return the times of an evaluation; nothing if the user does not wait for them."""
     try:
         with Bar() as bar:
             return measure_costs([item for item in plugins.subjects if isinstance(item, Subject)], progress=bar.update)
@@ -333,7 +331,6 @@ def _candidate(study: Study, name: str, width: int) -> Iterator[Text]:
 
 
 def _show_costs(study: Study, costs: Sequence[Cost], screen: Screen) -> None:
-    """Show the times of an evaluation: a line for each candidate, or the table of its parts."""
     width, (reference, *names) = columns(), study.comparison.formulations
     if screen.verbose and costs:
         table = comparisons.cost_table(costs, reference)

@@ -147,7 +147,6 @@ def _options(width: int) -> Iterator[Text]:
 
 
 def _default_in_words(default: Any) -> str:
-    """Return a default in parentheses; nothing where the scene has its own."""
     if default is None:
         return ""
     return f"({default})" if isinstance(default, str) else f"({default:g})"

@@ -121,7 +121,6 @@ def _judge_and_draw(example: Counterexample, subject: Subject, files: OutputFile
 
 
 def _check_surfaces(case: Case, files: OutputFiles) -> None:
-    """Refuse a file for ParaView of an interface in the plane."""
     if case.interface.dim == PLANE and PARAVIEW in files.names:
         raise MisuseError("--out", f"{files.names[PARAVIEW]} for a case without bodies", "a .png or .svg file")
 
@@ -157,7 +156,6 @@ def _read_stored(report: Path | None, case: str | None) -> Counterexample:
 
 
 def _draw_solved(case: Case, names: Sequence[str], title: str, files: OutputFiles, limits: Limits | None) -> bool:
-    """Solve a scene with each formulation and write the files; return whether all could be used."""
     if PARAVIEW in files.names and len(names) > 1:
         file_for_many = f"{files.names[PARAVIEW]} for {len(names)} formulations"
         raise MisuseError("--out", file_for_many, "one --formulation: a .vtu file holds one solution")

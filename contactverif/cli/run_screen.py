@@ -255,7 +255,6 @@ def _place(row: Row, room: int) -> str:
 
 
 def _asked(row: Row) -> str:
-    """Return how many cases a row has, if its run was stopped."""
     return f"; {row.judged} of {row.planned} cases judged" if len(row.outcomes) < row.planned else ""
 
 
@@ -462,7 +461,6 @@ def _together(group: Sequence[Coverage]) -> str:
 
 
 def _kinds(group: Sequence[Coverage], width: int) -> Iterator[Text]:
-    """Yield how many cases of each kind were judged, in all properties of a group together."""
 
     def cells(counts: CaseCounts) -> str:
         numbers = counts.cases, counts.judged, counts.failed, counts.undecided, counts.idle

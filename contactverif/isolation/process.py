@@ -164,7 +164,6 @@ class PluginProcess:
         raise TooLateError(f"no answer within {seconds:g} s")
 
     def _last_verb(self, questions: Sequence[Question]) -> str:
-        """Return the method that the process is working on, as it says."""
         # A file that is read cannot do harm. One that is mapped into memory can: the plugin may cut it.
         number = (os.pread(self._progress.fileno(), 1, 0) or b"\0")[0]
         return questions[min(number, len(questions) - 1)].verb if questions else "make"

@@ -114,7 +114,6 @@ def check_libraries(run: Run) -> None:
 
 
 def _find_changes(run: Run) -> tuple[str, ...]:
-    """Return what is other today than in a run, of what the last bits of a number depend on."""
     digests = code_digests(run.formulations, list(run.properties))
     today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
     stored = {name: run.provenance.get(name, "unknown") for name in today}

@@ -175,13 +175,13 @@ class OpenRow:
         verdict, reason = verdict_of_row(row, self, on_scene=on_scene)
         self.row = replace(row, verdict=verdict, reason=reason)
 
-    def stop(self, examples: int, asked: OpenRow | None) -> None:
+    def stop(self, examples: int, early: OpenRow | None) -> None:
         """Make the row of a run, with so many random cases, that was stopped before all cases were judged.
 
-        Of cases that were `asked` in the first round count those that are not judged again.
+        Those of the first round, which are in an `early` row, count as long as they are not judged again.
         """
-        if asked is not None and not len(self.outcomes):
-            self.outcomes, self.n_finished = asked.outcomes, self.n_finished + asked.n_finished
+        if early is not None and not len(self.outcomes):
+            self.outcomes, self.n_finished = early.outcomes, self.n_finished + early.n_finished
         outcomes = tuple(chain(self.outcomes, *(self._waiting[first] for first in sorted(self._waiting))))
         planned = self.planned or (examples if self.listed is None else len(self.listed))
         stopped = f"stopped: {self.n_finished} of {planned} cases judged"
@@ -380,7 +380,7 @@ def shrink_case(
         smallest = outcome
         return True
 
-    draw.shrink(*sampling.of(question), first=goal.first, fails=fails)
+    draw.shrink(*sampling.plan(question), first=goal.first, fails=fails)
     return smallest
 
 
@@ -392,7 +392,7 @@ def draw_planned(
     sampling: Sampling, question: Property, number: int, count: Callable[[int], None] | None = None
 ) -> PlannedCases:
     """Draw a block of the cases of a property, and of all properties with the same strategy."""
-    return draw.draw_block(*sampling.of(question), number=number, progress=count)
+    return draw.draw_block(*sampling.plan(question), number=number, progress=count)
 
 
 def find_missing_cases(row: Row, listed: Sequence[Case] | None, question: Property, sampling: Sampling) -> str:
@@ -401,7 +401,7 @@ def find_missing_cases(row: Row, listed: Sequence[Case] | None, question: Proper
     planned = count if listed is None else len(listed)
     if listed is None and count != sampling.examples:  # A strategy may have fewer cases than were wanted.
         number = min(count, sampling.examples - 1) // draw.BLOCK
-        number = number if draw.draws_blocks(*sampling.of(question)) else 0
+        number = number if draw.draws_blocks(*sampling.plan(question)) else 0
         block = draw_planned(sampling, question, number)
         planned = number * draw.BLOCK + len(block.cases) if block.last else sampling.examples
     missing = "" if count == planned > 0 else f"outcomes of {count} of {planned} cases"

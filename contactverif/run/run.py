@@ -309,7 +309,6 @@ class Driver:
             self._stopped |= {subject.name: reason for subject in self._subjects}
 
     def _earlier_failures(self) -> Iterator[Job]:
-        """Yield the jobs to judge what failed in earlier runs; none of them counts among the planned cases."""
         for question, subject in product(chain.from_iterable(self._groups.values()), self._subjects):
             key = subject.name, question.id
             case = self._store.failures.get(key)
@@ -429,7 +428,7 @@ class Driver:
             number += 1
             if self._share is not None or number * BLOCK >= sampling.examples:
                 return
-        if number and self._share is not None and not draw.draws_blocks(*sampling.of(question)):
+        if number and self._share is not None and not draw.draws_blocks(*sampling.plan(question)):
             return  # Where a strategy runs out of cases, the first block has all of them.
         before = Progress(rows[0].subject.name, question.id, "drawing", 0, sampling.examples)
         yield Job(draw_chunks, (sampling, question, number), partial(self._add_drawn, rows, number), before)
@@ -472,11 +471,10 @@ class Driver:
         return chain(*map(self._finish, rows), judging, () if block.last else self._blocks(rows, number + 1))
 
     def _judge(self, row: OpenRow, chunk: CaseChunk) -> Iterator[Job]:
-        """Yield the job to judge the cases of a chunk that are not judged yet."""
         name, question = row.subject.name, row.question
         stored = self._store.outcomes(name, question.info, chunk.first, chunk.count)
-        if chunk.first == 0 and not question.restarts and (asked := self._first.get((name, question.id))):
-            stored |= dict(enumerate(asked.outcomes))
+        if chunk.first == 0 and not question.restarts and (early := self._first.get((name, question.id))):
+            stored |= dict(enumerate(early.outcomes))
         if len(stored) == chunk.count:
             yield from self._add(row, chunk.first, [stored[place] for place in range(chunk.count)])
         else:

@@ -178,7 +178,6 @@ def _next_job(waiting: deque[Iterator[Job]]) -> Job | None:
 
 
 def _start_workers(executor: Executor, count: int, subject: Subject) -> None:
-    """Let each worker of an executor start the process of a subject, and wait for the first one."""
     futures = [_submit(executor, start_process, subject) for _ in range(count)]
     wait(filter(None, futures), return_when=FIRST_COMPLETED)
 

@@ -66,7 +66,7 @@ class Sampling:
         """Return the seed of the cases of a property, which properties with the same strategy have in common."""
         return f"{self.seed}/{strategy_name(question)}"
 
-    def of(self, question: Property) -> tuple[CaseSource, str, int]:
+    def plan(self, question: Property) -> tuple[CaseSource, str, int]:
         """Return what the cases of a property follow from, one that can be checked: their source, seed and number."""
         source = self.source(question)
         assert source is not None
@@ -158,7 +158,7 @@ def with_case(sampling: Sampling, question: Property, number: int, outcome: Outc
     """Return the outcome with this number in its row with its case, which is drawn once more if it was not kept."""
     if isinstance(outcome.case_or_summary, Case):
         return outcome
-    return replace(outcome, case_or_summary=draw_case(*sampling.of(question), number=number))
+    return replace(outcome, case_or_summary=draw_case(*sampling.plan(question), number=number))
 
 
 def shrink(source: CaseSource, seed: str, examples: int, *, first: int, fails: Callable[[Case], bool]) -> None:
