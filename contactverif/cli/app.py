@@ -191,9 +191,9 @@ def _words_of_usage_error(error: Exception) -> str:
         return f"{option}: found an option of an earlier version; needed --out FILE, whose ending says what is written"
     words = format_message()
     if match := _BAD_VALUE.match(getattr(error, "message", "")):
-        found = match[1] or repr(getattr(error.__cause__, "errors", list)()[0]["input"])
+        value = match[1] or repr(getattr(error.__cause__, "errors", list)()[0]["input"])
         name = error.param.opts[0]  # type: ignore[attr-defined]
-        return str(MisuseError(name, found, match[2].replace("'", "").rstrip(".")))
+        return str(MisuseError(name, value, match[2].replace("'", "").rstrip(".")))
     command_path = getattr(getattr(error, "ctx", None), "command_path", "contactverif")
     return f"{words} (see {command_path} --help)" if words else ""  # Without arguments typer has shown the help.
 

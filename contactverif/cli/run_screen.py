@@ -241,7 +241,7 @@ def _words(row: Row, room: int) -> str:
     if row.verdict is not Verdict.FAIL or row.breach or row.closest is None or row.fails_in_words:
         return _shorten(f"{before}{row.reason}{behind}".removesuffix("; "), room)
     number = row.closest.number
-    behind = f" {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}{behind}{_asked(row)}"
+    behind = f" {number.value:.3g}, {number.quantity.sense} {number.tolerance:.3g}{behind}{_judged_of_stopped(row)}"
     return _shorten(f"{before}{_shorten(number.quantity.name, room - len(before) - len(behind))}{behind}", room)
 
 
@@ -254,7 +254,7 @@ def _place(row: Row, room: int) -> str:
     return next((each for each in forms if len(each) <= room), "")
 
 
-def _asked(row: Row) -> str:
+def _judged_of_stopped(row: Row) -> str:
     return f"; {row.judged} of {row.planned} cases judged" if len(row.outcomes) < row.planned else ""
 
 
@@ -289,7 +289,7 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     """
     row, outcome = example.row, example.outcome
     words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
-    title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}{_asked(row)}"
+    title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}{_judged_of_stopped(row)}"
     text = indent_below(
         "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
         *chain.from_iterable(words),
