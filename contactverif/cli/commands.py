@@ -11,7 +11,6 @@ from typing import Annotated
 
 import typer
 
-from contactverif.cli import begin_work
 from contactverif.cli.options import (
     EARLIER,
     Screen,
@@ -21,6 +20,7 @@ from contactverif.cli.options import (
     formulation_option,
     output_option,
 )
+from contactverif.cli.signals import begin_work
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, RunOptions
 
 Isolated = Annotated[RunOptions, Takes([ISOLATION])]

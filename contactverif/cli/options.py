@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin,
 import typer
 
 from contactverif.api.run_files import JSON, JUNIT, PAGE, PARAVIEW, PICTURES, REPORT, either
-from contactverif.cli import begin_work
+from contactverif.cli.signals import begin_work
 from contactverif.contract.errors import MisuseError
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, Option, RunOptions, declared_options, group_names
 
