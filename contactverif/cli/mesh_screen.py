@@ -80,7 +80,7 @@ def _drawing(mesh: PlainMesh, points: FloatArray, inks: dict[str, str]) -> Itera
     x, y = left + (np.arange(n_columns) + 0.5) * row / _ASPECT, high - (np.arange(n_rows) + 0.5) * row
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     canvas = np.where(is_inside(points[outer], places), "░", " ").reshape(n_rows, n_columns)
-    for ink, part in lines.items():
+    for ink, part in reversed(lines.items()):  # The first groups over the later ones.
         for share in np.linspace(0, 1, max(n_columns, n_rows)):
             along, down = ((1 - share) * points[part[:, 0]] + share * points[part[:, 1]]).T
             canvas[((high - down) / row).astype(int), ((along - left) / row * _ASPECT).astype(int)] = ink
