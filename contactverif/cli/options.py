@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -277,13 +277,6 @@ class OutputFiles:
             check_writable(name, "--out", f"FILE{suffix}")
             by_suffix[suffix] = name
         return cls(by_suffix, {suffix: name.absolute() for suffix, name in by_suffix.items()})
-
-    def only(self, suffixes: Collection[str]) -> OutputFiles:
-        """Return the files with these suffixes."""
-        names, paths = (
-            {key: path for key, path in files.items() if key in suffixes} for files in (self.names, self.paths)
-        )
-        return OutputFiles(names, paths)
 
     def announce(self) -> None:
         """Print the name of each file that was written, a line each."""

@@ -80,8 +80,7 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
         plugins = replace(job, hidden=(folder.absolute(),)).load()
         for item in chain(*plugins):
             if isinstance(item, NotLoaded):
-                words = f"{name_line(item.formulation)} does not load: {one_line(item.reason)}"
-                echo(f"contactverif: {words}", to_stderr=True)
+                _warn(f"{name_line(item.formulation)} does not load: {one_line(item.reason)}")
                 return 1
         subjects = [item for item in plugins.subjects if isinstance(item, Subject)]
         questions = [item for item in plugins.questions if isinstance(item, Property)]
@@ -217,8 +216,7 @@ class Job:
         plan, outputs = self.plan(), tuple(self.files.paths.values())
         with hold_journal(folder, "--resume") if self.resumes else new_journal(folder, plan, outputs) as aside:
             if aside:
-                words = f"contactverif: the journal of a run that was stopped is now {folder.with_name(aside)}"
-                echo(words, to_stderr=True)
+                _warn(f"the journal of a run that was stopped is now {folder.with_name(aside)}")
             keep_earlier(folder, outputs)
             store = Store(plan, folder, self.sources)
             try:
@@ -373,7 +371,7 @@ def end_run(
 ) -> End:
     """Write the files before anything is shown, so that nothing that was judged is lost, and remove the journal."""
     missing = find_missing() if promises_kept else ""
-    written = []
+    files = OutputFiles({}, {})  # Those that are written.
     for suffix, path in job.files.paths.items():
         try:
             write(path)
@@ -382,17 +380,17 @@ def end_run(
         except (OSError, RuntimeError) as error:  # The netCDF library raises both, with words of its own.
             reason = f"{reason_not_to_grow(path) or getattr(error, 'strerror', None) or error}"
         else:
-            written.append(suffix)
+            files = OutputFiles({**files.names, suffix: job.files.names[suffix]}, {**files.paths, suffix: path})
             continue
         _warn(f"{job.files.names[suffix]} is not written: {reason}")
-    complete = len(written) == len(job.files.paths) and not missing
+    complete = len(files.paths) == len(job.files.paths) and not missing
     if store.write_error:
         _warn(f"the journal could not be written to its end: {store.write_error}")
     if complete and store.folder is not None:
         remove_journal(store.folder)
     status = 0 if promises_kept and not missing else 1
     whole = complete and not store.write_error
-    return End(job.files.only(written), missing, complete, status if whole or missing else _NOT_WRITTEN)
+    return End(files, missing, complete, status if whole or missing else _NOT_WRITTEN)
 
 
 @contextmanager
@@ -437,7 +435,7 @@ def print_isolation(provenance: Mapping[str, str]) -> None:
 
 
 def _warn(words: str) -> None:
-    typer.echo(f"contactverif: {' '.join(words.split())}", err=True)
+    echo(f"contactverif: {' '.join(words.split())}", to_stderr=True)
 
 
 def _judge_last_failed(job: Job) -> int:

@@ -115,11 +115,6 @@ class Host:
         assert question is not None
         return raise_failure(question)
 
-    @property
-    def is_loading(self) -> bool:
-        """Return whether the process loads the formulation, and `load` has not waited for that."""
-        return self._loading is not None
-
     def make(self, penalty: float) -> tuple[int, int]:
         """Make a formulation there, and return its number and the number of the process."""
         if self._process is None:

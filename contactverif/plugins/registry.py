@@ -256,7 +256,7 @@ def start_loading(text: str, limits: Limits) -> None:
     if not text.startswith(ENGINE):
         host = host_of(_worker(), text, _with_store(limits, text))
         with suppress(ContractError):
-            if not host.is_loading:
+            if not host.has_process:
                 host.begin_load()
 
 
