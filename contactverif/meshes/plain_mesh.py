@@ -5,6 +5,7 @@ What comes back is checked here: whoever gets a `PlainMesh` may rely on every st
 
 import gzip
 import os
+import re
 from collections.abc import Collection
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
@@ -134,23 +135,20 @@ def _pack(group: Group) -> dict[str, PackedArray]:
 def _cleaned(path: Path, folder: Path) -> Path:
     """Return a file, or a copy of it that is not compressed, and has no byte order mark or blank at its begin."""
     with path.open("rb") as stream:
-        head = stream.read(4)
+        head, suffix = stream.read(4), path.suffix.lower()
     if head.startswith(b"\x1f\x8b"):
         with gzip.open(path) as stream:
             data, name = stream.read(_LARGEST + 1), path.name.removesuffix(".gz")
         if len(data) > _LARGEST:
             raise ValueError(f"it is longer than {_LARGEST / 2**30:g} GiB when it is not compressed")
-    elif (
-        head.startswith(_MARK)
-        or (head[:1].isspace() and path.suffix.lower() != ".stl")
-        or path.suffix.lower() in _NASTRAN
-    ):
+    elif head.startswith(_MARK) or (head[:1].isspace() and suffix != ".stl") or suffix in _NASTRAN:
         data, name = path.read_bytes(), path.name
     else:
         return path
     data = data.removeprefix(_MARK).lstrip()
-    if path.suffix.lower() in _NASTRAN and b"BEGIN BULK" not in data.upper():
-        data = b"BEGIN BULK\n" + data  # Most programs write the cards of the mesh alone.
+    if suffix in _NASTRAN:  # Most programs write the cards of the mesh alone, and go on with a card by eight blanks.
+        data = re.sub(rb"(?m)^ {8}(?=\S)", b"+       ", data)
+        data = data if b"BEGIN BULK" in data.upper() else b"BEGIN BULK\n" + data
     copy = folder / name
     copy.write_bytes(data)
     return copy
@@ -269,7 +267,7 @@ def unknown_group_error(
         listed += f" and {more} more, which contactverif scenes lists"
     if not able:
         others = f", which has {', '.join(map(repr, mesh.groups))} of other cells" if mesh.groups else ""
-        listed = f"groups of {', '.join(kinds)} elements in the file{others}"
+        listed = f"a group of {' or '.join(kinds)} elements, made in the mesher (a physical group, *SURFACE, …){others}"
     needed = f"{' or '.join(near)}? The groups are {listed}" if near else f"one of {listed}" if able else listed
     said = f" ({one_line(mesh.warnings, _LONGEST_REASON)})" if mesh.warnings else ""
     found = "nothing" if name is None else f"{name!r}, which is no group of the file"

@@ -230,7 +230,7 @@ def test_a_file_without_groups(tmp_path: Path) -> None:
     mesh = blocks()
     mesh.cell_data, mesh.field_data = {}, {}
     meshlane.write(tmp_path / "mesh.vtk", mesh)
-    with pytest.raises(MisuseError, match=f"--slave: found 'punch', {UNKNOWN} groups of line, vertex elements"):
+    with pytest.raises(MisuseError, match=f"--slave: found 'punch', {UNKNOWN} a group of line or vertex"):
         read_interface(tmp_path / "mesh.vtk", slave="punch", master="base")
 
 
