@@ -39,7 +39,7 @@ def show_mesh(path: Path) -> None:
     for name, group in mesh.groups.items():
         names.setdefault(tuple((kind, data.tobytes()) for kind, data in group.items()), []).insert(0, name)
     drawn = (each[0] for each in names.values() if not set(kinds).isdisjoint(mesh.groups[each[0]]))
-    inks = {} if plane is None else dict(zip(drawn, _INKS, strict=False))
+    inks = dict(zip(drawn, _INKS, strict=False))
     listed = Table([Column("group", wrap=True), Column("of", wrap=True), Column("body"), Column("")], str(path))
     for name, *others in names.values():
         group = mesh.groups[name]
@@ -52,7 +52,8 @@ def show_mesh(path: Path) -> None:
     said = (mesh.warnings + ("" if plane is None else plane_words(mesh, points))).splitlines()
     said += [f"contact pair {n}: slave {slave}, master {master}" for n, (slave, master) in enumerate(mesh.pairs, 1)]
     said += [f"material of {name}: E = {young:g}, ν = {poisson:g}" for name, (young, poisson) in mesh.materials.items()]
-    show(*map(line, said), *(() if plane is None else _drawing(mesh, points, inks)))
+    said += ["seen along y, with x to the right and z up"] if plane is None else []
+    show(*map(line, said), *_drawing(mesh, points, kinds, inks))
     typed = "" if mesh.pairs else " --slave GROUP --master GROUP"
     more = " --pair N" if len(mesh.pairs) > 1 else ""
     show(line(f"to ask about it: contactverif verify NAME --mesh {path}{typed}{more}"))
@@ -67,11 +68,14 @@ def _count(group: Group) -> str:
     return ", ".join(f"{len(data)} {_WORDS.get(kind, kind)}" for kind, data in group.items()) or "nothing"
 
 
-def _drawing(mesh: PlainMesh, points: FloatArray, inks: dict[str, str]) -> Iterator[Text]:
-    """Yield a drawing to scale: bodies filled, and lines of groups by the letter of the table."""
-    outer = CellSides.of(mesh.cells, points).outer.get(2, np.empty((0, 2), dtype=np.int64))
-    lines = {ink: mesh.groups[name]["line"] for name, ink in inks.items()}
-    used = points[np.unique(np.concatenate([outer.reshape(-1), *(part.reshape(-1) for part in lines.values())]))]
+def _drawing(mesh: PlainMesh, points: FloatArray, kinds: tuple[str, ...], inks: dict[str, str]) -> Iterator[Text]:
+    """Yield a drawing to scale: bodies filled, and the lines or faces of groups by the letter of the table."""
+    sides = CellSides.of(mesh.cells, points).outer
+    in_space, plane = points.shape[1] == 3, points[:, [0, -1]]
+    strokes = {"░": _edges(sides.values())}
+    for name, ink in inks.items():
+        strokes[ink] = _edges(mesh.groups[name][kind] for kind in kinds if kind in mesh.groups[name])
+    used = plane[np.unique(np.concatenate([part.reshape(-1) for part in strokes.values()]))]
     if not len(used):
         return
     (left, low), (right, high) = used.min(axis=0), used.max(axis=0)
@@ -79,9 +83,18 @@ def _drawing(mesh: PlainMesh, points: FloatArray, inks: dict[str, str]) -> Itera
     n_columns, n_rows = int((right - left) * _ASPECT / row) + 1, int((high - low) / row) + 1
     x, y = left + (np.arange(n_columns) + 0.5) * row / _ASPECT, high - (np.arange(n_rows) + 0.5) * row
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    canvas = np.where(is_inside(points[outer], places), "░", " ").reshape(n_rows, n_columns)
-    for ink, part in reversed(lines.items()):  # The first groups over the later ones.
-        for share in np.linspace(0, 1, max(n_columns, n_rows)):
-            along, down = ((1 - share) * points[part[:, 0]] + share * points[part[:, 1]]).T
+    outer = plane[sides[2]] if 2 in sides else np.empty((0, 2, 2))
+    is_body = is_inside(outer, places)  # In space the edges of bodies are drawn.
+    canvas = np.where(is_body, "░", " ").reshape(n_rows, n_columns)
+    for ink in ["░"] * in_space + [*inks.values()][::-1]:  # The first groups over the later ones.
+        first, second = plane[strokes[ink]].swapaxes(0, 1)
+        for share in np.linspace(0, 1, 2 + int(np.abs(second - first).max(initial=0) / row * _ASPECT)):
+            along, down = ((1 - share) * first + share * second).T
             canvas[((high - down) / row).astype(int), ((along - left) / row * _ASPECT).astype(int)] = ink
     yield from (line("".join(each).rstrip()) for each in canvas.tolist())
+
+
+def _edges(parts: Iterable[IntArray]) -> IntArray:
+    """Return lines, and the edges of faces, as rows of two nodes."""
+    rows = [np.stack([part, np.roll(part, -1, axis=1)], axis=-1).reshape(-1, 2) for part in parts if part.shape[1] > 1]
+    return np.concatenate([np.empty((0, 2), dtype=np.int64), *rows])
