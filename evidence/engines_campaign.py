@@ -3,8 +3,8 @@
 `tox -e engines` writes `reports/findings/engines.csv`, a line for each engine and question, and the page `engines.md`;
 `tox -e libraries` writes `libraries.csv` and `libraries.md`. Engines that come as Python packages get environments of
 their own; `GETFEM_PYTHON` names the interpreter of GetFEM. A library is a package of the environment that runs this.
-Lines of today's judges stay. A report that is complete is read and not made again, and one that was stopped goes on,
-so that the same command goes on with the whole.
+Lines of today's judges stay; a page says how many are of older ones. A report that is complete is read and not made
+again, and one that was stopped goes on, so that the same command goes on with the whole.
 """
 
 import csv
@@ -28,6 +28,7 @@ FOLDER = Path(__file__).parents[1] / "reports" / "findings"
 COUNTS, NUMBERS = ("judged", "failed", "planned"), ("number", "value", "tolerance")
 HEADS = ("engine", "question", "verdict", *COUNTS, *NUMBERS, "seconds a case", "reason", "judge")
 PARTS = ("StructuralMechanics", "ContactStructuralMechanics", "LinearSolvers")
+HANGS = "engine.locking"  # It is asked in a run of its own: where no answer came twice, a run asks no more.
 Line = tuple[str, ...]
 KRATOS = ("KratosMultiphysics", *(f"Kratos{part}Application" for part in PARTS))
 
@@ -144,7 +145,7 @@ Each library was asked every property that makes sense for it, as a formulation:
 to its tolerance or furthest beyond it, over the tolerance, how many cases could be judged of how many, and the seconds
 of a case. What fails without a promise is no mistake: a barrier at nodes does not pass the patch test.
 
-`tox -e libraries` wrote this page, and `libraries.csv` beside it, which has the reasons.
+`tox -e libraries` wrote this page, and `libraries.csv` beside it, which has the reasons. {older}
 
 {tables}
 """
@@ -162,7 +163,7 @@ the seconds of a scene. A scene is not judged where the code says that it finds 
 - **not judged**, or **undecided** where nothing is promised: more than a tenth of the scenes was not judged.
 - **crashed**: it ended, or gave no answer within a minute.
 
-`tox -e engines` wrote this page, and `engines.csv` beside it, which has the reasons.
+`tox -e engines` wrote this page, and `engines.csv` beside it, which has the reasons. {older}
 
 {tables}
 """
@@ -183,7 +184,12 @@ def write_page(lines: list[Line], examples: int, name: str = "engines", page: st
                 f"{row['seconds a case']} |"
             )
         tables.append("\n".join([f"## {engine}", "", *rows, ""]))
-    (FOLDER / f"{name}.md").write_text(page.format(examples=examples, tables="\n".join(tables)), encoding="utf-8")
+    old = [line[-1] != judge_of(line[1]) for line in lines]
+    older = (
+        f"{sum(old)} of its {len(old)} lines are of an older judge, whose digest they keep (`judge`) if there is one."
+    )
+    text = page.format(examples=examples, tables="\n".join(tables), older=older)
+    (FOLDER / f"{name}.md").write_text(text, encoding="utf-8")
 
 
 def main(folder: Path, examples: int, name: str = "engines") -> None:
@@ -207,7 +213,8 @@ def main(folder: Path, examples: int, name: str = "engines") -> None:
             continue
         ids = property_ids(engines=not choice.library)
         old = [id_ for id_ in ids if lines.get((choice.label, id_), ("",))[-1] != judge_of(id_)]
-        lines |= {line[:2]: line for line in ask(choice, old, folder, examples)} if old else {}
+        for part in ([id_ for id_ in old if id_ != HANGS], [id_ for id_ in old if id_ == HANGS]):
+            lines |= {line[:2]: line for line in ask(choice, part, folder, examples)} if part else {}
         rows = [line for each in choices for line in lines.values() if line[0] == each.label]
         with file.open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream, lineterminator="\n").writerows([HEADS, *rows])

@@ -1,13 +1,19 @@
-"""Print the error of nodal forces on four Hertz meshes: codes beside the formulation of ours with the same method.
+"""Write the error of nodal forces on four Hertz meshes: codes beside the formulation of ours with the same method.
 
     python evidence/hertz_beside_codes.py kratos=PYTHON ngsolve=PYTHON
 
-`NAME=PYTHON` is the interpreter that has a code; without it the code is left out. CalculiX needs the program `ccx`.
+`NAME=PYTHON` is the interpreter that has a code; without it the lines of the code stay. CalculiX needs the program
+`ccx`. `reports/findings/hertz.csv` has a line for each scene and formulation.
 """
 
+import csv
 import shutil
 import sys
 from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+from origin import judge_of, keep_commit
 
 from contactverif import Subject
 from contactverif.isolation.host import end_all
@@ -18,14 +24,16 @@ from contactverif.problems.hertz_boxes import HERTZ_STUDIES, HertzStudy
 from contactverif.problems.problem import FORCES
 
 SECONDS = 120.0  # The most for one mesh.
+TABLE = Path(__file__).parents[1] / "reports" / "findings" / "hertz.csv"
+HEADS = ("scene", "formulation", "16", "20", "26", "33", "judge")
 SCENES = ("parabola-layer", "flat-soft")
 PAIRS = (
     ("sts", "engine/control"),
     ("sts", "engine/calculix"),
+    ("sts", "engine/ngsolve:order=15"),
     ("nts-ar", "engine/calculix:kind=nodes"),
     ("mortar-dual-lm", "engine/kratos:search=radius,normals=updated,augmentation=1e-6"),
     ("vts-g:n=3", "engine/ngsolve"),
-    ("sts", "engine/ngsolve:order=15"),
 )
 
 
@@ -49,16 +57,23 @@ def errors(study: HertzStudy, subject: Subject) -> list[float]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Print a table of each scene."""
+    """Write the lines of all formulations and of the codes that are here."""
     interpreters = dict(argument.split("=", 1) for argument in arguments)
     subjects = {name: load(name, interpreters) for name in dict.fromkeys(name for pair in PAIRS for name in pair)}
     studies = [HERTZ_STUDIES.read(case) for case in HERTZ_STUDIES.cases() if case.name in SCENES]
+    with TABLE.open(encoding="utf-8", newline="") as stream:
+        lines = {(row[0], row[1]): row for row in csv.reader(stream)}
     for scene, study in zip(SCENES, studies, strict=True):
-        print(f"\n{scene}, segments {', '.join(map(str, study.meshes[:4]))}")
         for name, subject in subjects.items():
             if subject is not None:
-                print(f"  {name:70s}", *(f"{error:.3e}" for error in errors(study, subject)), flush=True)
+                numbers = (f"{error:.3e}" for error in errors(study, subject))
+                lines[scene, name] = [scene, name, *numbers, judge_of("accuracy.hertz")]
+                print(*lines[scene, name], flush=True)
     end_all()
+    kept = (lines[key] for key in product(SCENES, subjects) if key in lines)
+    with TABLE.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([HEADS, *kept])
+    keep_commit(TABLE)
 
 
 if __name__ == "__main__":

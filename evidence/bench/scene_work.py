@@ -23,9 +23,9 @@ sys.path.append(str(Path(__file__).parents[1]))
 from origin import keep_commit
 
 from contactverif import Case, Property, Subject, judge_case, load_formulation, load_properties
-from contactverif.mechanics import bulk, newton
-from contactverif.mechanics.newton import Trace
+from contactverif.mechanics import bulk
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
+from contactverif.mechanics.system import System
 from contactverif.sampling.draw import draw_cases
 
 
@@ -53,15 +53,15 @@ class Counts:
     factorised: int = 0
     parts: set[Any] = field(default_factory=set)  # Elastic bodies that differ, as far as matrices are concerned.
     scenes: dict[int, Scene] = field(default_factory=dict)
-    traces: list[Trace] = field(default_factory=list)
+    forces: dict[int, Any] = field(default_factory=dict)  # The contact forces that each scene was balanced with last.
 
 
 @contextmanager
 def count_all() -> Iterator[Counts]:
-    """Count assemblies, factorisations, scenes and solutions while the context lasts."""
+    """Count assemblies, factorisations and scenes, and keep contact forces, while the context lasts."""
     counts = Counts()
     assemble, factorise, prepare = bulk.assemble_stiffness, bulk._interior_solver, bulk._factorise
-    bodies, finish = Scene.__dict__["condensed_bodies"], newton._trace
+    bodies, balance = Scene.__dict__["condensed_bodies"], System.balance
     condense = bodies.func
 
     def count_assembly(*arguments: Any) -> Any:
@@ -80,17 +80,16 @@ def count_all() -> Iterator[Counts]:
         counts.scenes[id(scene)] = scene
         return condense(scene)
 
-    def count_solution(*arguments: Any) -> Trace:
-        trace = finish(*arguments)
-        counts.traces.append(trace)
-        return trace
+    def keep_forces(system: System, u: Any, forces: Any) -> Any:
+        counts.scenes[id(system.scene)], counts.forces[id(system.scene)] = system.scene, forces
+        return balance(system, u, forces)
 
     with ExitStack() as stack:
         stack.enter_context(patch.object(bulk, "assemble_stiffness", count_assembly))
         stack.enter_context(patch.object(bulk, "_interior_solver", count_factorisation))
         stack.enter_context(patch.object(bulk, "_factorise", count_part))
         stack.enter_context(patch.object(bodies, "func", count_scene))
-        stack.enter_context(patch.object(newton, "_trace", count_solution))
+        stack.enter_context(patch.object(System, "balance", keep_forces))
         yield counts
 
 
@@ -121,16 +120,16 @@ def measure_work(question: Property, subject: Subject) -> Work:
         "factorised": counts.factorised,
         "least_bodies": len(counts.parts),
     }
-    if counts.traces:
-        work |= sizes_of(max(counts.traces, key=lambda trace: trace.scene.n_free))
+    if counts.forces:
+        largest = max(counts.forces, key=lambda key: counts.scenes[key].n_free)
+        work |= sizes_of(counts.scenes[largest], counts.forces[largest])
     return Work(**work)
 
 
-def sizes_of(trace: Trace) -> dict[str, int]:
-    """Return the numbers of facets and unknowns of a solved scene."""
-    scene = trace.scene
+def sizes_of(scene: Scene, forces: Any) -> dict[str, int]:
+    """Return the numbers of facets and unknowns of a solved scene with its contact forces."""
     interface = scene.interface
-    pushed = trace.forces[: interface.n_unknowns].reshape(-1, 2).any(axis=1)
+    pushed = forces[: interface.n_unknowns].reshape(-1, 2).any(axis=1)
     segments = np.vstack([interface.slave.segments, interface.master.segments])
     touching = segments[pushed[segments].any(axis=1)]
     rows = np.repeat(np.isin(np.arange(interface.n_nodes), touching), 2)

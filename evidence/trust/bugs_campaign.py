@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 
-from tables import FOLDER, TESTS, install, keep_commit, markdown
+from tables import FOLDER, JUDGE, TESTS, entries, install, judge_of, keep_commit, markdown
 from zoo.springs import FRESH, KNOWN, Springs
 
-HEADS = ("formulation", "named", "first row", "first wrong row", "in all", "lines", "status", "diagnosis")
+HEADS = ("formulation", "named", "first row", "first wrong row", "in all", "lines", "status", "diagnosis", JUDGE)
 WRONG = re.compile(r"^\S+ \S+: (fail|crashed|BROKEN|breaks)")
 RIGHT = "right"
 ASKED = KNOWN | FRESH
@@ -74,7 +74,8 @@ class Answer:
         """The line of the table."""
         named = "–" if self.name == RIGHT else "yes" if self.named else "no"
         seconds = (f"{value:.1f}" for value in self.times)
-        return self.name, named, *seconds, str(len(self.screen.splitlines())), str(self.status), self.diagnosis
+        counts = str(len(self.screen.splitlines())), str(self.status)
+        return self.name, named, *seconds, *counts, self.diagnosis, judge_of(*entries())
 
 
 def ask(name: str, folder: Path) -> Answer:

@@ -32,7 +32,8 @@ A verifier must catch what is wrong, and never accuse what is right. `tox -e tru
 from the tables beside it: {commits}.
 
 Each line of these tables keeps a digest of the properties that judged it (`judge`). {older} `tox -e trust` asks such
-lines anew, and no others.
+lines anew, and no others. `evidence/trust/bugs_campaign.py` writes `bugs.csv`; the formulations of `unseen.csv` were
+not kept, so that its lines stay.
 
 """
 CAMPAIGN = """## Nobody who is right is accused

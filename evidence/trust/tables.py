@@ -27,6 +27,8 @@ JUDGED_BY = {
     "smallest_errors.csv": "property",
     "curved_damage.csv": "property",
     "smallest_cases.csv": "caught by",
+    "unseen.csv": "",
+    "bugs.csv": "",
 }
 
 

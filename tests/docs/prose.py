@@ -60,6 +60,15 @@ def read(name: str) -> Any:
     return _read(REPORTS / name)
 
 
+OTHER = "kratos:search=radius,search_factor=10000,normals=updated,augmentation=1e-6"
+
+
+def answer(name: str, question: str) -> Any:
+    """Return the line of a code or a library for a question."""
+    lines = pd.concat([read("findings/engines.csv"), read("findings/libraries.csv")])
+    return next(lines[(lines.engine == name) & (lines.question == question)].itertuples())
+
+
 def code(name: str) -> Any:
     """Return what `module:name` is in the code."""
     module, _, attribute = name.partition(":")
@@ -67,8 +76,8 @@ def code(name: str) -> Any:
 
 
 def short(value: float) -> str:
-    """Return two digits of a number as sentences write it: 7.8e-2."""
-    return re.sub("e-0?", "e-", f"{value:.1e}")
+    """Return two digits of a number as sentences write it: 7.8e-2, or 7.8e2."""
+    return re.sub(r"e\+?(-?)0?", r"e\1", f"{value:.1e}")
 
 
 def ratio(name: str) -> str:
@@ -93,10 +102,15 @@ def most_in_space() -> int:
     )
 
 
-@cache
 def accuracy(formulation: str, case: str, name: str = "wavy") -> SimpleNamespace:
-    """Return the numbers of the one case of `accuracy.NAME` whose name begins so, without spaces. It is solved here."""
-    prop = the_property(f"accuracy.{name}")
+    """Return the numbers of a case of `accuracy.NAME`."""
+    return solution(formulation, f"accuracy.{name}", case)
+
+
+@cache
+def solution(formulation: str, name: str, case: str) -> SimpleNamespace:
+    """Return the numbers of the one case of a property whose name begins so, without spaces. It is solved here."""
+    prop = the_property(name)
     (scene,) = (each for each in prop.cases(None) if each.name.replace(" ", "").startswith(case))
     measurement = judge_case(prop, scene, load_formulation(formulation)).measurement
     numbers = checked_numbers(prop.info, measurement)
@@ -142,7 +156,7 @@ SCENES = {
     "patch.curved": "two rings, two meshes",
     "patch.kinked": "zigzag, with two and three normals",
     "accuracy.wavy": "two wavy half-planes, four meshes",
-    "accuracy.hertz": "Hertz in a box, four meshes",
+    "accuracy.hertz": "Hertz in a box, finest mesh",
     "newton.attainable": "solved far from the origin, at five places",
 }
 
@@ -154,6 +168,33 @@ def scene_work() -> Cells:
         row = work.loc[name]
         pairs = (row.assembled, row.least_bodies), (row.facets, row.touching_facets), (row.unknowns, row.least_unknowns)
         yield kind, *(f"{number} ({least})" for number, least in pairs), str(row.all_unknowns)
+
+
+METHODS = {
+    "engine/control": "control",
+    "engine/calculix": "CalculiX, surface to surface",
+    "engine/calculix:kind=nodes": "CalculiX, node to surface",
+    "engine/kratos:search=radius,normals=updated,augmentation=1e-6": "Kratos, the other search and normals, hardly any "
+    "augmentation",
+    "vts-g:n=3": "`vts-g:n=3`, Gauss points",
+    "engine/ngsolve": "NGSolve",
+    "engine/ngsolve:order=15": "NGSolve, order 15",
+}
+
+
+def hertz(scene: str) -> Cells:
+    """Iterate over the rows of the errors of nodal forces on four Hertz meshes."""
+    for row in read("findings/hertz.csv").itertuples():
+        if row.scene == scene:
+            errors = (re.sub("e-0?", "e-", f"{error:.3e}") for error in row[3:7])
+            yield METHODS.get(row.formulation, f"`{row.formulation}`"), *errors
+
+
+def hertz_difference() -> float:
+    """Return the largest difference of a code from the formulation before it, which has its method, over its errors."""
+    table = read("findings/hertz.csv")
+    ours = table.iloc[:, 2:6].where(~table.formulation.str.startswith("engine/")).ffill()
+    return float((table.iloc[:, 2:6] / ours - 1).abs().max(axis=None))
 
 
 def flat_rates() -> Cells:

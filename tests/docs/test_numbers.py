@@ -20,6 +20,8 @@ STORED = (
     ("paper/paper.nc", "fig30_convergence/iterations", (3, 1, 1)),
     ("stability/stability.nc", "stability/sweep/value", (0, 7, 0)),
     ("bench/kernels.csv", "\nsts,1000000,1.034,1.253", "\nsts,1000000,1.034,1.553"),
+    ("findings/hertz.csv", "soft,nts-ar,2.774e-02", "soft,nts-ar,2.874e-02"),
+    ("findings/engines.csv", "engine.mirror,BROKEN PROMISE,94,72,", "engine.mirror,BROKEN PROMISE,94,73,"),
 )
 
 

@@ -1,4 +1,4 @@
-"""Two strips in CalculiX alone, one on the other, 1 high and 1 thick, E = 1, pressed together by 0.01."""
+"""Two strips in CalculiX alone, one on the other, 1 high and 1 thick, pressed together by 0.01."""
 
 import subprocess
 import tempfile
@@ -7,11 +7,11 @@ from pathlib import Path
 PUSHED, STIFFNESS = 0.01, 100.0
 
 
-def press(upper, lower):
+def press(upper, lower, kind="SURFACE TO SURFACE", modulus=1.0):
     """Return how ccx ends, and the displacements of the slave's nodes across the contact.
 
     The columns of the strips are between these places x. The upper strip is the slave, and its upper side is pushed
-    down.
+    down. Springs hold the slave's nodes along z with mortar contact, which finds no pivot where supports do.
     """
     lines, nodes, cells, held = ["*NODE, NSET=ALL"], [], [], []
     for xs, base in ((upper, 0), (lower, -1)):
@@ -28,10 +28,19 @@ def press(upper, lower):
     above = len(upper) - 1
     lines += ["*SURFACE, NAME=S", *(f"{k}, S3" for k in range(1, above + 1))]
     lines += ["*SURFACE, NAME=M", *(f"{k}, S5" for k in range(above + 1, len(cells) + 1))]
-    lines += ["*MATERIAL, NAME=A", "*ELASTIC", "1., 0.", "*SOLID SECTION, ELSET=E, MATERIAL=A"]
-    lines += ["*SURFACE INTERACTION, NAME=C", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{STIFFNESS}"]
-    lines += ["*CONTACT PAIR, INTERACTION=C, TYPE=SURFACE TO SURFACE", "S, M", "*STEP", "*STATIC", "1., 1."]
-    lines += ["*BOUNDARY", "ALL, 3, 3", *(line for k, y in held for line in (f"{k}, 1, 1", f"{k}, 2, 2, {y}"))]
+    slave = [k for k in (*range(1, len(upper) + 1), *range(2 * len(upper) + 1, 3 * len(upper) + 1)) if "MORTAR" in kind]
+    if slave:
+        lines += ["*ELEMENT, TYPE=SPRING1, ELSET=Z", *(f"{len(cells) + k}, {n}" for k, n in enumerate(slave, 1))]
+        lines += ["*SPRING, ELSET=Z", "3", f"{1e7 * modulus:.6e}"]
+    lines += ["*MATERIAL, NAME=A", "*ELASTIC", f"{modulus:.6e}, 0.", "*SOLID SECTION, ELSET=E, MATERIAL=A"]
+    lines += [
+        "*SURFACE INTERACTION, NAME=C",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+        f"{STIFFNESS * modulus:.6e}",
+    ]
+    lines += [f"*CONTACT PAIR, INTERACTION=C, TYPE={kind}", "S, M", "*STEP", "*STATIC", "1., 1."]
+    across = [f"{k}, 3, 3" for k in range(1, len(nodes) + 1) if k not in slave]
+    lines += ["*BOUNDARY", *across, *(line for k, y in held for line in (f"{k}, 1, 1", f"{k}, 2, 2, {y}"))]
     lines += ["*NODE PRINT, NSET=ALL", "U", "*END STEP"]
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "strips.inp").write_text("\n".join(lines) + "\n")
