@@ -1,0 +1,172 @@
+"""Decks of Abaqus and CalculiX: what is read, on which side the body of a surface is, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactverif.meshes.deck import read_deck
+from contactverif.meshes.plain_mesh import PlainMesh
+
+# Two squares, one above the other with a gap of 0.5. Nodes 1 to 4 and 11 to 14, elements 1 and 2.
+NODES = "*NODE, NSET=ALL\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n11,0,1.5\n12,1,1.5\n13,1,2.5\n14,0,2.5\n"
+CELLS = "*ELEMENT, TYPE=CPE4, ELSET=LOW\n1,1,2,3,4\n*ELEMENT, TYPE=CPE4, ELSET=UP\n2,11,12,13,14\n"
+SURFACES = "*SURFACE, NAME=Top\nLOW, S3\n*SURFACE, NAME=Bottom\nUP, S1\n"
+SQUARES = NODES + CELLS
+TOP, BOTTOM = [[2, 3]], [[4, 5]]
+
+CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+# {type: (corners, middle of each face)}: CalculiX 2.22, section *SURFACE, and the element library of Abaqus agree.
+FACES = {
+    "CPE3": (CUBE[[0, 1, 3]], ["0.5 0 0", "0.5 0.5 0", "0 0.5 0"]),
+    "CAX4R": (CUBE[:4], ["0.5 0 0", "1 0.5 0", "0.5 1 0", "0 0.5 0"]),
+    "C3D4": (CUBE[[0, 1, 3, 4]], ["1 1 0", "1 0 1", "1 1 1", "0 1 1"]),
+    "C3D6": (CUBE[[0, 1, 3, 4, 5, 7]], ["1 1 0", "1 1 3", "0.5 0 0.5", "0.5 0.5 0.5", "0 0.5 0.5"]),
+    "C3D8I": (CUBE, ["0.5 0.5 0", "0.5 0.5 1", "0.5 0 0.5", "1 0.5 0.5", "0.5 1 0.5", "0 0.5 0.5"]),
+}
+
+
+def read(folder: Path, text: str | bytes) -> PlainMesh:
+    path = folder / "deck.inp"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_deck(str(path))
+
+
+def sides(mesh: PlainMesh, name: str) -> list[list[int]]:
+    return [side for part in mesh.groups[name].values() for side in part.tolist()]
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("name", FACES)
+def test_each_face_of_a_solid_cell_is_where_the_codes_have_it_with_the_cell_behind_it(
+    tmp_path: Path, name: str, mirrored: bool
+) -> None:
+    corners, middles = FACES[name]
+    points = corners * [[-1 if mirrored else 1, 1, 1]]
+    text = "*NODE\n" + "".join(f"{n}, {x}, {y}, {z}\n" for n, (x, y, z) in enumerate(points, 1))
+    text += f"*ELEMENT, TYPE={name}\n7, {', '.join(map(str, range(1, len(points) + 1)))}\n"
+    text += "".join(f"*SURFACE, NAME=F{n}\n7, S{n}\n" for n in range(1, len(middles) + 1)) + "*SURFACE, NAME=SKIN\n7\n"
+    mesh = read(tmp_path, text)
+    for number, middle in enumerate(middles, 1):
+        (side,) = sides(mesh, f"F{number}")
+        expected = np.array(middle.split(), dtype=float) * (points.max(axis=0) + points.min(axis=0))
+        if name == "C3D4" or (name == "C3D6" and number < 3):
+            expected = np.array(middle.split(), dtype=float) / 3 * (points.max(axis=0) + points.min(axis=0))
+        np.testing.assert_allclose(points[side].mean(axis=0), expected, atol=1e-15)
+        a, b, *rest = points[side]
+        normal = np.cross(b - a, rest[0] - a if rest else [0, 0, 1])
+        assert normal @ (points.mean(axis=0) - a) < 0
+    assert {frozenset(side) for side in sides(mesh, "SKIN")} == {
+        frozenset(sides(mesh, f"F{number}")[0]) for number in range(1, len(middles) + 1)
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "face", "expected"),
+    [
+        ("R2D2", "SPOS", [[1, 0]]),  # The normal is on the left of 1 → 2, so the body is on the right.
+        ("T2D2", "SNEG", [[0, 1]]),
+        ("S3", "SPOS", [[0, 1, 2]]),
+        ("S4R", "SNEG", [[3, 2, 1, 0]]),
+        ("R3D4", "SPOS", [[0, 1, 2, 3]]),
+        ("S4", "S1", [[3, 2, 1, 0]]),  # CalculiX: the face on the negative side.
+    ],
+)
+def test_the_body_of_a_thin_cell_is_behind_its_face(
+    tmp_path: Path, name: str, face: str, expected: list[list[int]]
+) -> None:
+    nodes = ", ".join(map(str, range(1, len(expected[0]) + 1)))
+    mesh = read(tmp_path, f"{NODES}*ELEMENT, TYPE={name}, ELSET=E\n5, {nodes}\n*SURFACE, NAME=A\nE, {face}\n")
+    assert sides(mesh, "A") == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SQUARES + SURFACES,
+        "\ufeff" + (SQUARES + SURFACES).replace("\n", "\r\n"),
+        (SQUARES + SURFACES).lower().replace("top", "Top").replace("bottom", "Bottom"),
+        b"** Gr\xfc\xdfe\n" + (SQUARES + SURFACES).encode(),
+        (SQUARES + SURFACES).replace(", ", " ,\t").replace("*NODE ,", "  * NODE,\n** continued\n "),
+        NODES.replace("11,0,1.5", "*NODE\n11, 0., 1.5D0, 0.") + CELLS + SURFACES,
+        NODES + CELLS.replace("1,1,2,", "1,1,\n2,") + SURFACES,
+        SURFACES + CELLS + NODES,
+        SQUARES + "*ELSET, ELSET=A, GENERATE\n1, 1, 1\n*ELSET, ELSET=B\nA\n" + SURFACES.replace("LOW", "B"),
+        SQUARES + "*SURFACE, NAME=Top, TYPE=ELEMENT\n1, S3\n*SURFACE, NAME=Bottom\n2, S1\n",
+        SQUARES + SURFACES + '*SURFACE, NAME="Top "\nUP, S3\n',
+    ],
+    ids=map(str, range(11)),
+)
+def test_a_deck_is_read_however_it_is_written(tmp_path: Path, text: str | bytes) -> None:
+    mesh = read(tmp_path, text)
+    assert (sides(mesh, "Top"), sides(mesh, "Bottom")) == (TOP, BOTTOM)
+    assert mesh.points.shape == (8, 2)
+    assert mesh.cells["quad"].tolist() == [[0, 1, 2, 3], [4, 5, 6, 7]]
+
+
+def test_pairs_materials_sets_and_names_are_those_of_the_deck(tmp_path: Path) -> None:
+    extra = (
+        "*NSET, NSET=N\n1, 4\n*NSET, NSET=N\n11\n*ELSET, ELSET=TOP\n2\n*SURFACE, NAME=P, TYPE=NODE\nN\n12\n"
+        "*MATERIAL, NAME=steel\n*ELASTIC\n2.1E5, 0.3, 20.\n1., 0.3, 100.\n*SOLID SECTION, ELSET=LOW, MATERIAL=Steel\n"
+        "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE\nBOTTOM, top\np, TOP\n*TIE\nx, y\n"
+    )
+    mesh = read(tmp_path, SQUARES + SURFACES + extra)
+    assert mesh.pairs == (("Bottom", "Top"), ("P", "Top"))
+    assert mesh.materials == {"LOW": (2.1e5, 0.3)}
+    assert mesh.groups["N"]["vertex"].tolist() == [[0], [3], [4]]
+    assert mesh.groups["P"]["vertex"].tolist() == [[0], [3], [4], [5]]
+    assert mesh.groups["TOP"]["quad"].tolist() == [[4, 5, 6, 7]]
+    assert mesh.warnings == "Not read: *TIE.\n"
+
+
+def test_instances_are_moved_and_their_names_have_their_own_in_front(tmp_path: Path) -> None:
+    part = (
+        NODES.replace("*NODE, ", "*Part, name=P\n*Node, ").split("11,")[0]
+        + CELLS.split("*ELEMENT, TYPE=CPE4, ELSET=U")[0]
+    )
+    assembly = (
+        "*Surface, name=S\nLOW, S3\n*End Part\n*Assembly, name=A\n*Instance, name=I-1, part=P\n*End Instance\n"
+        "*Instance, name=I-2, part=P\n0., 3., 0.\n1., 3., 0., 1., 3., 1., 180.\n*Elset, elset=own\n1\n*End Instance\n"
+        "*Elset, elset=_E, internal, instance=I-1\n1\n*Surface, name=T\n_E, S3\nI-2.LOW, S1\n"
+        "*Nset, nset=N\nI-2.3\n*End Assembly\n*Contact Pair, interaction=I\nI-2.S, T\n"
+    )
+    mesh = read(tmp_path, part + assembly)
+    np.testing.assert_allclose(mesh.points[4:], [[2, 3], [1, 3], [1, 2], [2, 2]], atol=1e-15)
+    assert mesh.pairs == (("I-2.S", "T"),)
+    assert (sides(mesh, "I-1.S"), sides(mesh, "I-2.S")) == ([[2, 3]], [[6, 7]])
+    assert sides(mesh, "T") == [[2, 3], [4, 5]]
+    assert sides(mesh, "N") == [[6]]
+    assert "S" not in mesh.groups
+    assert sides(mesh, "own") == sides(mesh, "I-2.own") == [[4, 5, 6, 7]]
+
+
+def test_files_that_a_deck_includes_are_read_in_their_place(tmp_path: Path) -> None:
+    (tmp_path / "mesh.inc").write_text(NODES + "*ELEMENT, TYPE=CPE4, ELSET=UP, INPUT=up.txt\n*INCLUDE, INPUT=low.inc\n")
+    (tmp_path / "up.txt").write_text("2,11,12,13,14")
+    (tmp_path / "low.inc").write_text(CELLS.split("*ELEMENT, TYPE=CPE4, ELSET=U")[0])
+    mesh = read(tmp_path, '*Include, input="mesh.inc"\n' + SURFACES)
+    assert (sides(mesh, "Top"), sides(mesh, "Bottom")) == (TOP, BOTTOM)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("*INCLUDE, INPUT=deck.inp\n", "line 1: *INCLUDE: found deck.inp; needed an ordinary file"),
+        (NODES + "*NODE\n4, 0, 2\n", "line 11: *NODE: found 4, which is no number or is in use"),
+        (SQUARES + "*ELSET, ELSET=LOW\n3\n", "line 15: *ELSET: found 3; needed a number or an ELSET of the deck"),
+        (SQUARES + "*NSET, NSET=A\nB\n*NSET, NSET=B\nA\n", "no sets in a circle"),
+        (NODES + CELLS.replace("1,1,2,3,4", "1,1,2,3"), "line 11: *ELEMENT: found 4 numbers; needed 5"),
+        (NODES + CELLS.replace("1,1,2,3,4", "1,1,2,3,5"), "node '5'; needed nodes of the deck"),
+        (NODES + "*ELEMENT, TYPE=C3D20R\n", "quadratic elements C3D20R; needed elements of first order"),
+        (SQUARES + "*NCOPY, CHANGE NUMBER=10\n", "line 14: *NCOPY: found this card, which makes or moves nodes"),
+        (SQUARES + "*SURFACE, NAME=A\nLOW, S5\n", "face S5 of elements CPE4; needed S1, S2, S3, S4"),
+        (SQUARES + "*ELEMENT, TYPE=MASS\n9, 1\n*SURFACE, NAME=A\n9, S1\n", "needed elements that are read"),
+        (SQUARES + SURFACES + "*CONTACT PAIR\nTop, Low\n", "found Top, Low; needed two surfaces, the slave first"),
+        (NODES.replace("1,0,0", "1,0,x"), "line 2: *NODE: found 0, x"),
+        (NODES.replace("*NODE", "*NODE, SYSTEM=C"), "needed rectangular coordinates"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=r"line \d+") as error:
+        read(tmp_path, text)
+    assert message in str(error.value)
