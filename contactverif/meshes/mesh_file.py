@@ -170,11 +170,11 @@ def planar(mesh: PlainMesh) -> FloatArray | None:
     The axes keep their order: a mesh in x and z is seen with x to the right and z up.
     """
     used = _used(mesh)
-    extent = np.ptp(mesh.points[used], axis=0)
+    extent = np.ptp(mesh.points[used], axis=0) if len(used) else np.zeros(2)
     if not np.isfinite(extent).all():
         raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
     if len(extent) == 2:
-        return mesh.points
+        return mesh.points[:, :2]
     thin = [axis for axis in (2, 1, 0) if extent[axis] <= FLAT * extent.max()]
     return np.delete(mesh.points, thin[0], axis=1) if thin else None
 

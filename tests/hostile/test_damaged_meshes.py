@@ -103,7 +103,7 @@ def test_a_reader_without_an_end_is_stopped(tmp_path: Path, monkeypatch: pytest.
 
 def test_so_many_groups_are_no_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_text(tmp_path / "a.msh", "1 1 2 1 1 1 2\n2 1 2 2 2 2 3\n")
-    monkeypatch.setattr("contactverif.meshes.plain_mesh._MOST_VALUES", 1)
+    monkeypatch.setattr("contactverif.meshes.read_file._MOST_VALUES", 1)
     with pytest.raises(
         MisuseError, match="--slave: found '1', which is no group of the file; needed a group of line or vertex"
     ):
