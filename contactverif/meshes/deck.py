@@ -109,21 +109,23 @@ def _expand(path: str, files: list[str], depth: int = 0) -> str:
 def _read_cards(text: str, warnings: list[str]) -> tuple[list[_Card], dict[str, _Card]]:
     """Return the cards that are read, those of a part once for each instance; and the instances by name."""
     cards, parts, instances, skipped = list[_Card](), dict[str, list[_Card]](), dict[str, _Card](), list[str]()
-    before, *rest = _KEYWORD.split(text)
+    before, *blocks = _KEYWORD.split(text)
     current, name, line = cards, "", 1 + before.count("\n")
     _Card("", {}, "", 1).need(not before.strip(), "text before the first keyword; needed a deck, such as *NODE first")
-    for head, data in zip(rest[::2], rest[1::2], strict=True):
+    for head, data in zip(blocks[::2], blocks[1::2], strict=True):
         line += head.count("\n")
-        (keyword, _), *pairs = (
-            (_label(key), value) for key, _, value in (each.partition("=") for each in head.split(","))
-        )
-        card = _Card(keyword, {key: value.strip() for key, value in pairs if key}, data, line, name, _label(name))
+        title, *rest = head.split(",")
+        pairs = (part.partition("=") for part in rest if part.strip())
+        parameters = {_label(key): value.strip() for key, _, value in pairs}
+        keyword = _label(title)
+        card = _Card(keyword, parameters, data, line, name, _label(name))
         line += data.count("\n")
-        proper = all(key[:1].isalpha() for key in (keyword, *card.parameters))
+        proper = all(key[:1].isalpha() for key in (keyword, *parameters))
         card.need(proper, "a keyword or a parameter that begins with no letter; needed a name")
         needed = "needed a deck with all nodes and elements in their places"
         card.need(keyword not in _REFUSED.split(), f"this card, which makes or moves nodes and is not read; {needed}")
         if keyword in _LEVELS:
+            card.need(keyword == "INSTANCE" or not data.strip(), "data lines; needed a keyword")
             current, name = cards, ""
         if keyword == "PART":
             current = parts.setdefault(card.label("NAME"), [])
@@ -138,7 +140,8 @@ def _read_cards(text: str, warnings: list[str]) -> tuple[list[_Card], dict[str, 
         else:
             skipped.append(f"*{keyword}")
         if keyword in _MESH_CARDS:
-            skipped += [f"{key} of *{keyword}" for key in card.parameters if key not in _PARAMETERS]
+            skipped += [f"{key} of *{keyword}" for key in parameters if key not in _PARAMETERS]
+    skipped += [f"the part {part}" for part in parts.keys() - {card.label("PART") for card in instances.values()}]
     warnings += [f"Not read: {', '.join(dict.fromkeys(skipped))}."] if skipped else []
     return cards, instances
 
@@ -260,8 +263,12 @@ class _Deck:
                         first, last, step = map(int, card.numbers(line, [*fields, "1", ""][:3]))
                         proper = step > 0 and last - first in range(_LONGEST)
                         card.need(proper, f"{', '.join(fields)}; needed a first number, a last one, and a step", line)
-                        numbers = map(str, range(first, last + 1, step))
+                        numbers = list(map(str, range(first, last + 1, step)))
                         fields = [each for each in numbers if card.prefix + each in self.indices[kind]]
+                        if len(fields) < len(numbers):
+                            self.warnings.append(
+                                f"{kind} {label}: {len(fields)} of {len(numbers)} numbers are in the deck."
+                            )
                     for each in filter(None, fields):
                         members |= dict.fromkeys(self.members(kind, card, each, line, depth + 1))
             self.known[kind, label] = list(members)
@@ -284,37 +291,35 @@ class _Deck:
 
     def surface(self, label: str) -> Group:
         """Return the sides of a surface by kind."""
-        thin, solid = list[list[int]](), list[list[int]]()
-        owners, whole = (
-            list[int](),
-            list[int](),
-        )  # The elements of solid sides, and those that are there with all sides.
+        sides, owners, whole = list[list[int]](), list[int](), list[int]()  # Elements with a face, or all free faces.
         for card in self.sets["SURFACE", label]:
             assert isinstance(card, _Card)
             form = _label(card.parameters.get("TYPE", "ELEMENT"))
             if form not in ("NODE", "ELEMENT") or {"COMBINE", "CROP"} & set(card.parameters):
-                self.warnings.append(f"The surface {label} is of a type that is not read.")
-                return {}
+                return {}  # An analytical surface, or one that is made of others.
             for line, (member, *rest) in card.rows():
                 if form == "NODE":
-                    thin += [[node] for node in self.members("NSET", card, member, line)]
+                    sides += [[node] for node in self.members("NSET", card, member, line)]
                     continue
                 face = _label((*rest, "")[0])
                 for element in self.members("ELSET", card, member, line):
                     name, _, faces, nodes = self.elements[element]
-                    is_solid, needed = "S3" in faces, f"needed {', '.join(faces) or 'elements that are read'}"
-                    proper = face in faces or (is_solid and not face)
+                    proper = face in faces or (not face and "S3" in faces)
+                    needed = f"needed {', '.join(faces) or 'elements that are read'}"
                     card.need(proper, f"face {face or 'none'} of elements {name}; {needed}", line)
-                    side = [nodes[corner] for corner in faces.get(face, [])]
-                    card.need(len({*side}) == len(side), f"a side of an element {name} with a node twice", line)
-                    (solid if is_solid and face else thin if face in faces else []).append(side)
-                    (owners if face else whole).append(element)
-        turned = self.boundary(owners)
+                    (owners if face in faces else whole).append(element)
+                    if face in faces:
+                        sides.append([nodes[corner] for corner in faces[face]])
+                        card.need(len({*sides[-1]}) == len(sides[-1]), f"{name} with a node twice on {face}", line)
+        behind = self.boundary(owners)
         outer = self.boundary(range(len(self.elements))) if whole else {}
-        sides = thin + [turned.get(frozenset(side), side) for side in solid]
+        sides = [behind.get(frozenset(side), side) for side in sides]
         sides += [side for key, side in self.boundary(whole).items() if key in outer]
+        each = dict.fromkeys(map(tuple, sides))
+        if len(each) < len(sides):
+            self.warnings.append(f"The surface {label} has {len(sides) - len(each)} of its sides twice.")
         return {
-            kind: np.array(part) for n, kind in _SIDES.items() if (part := [side for side in sides if len(side) == n])
+            kind: np.array(part) for n, kind in _SIDES.items() if (part := [side for side in each if len(side) == n])
         }
 
 
@@ -338,17 +343,20 @@ def read_deck(path: str) -> PlainMesh:
         If the deck cannot be read. Lines are counted with included files in their places.
     """
     deck = _Deck(_expand(path, [path]))
+    _Card("ELEMENT", {}, "", 1).need(bool(deck.elements), "no elements; needed a deck with *NODE and *ELEMENT")
     groups: dict[str, Group] = {}
     keys: dict[_Key, str] = {}  # The names of groups.
     for kind, label in sorted(deck.sets, key=lambda key: [*_SETS].index(key[0])):
         if kind == "NSET":
-            group = {"vertex": np.array(deck.set(kind, label))[:, None]}
+            group = {"vertex": np.array([[node] for node in deck.set(kind, label)])}
         else:
             group = deck.surface(label) if kind == "SURFACE" else deck.cells(deck.set(kind, label))
-        if group:
+        if any(map(len, group.values())):
             name = "".join(deck.names[kind, label])
             keys[kind, label] = name + f" ({kind})" * (name in groups)
             groups[keys[kind, label]] = group
+        else:
+            deck.warnings.append(f"{kind} {label} has no members that are read.")
     owners = Counter(name for _, name in {*deck.names.values()})
     for key, full_name in keys.items():
         if owners[deck.names[key][1]] == 1:
@@ -358,15 +366,18 @@ def read_deck(path: str) -> PlainMesh:
         rows = card.rows() if card.keyword in _OTHER_CARDS else []
         if card.keyword == "CONTACTPAIR":
             for line, fields in rows:
-                names = [keys.get(("SURFACE", card.prefix + _label(text)), "") for text in (*fields, "")[:2]]
+                if len(fields) == 1:
+                    deck.warnings.append(f"Not read: the contact of {fields[0]} with itself.")
+                    continue
+                names = [keys.get(("SURFACE", card.prefix + _label(text)), "") for text in fields[:2]]
                 card.need(all(names), f"{', '.join(fields)}; needed two surfaces, the slave first", line)
                 pairs.append((names[0], names[1]))
             deck.warnings += ["*CONTACT PAIR: ADJUST is not read; no node is moved."] * ("ADJUST" in card.parameters)
         elif card.keyword == "MATERIAL":
             material = card.label("NAME")
         elif card.keyword == "ELASTIC" and rows and _label(card.parameters.get("TYPE", "ISO"))[:3] == "ISO":
-            young, poisson = card.numbers(rows[0][0], [*rows[0][1], ""][:2])
-            laws.setdefault(material, (young, poisson))
+            table = [card.numbers(line, [*fields, ""]) for line, fields in rows]
+            laws.setdefault(material, (table[0][0], table[0][1]))
         elif card.keyword == "SOLIDSECTION" and (name := keys.get(("ELSET", card.prefix + card.label("ELSET")), "")):
             sections[name] = card.label("MATERIAL")
     deck.warnings += [f"{name}: no isotropic *ELASTIC of {law}." for name, law in sections.items() if law not in laws]

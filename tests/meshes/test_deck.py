@@ -108,7 +108,8 @@ def test_pairs_materials_sets_and_names_are_those_of_the_deck(tmp_path: Path) ->
     extra = (
         "*NSET, NSET=N\n1, 4\n*NSET, NSET=N\n11\n*ELSET, ELSET=TOP\n2\n*SURFACE, NAME=P, TYPE=NODE\nN\n12\n"
         "*MATERIAL, NAME=steel\n*ELASTIC\n2.1E5, 0.3, 20.\n1., 0.3, 100.\n*SOLID SECTION, ELSET=LOW, MATERIAL=Steel\n"
-        "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE\nBOTTOM, top\np, TOP\n*TIE\nx, y\n"
+        "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE, ADJUST=0.1\nBOTTOM, top\np, TOP\nTop\n*TIE\nx, y\n"
+        "*ELSET, ELSET=GEN, GENERATE\n1, 3\n*SURFACE, NAME=TWICE\nLOW, S3\n1, S3\n*NSET, NSET=EMPTY\n"
     )
     mesh = read(tmp_path, SQUARES + SURFACES + extra)
     assert mesh.pairs == (("Bottom", "Top"), ("P", "Top"))
@@ -116,7 +117,11 @@ def test_pairs_materials_sets_and_names_are_those_of_the_deck(tmp_path: Path) ->
     assert mesh.groups["N"]["vertex"].tolist() == [[0], [3], [4]]
     assert mesh.groups["P"]["vertex"].tolist() == [[0], [3], [4], [5]]
     assert mesh.groups["TOP"]["quad"].tolist() == [[4, 5, 6, 7]]
-    assert mesh.warnings == "Not read: *TIE.\n"
+    assert mesh.warnings == (
+        "Not read: *TIE.\nThe surface TWICE has 1 of its sides twice.\nELSET GEN: 2 of 3 numbers are in the deck.\n"
+        "NSET EMPTY has no members that are read.\n"
+        "Not read: the contact of Top with itself.\n*CONTACT PAIR: ADJUST is not read; no node is moved.\n"
+    )
 
 
 def test_instances_are_moved_and_their_names_have_their_own_in_front(tmp_path: Path) -> None:
@@ -162,6 +167,7 @@ def test_files_that_a_deck_includes_are_read_in_their_place(tmp_path: Path) -> N
         (SQUARES + "*SURFACE, NAME=A\nLOW, S5\n", "face S5 of elements CPE4; needed S1, S2, S3, S4"),
         (SQUARES + "*ELEMENT, TYPE=MASS\n9, 1\n*SURFACE, NAME=A\n9, S1\n", "needed elements that are read"),
         (SQUARES + SURFACES + "*CONTACT PAIR\nTop, Low\n", "found Top, Low; needed two surfaces, the slave first"),
+        (NODES, "needed a deck with *NODE and *ELEMENT"),
         (NODES.replace("1,0,0", "1,0,x"), "line 2: *NODE: found 0, x"),
         (NODES.replace("*NODE", "*NODE, SYSTEM=C"), "needed rectangular coordinates"),
     ],
