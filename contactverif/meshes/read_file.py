@@ -15,6 +15,8 @@ import numpy as np
 
 from contactverif.contract.arrays import IntArray
 from contactverif.isolation.wire import PackedArray
+from contactverif.meshes.exodus import read_exodus
+from contactverif.meshes.mdpa import read_mdpa
 from contactverif.meshes.plain_mesh import Group, PackedMesh, PlainMesh
 
 # The cell data in which formats that number their groups store the numbers: `3` names a group. In any other array of
@@ -23,6 +25,7 @@ TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "ugrid:ref", "su2:tag", "nast
 NO_GROUPS = ("gmsh:geometrical",)
 _MOST_VALUES = 1000  # An array with more different numbers counts the cells, and groups none.
 _NASTRAN, _MARK = (".bdf", ".fem", ".nas"), b"\xef\xbb\xbf"
+_EXODUS = (".e", ".exo", ".ex2", ".exoii", ".g", ".gen")
 _LARGEST = 2**30  # Bytes of a file that was compressed.
 _LONGEST_WARNING = 2000  # Characters of what a reader prints.
 
@@ -71,6 +74,10 @@ def _cleaned(path: Path, folder: Path) -> Path:
 
 def _read(path: Path) -> PlainMesh:
     """Read a file by the reader for its kind, which its first bytes and its ending say."""
+    if path.suffix.lower() in _EXODUS:
+        return read_exodus(str(path))
+    if path.suffix.lower() == ".mdpa":
+        return read_mdpa(str(path))
     with path.open("rb") as stream:
         head = stream.read(4)
     output, errors = StringIO(), StringIO()
