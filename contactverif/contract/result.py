@@ -418,7 +418,8 @@ def describe_failures(rows: Iterable[Row]) -> str:
     failing = [row for row in rows if row.verdict in FAILED]
     if not failing:
         return ""
-    patch = ", the patch test among them" if any(row.info.role == "exact" for row in failing) else ""
+    tested = any(row.info.role == "exact" and row.info.family == "patch" for row in failing)
+    patch = ", the patch test among them" if tested else ""
     words = f"fails {len(failing)} of {sum(row.verdict in DECIDED for row in rows)}{patch}"
     counts = Counter(row.result for row in failing)
     if len(counts) > 1:

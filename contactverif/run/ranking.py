@@ -33,7 +33,7 @@ def by_rank(rows: Iterable[Row]) -> list[Row]:
     """Return rows, the lowest rank first within each group.
 
     Crashes come first, then breaches of the contract, answers that depend on earlier calls, other failures, and the
-    rest. Where a flat patch has wrong forces, two answers that differ are shown behind it.
+    rest. Where an exact answer is missed, two answers that differ are shown behind it.
     """
     rows = list(rows)
     exact = [row.info.rank for row in rows if row.info.role == "exact" and row.verdict is Verdict.FAIL]
@@ -42,7 +42,7 @@ def by_rank(rows: Iterable[Row]) -> list[Row]:
 
 def _key(row: Row, behind: float) -> tuple[bool, bool, bool, bool, float]:
     rank, failed = row.info.rank, row.verdict in (Verdict.FAIL, Verdict.CRASHED)
-    if row.info.role == "comparison" and rank < behind:
+    if row.info.role in ("comparison", "trait") and rank < behind:
         rank = behind + _LEAST_STEP * rank
     foundation = failed and row.info.role == "foundation"
     return row.verdict is not Verdict.CRASHED, not row.breach, not foundation, not failed, rank

@@ -46,6 +46,7 @@ _define = partial(
 @_define(
     id="balance.force",
     rank=280,
+    role="exact",
     turn=0,
     quantities=(FORCE_IMBALANCE,),
     promise=lambda traits: traits.promises.conserves_force,
@@ -80,6 +81,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
 @_define(
     id="balance.moment",
     rank=230,
+    role="exact",
     turn=1,
     quantities=(MOMENT_IMBALANCE,),
     promise=lambda traits: traits.promises.conserves_moment,

@@ -79,7 +79,7 @@ def check_constraint_rows(
     random = np.random.default_rng([closed.seed, 2])
     reach = min(depth, closed.shortest_segment)
     largest = max(closed.largest_coordinate, lifted.largest_coordinate)
-    tolerance = UNIT_ROUNDOFF * (8 * largest / reach + 4 * closed.n_segments)
+    tolerance = UNIT_ROUNDOFF * (8 * (largest + roundoff.normal_rounding(closed)) / reach + 4 * closed.n_segments)
     pressing = scale * depth * random.uniform(0.5, 1.0, count)
     areas, spreads = _areas(FrozenState.at(formulation, closed.with_multipliers(pressing)), rules)
     constraints = _Constraints(rules, scale, areas, spreads, tolerance)

@@ -27,7 +27,13 @@ from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lie
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
-from contactverif_properties.roundoff import WEIGHT_REASON, WEIGHT_ROUNDINGS, rounding_distance, sum_slave_forces
+from contactverif_properties.roundoff import (
+    WEIGHT_REASON,
+    WEIGHT_ROUNDINGS,
+    normal_rounding,
+    rounding_distance,
+    sum_slave_forces,
+)
 from contactverif_properties.states import Pass, any_cases, freeze_state, split_passes
 
 LARGER_MESHES = ("larger random mesh", "larger mesh, exact ties")
@@ -727,7 +733,7 @@ def _compare_forces(reported: _Reported) -> tuple[float, float] | None:
     stiffness = state.penalty * state.slave_measure  # Force per length of penetration.
     size = max(size, UNIT_ROUNDOFF * distant * stiffness)
     reach = min(size / stiffness, state.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * distant / reach + 4 * state.n_segments)
+    tolerance = UNIT_ROUNDOFF * (8 * (distant + normal_rounding(state)) / reach + 4 * state.n_segments)
     return difference / size, tolerance + bend + 8 * UNIT_ROUNDOFF * _thinness(reported)
 
 

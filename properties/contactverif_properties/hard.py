@@ -93,6 +93,7 @@ def flat_forces(case: Case) -> FloatArray:
 _define_flat = partial(
     Property.define,
     quantities=FLAT_QUANTITIES,
+    role="exact",
     # What is asked is promised with the patch test, or where that is denied, with the total.
     promise=lambda traits: {True: True, False: knows_total(traits) or None, None: None}[traits.promises.patch.flat],
     exact=flat_forces,

@@ -1,10 +1,10 @@
 """The tolerances that several properties share: what roundoff alone may do to a force, each formula with its reason.
 
 Symbols: u = 2⁻⁵³; X is the largest coordinate; Z is X, or the diameter D of a formulation that promises
-`translation_stable` (`rounding_distance`); g is the penetration; ℓ is the shortest segment, or for
-a barrier its gap (`Case.resolution`); L is the slave's
-length; N is the number of segments of both sides. Where the penetration varies, g is the uniform one that would give
-the same forces, Σ|R| / (ε̂ L). `docs/concepts/tolerances.md` has the whole list.
+`translation_stable` (`rounding_distance`); g is the penetration; ℓ is the shortest segment, or for a barrier its gap
+(`Case.resolution`); L is the slave's length; N is the number of segments of both sides; d/h is the longest edge of a
+face over its least height. Where the penetration varies, g is the uniform one that would give the same forces,
+Σ|R| / (ε̂ L). `docs/concepts/tolerances.md` has the whole list.
 """
 
 from __future__ import annotations
@@ -28,17 +28,20 @@ from contactverif_properties.states import FrozenState, random_directions
 WEIGHT_ROUNDINGS = 128
 WEIGHT_REASON = "Weights of integration are known to 1e-14."
 GAP_TOLERANCE = "u(8X/|g| + 4N + 128)"
-GAP_REASON = f"A gap is a difference of coordinates, each rounded to uX, and N forces are summed. {WEIGHT_REASON}"
+NORMAL_REASON = "In 3-D a normal is rounded too, which adds D d/h to the distance at which positions are rounded."
+GAP_REASON = (
+    f"A gap is a difference of coordinates, each rounded to uX, and N forces are summed. {WEIGHT_REASON} {NORMAL_REASON}"
+)
 STATED_GAP_TOLERANCE = "u(8Z/|g| + 4N + 128)"
 STATED_GAP_REASON = (
     f"A gap is a difference of positions, each rounded to uZ, and N forces are summed. {WEIGHT_REASON} "
-    "Z is the largest coordinate X, and the diameter D where the trait `translation_stable` is True."
+    f"Z is the largest coordinate X, and the diameter D where the trait `translation_stable` is True. {NORMAL_REASON}"
 )
 SEGMENT_TOLERANCE = "u(8X/min(g, ℓ) + 4N)"
 SEGMENT_REASON = (
     "A gap is a difference of coordinates, each rounded to uX, and N forces are summed. "
     "Rounding the ends of a segment turns the segment and its force by uX/ℓ. "
-    "8 is the number of coordinates of two segments; two triangles have 18, two quadrilaterals 24."
+    f"8 is the number of coordinates of two segments; two triangles have 18, two quadrilaterals 24. {NORMAL_REASON}"
 )
 COORDINATE_ROUNDING = 64 * UNIT_ROUNDOFF  # A motion rounds each coordinate a few times; this times X bounds the move.
 
@@ -81,7 +84,7 @@ def gap_tolerance(case: Case, penetration: float, distance: float | None = None)
 
     Where the penetration g, a length, is 0 there is no gap to round, and a force of any size is wrong.
     """
-    largest = case.largest_coordinate if distance is None else distance
+    largest = (case.largest_coordinate if distance is None else distance) + normal_rounding(case)
     gap_rounding = 8 * largest / penetration if penetration > 0 else 0.0
     return UNIT_ROUNDOFF * (gap_rounding + 4 * case.n_segments + WEIGHT_ROUNDINGS)
 
@@ -94,7 +97,20 @@ def segment_tolerance(case: Case, forces: Array, largest: float) -> float:
     """
     penetration = mean_penetration(case, forces)
     reach = min(penetration, case.resolution) if penetration > 0 else case.resolution
+    largest += normal_rounding(case)
     return UNIT_ROUNDOFF * (pair_coordinates(case) * largest / reach + 4 * case.n_segments)
+
+
+def normal_rounding(case: Case) -> float:
+    """Return D d/h, the length by which a rounded normal makes a gap wrong, in units of u; 0 in the plane.
+
+    A normal is a cross product of edges, none longer than d. Each edge is rounded to ud, each of the products to ud²,
+    so that the sum of two is off by 5ud². It is dh long, twice the area; so the normal turns by 5u d/h, and the gap of
+    a point whose foot is up to D away from the corner that the gap is measured from changes by 5u D d/h. That is less
+    than 8 times, which is what counts. A normal that is read off rounded corners needs no more: a foot inside a face
+    moves with them as a mean of them.
+    """
+    return case.diameter * slenderness(case) if case.interface.dim != PLANE else 0.0
 
 
 def pair_coordinates(case: Case) -> int:

@@ -322,8 +322,9 @@ def test_a_wrong_force_beside_an_exact_one_is_shown_before_two_answers_that_diff
     def row(name: str, verdict: Verdict) -> Row:
         return Row("mine", load_property(name).info, verdict, True)
 
-    failing = [row(name, Verdict.FAIL) for name in ("mirror", "patch.flat.resultant", "purity")]
-    assert [each.property_id for each in by_rank(failing)] == ["purity", "patch.flat.resultant", "mirror"]
+    for exact in ("patch.flat.resultant", "balance.moment", "hard.node-hit"):
+        failing = [row(name, Verdict.FAIL) for name in ("mirror", "swap", exact, "purity")]
+        assert [each.property_id for each in by_rank(failing)] == ["purity", exact, "mirror", "swap"]
     assert by_rank([failing[0], row("patch.flat.resultant", Verdict.PASS)])[0].property_id == "mirror"
 
 

@@ -50,6 +50,23 @@ def test_only_an_end_that_roundoff_loses_is_undecided(name: str) -> None:
     assert Verdict.FAIL not in {outcome.verdict for outcome in outcomes}
 
 
+def test_a_textbook_normal_of_a_needle_in_space_is_not_accused() -> None:
+    """A master triangle is 64 times as long as high; a gap from its cross product is off by 5.1e-8."""
+
+    def from_cross_product(right: Any, interface: Interface, pairing: Any, z: Any) -> Any:
+        points, x = right(interface, pairing, z), z.reshape(-1, 3)
+        a, b, c = np.moveaxis(x[interface.master.faces[points.master_segment]], 1, 0)
+        normal = np.cross(b - a, c - a)
+        nodes = interface.slave.faces[points.slave_segment, points.slave_shape.argmax(axis=1)]
+        return replace(points, gap=((x[nodes] - a) * normal).sum(axis=1) / np.linalg.norm(normal, axis=1))
+
+    textbook = with_verbs("nts-ar-3d", contact_points=from_cross_product)
+    question = load_property(NORMAL).for_traits(load_subject("nts-ar-3d").traits)
+    needle = draw_cases(question.cases(None), seed="2", examples=100).cases[98]
+    measurement = judge_as(Verdict.PASS, question, needle, textbook).measurement
+    assert measurement and measurement.values["error of a reported gap"] > 4e-8
+
+
 class ProductsOfPositions:
     """Exact segments, whose gaps are wrong by what overhangs times the distance from the origin, as in D x − M x."""
 
