@@ -17,6 +17,7 @@ from contactverif.explanations import terms
 from contactverif.explanations.case_numbers import case_text
 from contactverif.explanations.property_text import property_text, stated_failures
 from contactverif.plugins.registry import load_formulations, property_ids, the_property
+from contactverif.problems.named_states import NAMED, named_case
 from contactverif.run.run_options import RunOptions
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.plot.text import as_text
@@ -31,10 +32,13 @@ def explain(name: str | None, report: Path | None, case: str | None, options: Ru
     ids = property_ids(engines=True)
     name = name.lower() if name is not None and name.lower() in ids else name
     if name not in ids:
+        if name in NAMED:
+            show_verbatim(Text(as_text(named_case(name))))
+            return
         text = terms.list_of_terms() if name is None else terms.term_text(name) or terms.trait_text(name)
         if name is not None and not text:
-            names = {*ids, *terms.term_texts(), *terms.symbol_meanings(), *terms.trait_names()}
-            needed = "a property, a term, a symbol or a trait; `contactverif explain` lists the terms"
+            names = {*ids, *terms.term_texts(), *terms.symbol_meanings(), *terms.trait_names(), *NAMED}
+            needed = "a property, a term, a symbol, a trait or a named case; `contactverif explain` lists the terms"
             raise unknown_name_error("NAME", name, names, needed)
         show(TerminalMarkdown(text))
         return

@@ -123,7 +123,10 @@ def load_entry(name: str, entries: Sequence[EntryPoint]) -> Any:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # A plugin may raise anything while it is imported.
-        return NotLoaded(name, describe_error(error))
+        reason, named = describe_error(error), entries[0].value
+        if getattr(error, "name", None) in named.split(":"):  # A class or a module that has another name by now.
+            reason += f"; pyproject.toml names {named}; after a change of entry points run pip install -e ."
+        return NotLoaded(name, reason)
 
 
 def modules_of(entries: Iterable[EntryPoint]) -> set[str]:

@@ -120,7 +120,8 @@ def explain(row: Row, *, command: str, opposite_sign: bool = False, diagnosis: s
         unnamed = "smallest case that fails" if row.shrunk else "first case that clearly fails, not shrunk"
         lines.append(f"  The {role} {name}: {outcome.verdict}" if name else f"  The {unnamed}:")
         lines += _numbers(row.info, outcome)
-        lines.append(textwrap.indent(as_text(outcome.case), "    "))
+        finding = outcome.measurement and outcome.measurement.finding
+        lines.append(textwrap.indent(as_text(outcome.case, worst=finding), "    "))
     lines.append(f"  To run it again: {command}")
     return "\n".join(lines)
 

@@ -435,7 +435,8 @@ def _excuse_pulls(state: FrozenState, pulled: set[int], traits: Traits) -> str:
     twice = traits.promises.unbiased or may_act_twice(traits)
     first_master = 0 if twice else state.case.interface.n_slave_nodes
     if not state.has_points and min(pulled) >= first_master:
-        return "a foot may lie past the end of a segment, and no point says how far"
+        part = "segment" if state.case.interface.dim == PLANE else "face"
+        return f"a foot may lie outside its {part}; provide contact_points, and this can be judged"
     return ""
 
 

@@ -554,6 +554,7 @@ def _refuse_unknown_integral(traits: Traits) -> str:
 @Property.define(
     id="patch.tilted.nodal",
     rank=370,
+    role="trait",
     quantities=(TILTED_NODAL,),
     cases=Cases.random(tilted_cases),
     cases_in_space=Cases.random(tilted_plane_cases),

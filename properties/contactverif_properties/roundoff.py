@@ -28,20 +28,19 @@ from contactverif_properties.states import FrozenState, random_directions
 WEIGHT_ROUNDINGS = 128
 WEIGHT_REASON = "Weights of integration are known to 1e-14."
 GAP_TOLERANCE = "u(8X/|g| + 4N + 128)"
-NORMAL_REASON = "In 3-D a normal is rounded too, which adds D d/h to the distance at which positions are rounded."
-GAP_REASON = (
-    f"A gap is a difference of coordinates, each rounded to uX, and N forces are summed. {WEIGHT_REASON} {NORMAL_REASON}"
-)
+_ALL_REASON = f"and N forces are summed. {WEIGHT_REASON} In 3-D a rounded normal adds D d/h to the distance."
+GAP_REASON = f"A gap is a difference of coordinates, each rounded to uX, {_ALL_REASON}"
 STATED_GAP_TOLERANCE = "u(8Z/|g| + 4N + 128)"
 STATED_GAP_REASON = (
-    f"A gap is a difference of positions, each rounded to uZ, and N forces are summed. {WEIGHT_REASON} "
-    f"Z is the largest coordinate X, and the diameter D where the trait `translation_stable` is True. {NORMAL_REASON}"
+    f"A gap is a difference of positions, each rounded to uZ, {_ALL_REASON} "
+    "Z is the largest coordinate X, and the diameter D where the trait `translation_stable` is True."
 )
 SEGMENT_TOLERANCE = "u(8X/min(g, ℓ) + 4N)"
 SEGMENT_REASON = (
     "A gap is a difference of coordinates, each rounded to uX, and N forces are summed. "
     "Rounding the ends of a segment turns the segment and its force by uX/ℓ. "
-    f"8 is the number of coordinates of two segments; two triangles have 18, two quadrilaterals 24. {NORMAL_REASON}"
+    "8 is the number of coordinates of two segments; two triangles have 18, two quadrilaterals 24. "
+    "In 3-D a rounded normal adds D d/h to X."
 )
 COORDINATE_ROUNDING = 64 * UNIT_ROUNDOFF  # A motion rounds each coordinate a few times; this times X bounds the move.
 

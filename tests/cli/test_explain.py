@@ -30,6 +30,8 @@ HEAD_OF_NAME = {  # {name: the head of what it finds}
     "Inf-Sup": "inf_sup",
     "Balance.Force": "balance.force",
     "properties": "Property",
+    "border": "Free end and border",
+    "crossed-diagonals": "crossed-diagonals: 2 slave on 2 master triangles, in space",
 }
 
 

@@ -121,7 +121,7 @@ MISTAKES = {  # {command line: argument, found, needed}
     "explain witnes": r"NAME: found 'witnes'; needed a name that exists; the nearest: witness.*",
     "explain patch.flat.noda": r"NAME: found 'patch.flat.noda'; needed a name .*; the nearest: patch.flat.nodal.*",
     "explain swap --case nts.swap": r"--report: found nothing; needed the report that has the case 'nts.swap'",
-    "explain xyzzy": r"NAME: found 'xyzzy'; needed a property, a term, a symbol or a trait; .*",
+    "explain xyzzy": r"NAME: found 'xyzzy'; needed a property, a term, a symbol, a trait or a named case; .*",
     "new 'two words'": r"NAME: found 'two words'; needed a name of letters, digits.*",
     "new a/b": r"NAME: found 'a/b'; needed a name of letters.*",
     "new ../mine": r"NAME: found '../mine'; needed a name of letters.*",

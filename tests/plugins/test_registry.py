@@ -243,10 +243,12 @@ def test_a_name_that_looks_like_another_is_not_loaded(entries: dict[str, list[En
 def test_an_entry_point_that_names_no_module_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "odd-1.0.dist-info").mkdir()
-    entry = "[contactverif.formulations]\nodd = ../../x:!!\n"
+    entry = "[contactverif.formulations]\nodd = ../../x:!!\nold = json:FaceToFace\n"
     (tmp_path / "odd-1.0.dist-info" / "entry_points.txt").write_text(entry)
     registry._with_store(Limits(box=Box()), "odd")
     assert reason_of(load_formulation("odd")) == "its entry point is '../../x:!!'; needed MODULE:OBJECT"
+    advice = "pyproject.toml names json:FaceToFace; after a change of entry points run pip install -e ."
+    assert reason_of(load_formulation("old")).endswith(f"has no attribute 'FaceToFace'; {advice}")
 
 
 def test_a_name_that_two_distributions_want_is_a_row(entries: dict[str, list[Entry]]) -> None:

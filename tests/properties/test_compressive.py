@@ -142,7 +142,7 @@ def test_single_nodes_are_judged_where_that_is_promised_and_told_elsewhere() -> 
     springs = Subject("one segment", OneSegment)
     assert judge_case(unilateral, case, springs).verdict is Verdict.PASS
     outcome = judge_as(Verdict.UNDECIDED, nodal_push, case, springs)
-    assert outcome.reason == "a foot may lie past the end of a segment, and no point says how far"
+    assert outcome.reason == "a foot may lie outside its segment; provide contact_points, and this can be judged"
     assert nodal_push.promise(springs.traits) is None
     assert judge_case(nodal_push, case, Subject("right", Springs)).verdict is Verdict.PASS
 

@@ -64,7 +64,8 @@ def test_a_textbook_normal_of_a_needle_in_space_is_not_accused() -> None:
     question = load_property(NORMAL).for_traits(load_subject("nts-ar-3d").traits)
     needle = draw_cases(question.cases(None), seed="2", examples=100).cases[98]
     measurement = judge_as(Verdict.PASS, question, needle, textbook).measurement
-    assert measurement and measurement.values["error of a reported gap"] > 4e-8
+    assert measurement is not None
+    assert measurement.values["error of a reported gap"] > 4e-8
 
 
 class ProductsOfPositions:

@@ -41,8 +41,14 @@ def test_the_text_lists_nodes_and_faces() -> None:
 def test_a_mesh_of_many_faces_is_not_listed() -> None:
     large = max(draw_cases(flat_surface_cases(), seed="text", examples=20).cases, key=lambda case: case.n_segments)
     text = as_text(large)
-    assert "too many to be listed" in text
+    assert "too many to be listed; see replay --out case.svg" in text
     assert len(text.splitlines()) < 40
+    node = large.interface.n_nodes - 1
+    worst = as_text(large, worst=f"master node {node} (border): force 1, exact 2")
+    assert len(worst.splitlines()) < 40
+    (row,) = (line.split() for line in worst.splitlines() if line.split()[:1] == [f"{node}"])
+    faces = worst.partition(" ".join(row[-1:]))[2]
+    assert all(f"{number}: " in faces for number in np.flatnonzero((large.interface.master.faces == node).any(axis=1)))
 
 
 def test_the_view_from_above_keeps_lengths_in_the_plane() -> None:

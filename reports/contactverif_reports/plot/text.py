@@ -1,5 +1,6 @@
 """Drawings of cases and scenes in a few lines of text, for a terminal."""
 
+import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from itertools import pairwise, zip_longest
@@ -28,7 +29,7 @@ _INKS = {"slave": "▒", "master": "░"}  # The fillings of bodies.
 _FACES = {3: "triangle", 4: "quadrilateral"}
 
 
-def as_text(case: Case, width: int = 72) -> str:
+def as_text(case: Case, width: int = 72, worst: object = "") -> str:
     """Draw a case as text.
 
     A flat interface is two lines with their nodes to scale and the lengths between them. Any other is a small picture
@@ -40,10 +41,13 @@ def as_text(case: Case, width: int = 72) -> str:
         The case.
     width : int
         The largest number of columns, at least 60.
+    worst : object
+        The finding that names the worst node, if one does. It is listed with its faces where a side in space has too
+        many nodes for a table.
     """
     width = max(width, 60)
     if case.interface.dim != PLANE:
-        return _surfaces(case, width)
+        return _surfaces(case, width, {int(node) for node in re.findall(r"\bnode (\d+)", str(worst))})
     course, gaps = Course.from_case(case), Gaps.from_case(case)
     unit, unit_name = unit_of(np.concatenate(segment_lengths(case)))
     if course.nearly_flat:
@@ -139,17 +143,22 @@ def surfaces_headline(case: Case) -> str:
     return f"{_name(case)}{first} on {len(master)} master {kinds[1]}, in space"
 
 
-def _surfaces(case: Case, width: int) -> str:
+def _surfaces(case: Case, width: int, worst: set[int]) -> str:
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     unit, unit_name = unit_of(np.array([case.shortest_segment, case.diameter]))
     lines = [surfaces_headline(case)]
-    nodes = range(interface.n_nodes)
+    nodes = list(range(interface.n_nodes))
     sides = (("slave", nodes[:n_slave], interface.slave), ("master", nodes[n_slave:], interface.master))
     for name, side, surface in sides:
         if max(len(side), len(surface)) > _LISTED_FACES:
-            lines.append(f"  {name}: {len(side)} nodes, too many to be listed")
-            continue
-        corners = [f"{number}: {' '.join(map(str, face))}" for number, face in enumerate(surface.faces.tolist())]
+            lines.append(f"  {name}: {len(side)} nodes, too many to be listed; see replay --out case.svg")
+            side = [node for node in side if node in worst]
+            if not side:
+                continue
+        listed = [
+            (number, face) for number, face in enumerate(surface.faces.tolist()) if not set(side).isdisjoint(face)
+        ]
+        corners = [f"{number}: {' '.join(map(str, face))}" for number, face in listed]
         faces = textwrap.wrap(f"faces   {'   '.join(corners)}", 68, subsequent_indent="        ")
         table = _align([[name, "x", "y", "z"], *_position_rows(case, side, unit)])
         lines += [f"  {line}" for line in [*table, *faces]]
