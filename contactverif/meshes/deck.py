@@ -41,7 +41,9 @@ _PARAMETERS = {"NAME", "TYPE", "PART", "INPUT", "SYSTEM", "GENERATE", "INSTANCE"
 _OTHER_CARDS = {"CONTACTPAIR", "MATERIAL", "ELASTIC", "SOLIDSECTION"}  # No parameter of these moves a surface.
 _REFUSED = "NCOPY NGEN NFILL NMAP ELGEN ELCOPY SYSTEM IMPERFECTION ADJUST PARAMETER IMPORT REFINEMESH INCLUDE"
 _DEEPEST, _MOST_FILES, _LONGEST = 20, 1000, 10**7  # Sets in sets and files in files; files; a range of numbers.
-_KEYWORD = re.compile(r"(?m)^[ \t]*\*((?:[^\n]*,[ \t]*\n(?:[ \t]*\n)*(?![ \t]*\*))*[^\n]*)")  # A comma goes on.
+# A keyword line goes on behind a comma if there are parameters; data may follow such a comma too.
+_MORE = r"(?:[^\n]*,[ \t]*\n(?:[ \t]*\n)*(?![ \t]*\*)(?=[^\n]*=|[ \t]*(?:GENERATE|INTERNAL|UNSORTED)\b))*"
+_KEYWORD = re.compile(rf"(?im)^[ \t]*\*({_MORE}[^\n]*)")
 _INCLUDE = re.compile(r'(?im)^[ \t]*\*[ \t]*(?:(INCLUDE)|NODE|ELEMENT)[ \t]*,.*?\bINPUT[ \t]*=[ \t"]*([^\n",]*).*')
 _Key = tuple[str, str]  # SURFACE, ELSET or NSET, and the label of a set.
 
@@ -94,7 +96,7 @@ def _expand(path: str, files: list[str], depth: int = 0) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    text = re.sub(r"(?m)^[ \t]*\*\*.*", "", text.replace("\r\n", "\n").replace("\r", "\n"))
+    text = re.sub(r"(?m)^[ \t]*\*(\*.*|[ \t]*)$", "", text.replace("\r\n", "\n").replace("\r", "\n"))
 
     def include(match: re.Match[str]) -> str:
         files.append(os.path.join(os.path.dirname(files[0]), match[2].strip()))
@@ -225,19 +227,23 @@ class _Deck:
         if not kind or name[:3] in _STATES:
             state = f"{_STATES[name[:3]]}; the state here is plane strain" if kind else "not read"
             self.warnings.append(f"Elements {name} are {state}.")
-        data = re.sub(r",[ \t]*\n\s*", ",", card.data)  # A line that ends with a comma goes on.
-        for line, fields in replace(card, data=data).rows():
-            width = 1 + CORNERS[kind] if kind else len(fields)
-            proper = len(fields) % width == 0 and all(map(str.isdecimal, fields))
-            card.need(not kind or proper, f"{len(fields)} numbers; needed {width} for an element {name}", line)
-            for at in range(0, len(fields), width):
-                ends = fields[at + 1 : at + width] if kind else []
+        width, begin, values = 1 + CORNERS.get(kind, -1), 0, list[str]()
+        for line, fields in card.rows():
+            begin, values = (begin, values + fields) if values else (line, fields)
+            if len(values) < width:
+                continue  # The next line goes on.
+            proper = not kind or (len(values) % width == 0 and all(map(str.isdecimal, values)))
+            card.need(proper, f"{len(values)} numbers; needed {width} for an element {name}", begin)
+            for at in range(0, len(values), width) if kind else [0]:
+                ends = values[at + 1 : at + width]
                 try:
                     nodes = [known[card.prefix + end] for end in ends]
                 except KeyError as error:
-                    card.need(False, f"node {error}; needed nodes of the deck", line)
-                row = line, fields[at:]
+                    card.need(False, f"node {error}; needed nodes of the deck", begin)
+                row = begin, values[at:]
                 indices.append(self._number("ELSET", card, row, self.elements, (name, kind, faces, nodes)))
+            values = []
+        card.need(not values, f"{len(values)} numbers; needed {width} for an element {name}", begin)
         return indices
 
     def members(self, kind: str, card: _Card, text: str, line: int, depth: int = 0) -> list[int]:
@@ -311,6 +317,9 @@ class _Deck:
                     if face in faces:
                         sides.append([nodes[corner] for corner in faces[face]])
                         card.need(len({*sides[-1]}) == len(sides[-1]), f"{name} with a node twice on {face}", line)
+        if (owners or whole) and any(len(side) == 1 for side in sides):  # CalculiX may have two surfaces of a name.
+            self.warnings.append(f"The surface {label} of nodes is not read, but that of faces.")
+            sides = [side for side in sides if len(side) > 1]
         behind = self.boundary(owners)
         outer = self.boundary(range(len(self.elements))) if whole else {}
         sides = [behind.get(frozenset(side), side) for side in sides]

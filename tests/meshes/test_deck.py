@@ -16,7 +16,7 @@ SQUARES = NODES + CELLS
 TOP, BOTTOM = [[2, 3]], [[4, 5]]
 
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
-# {type: (corners, middle of each face)}: CalculiX 2.22, section *SURFACE, and the element library of Abaqus agree.
+# {type: (corners, middle of each face)}: the manual of CalculiX and the element library of Abaqus agree.
 FACES = {
     "CPE3": (CUBE[[0, 1, 3]], ["0.5 0 0", "0.5 0.5 0", "0 0.5 0"]),
     "CAX4R": (CUBE[:4], ["0.5 0 0", "1 0.5 0", "0.5 1 0", "0 0.5 0"]),
@@ -90,12 +90,14 @@ def test_the_body_of_a_thin_cell_is_behind_its_face(
         (SQUARES + SURFACES).replace(", ", " ,\t").replace("*NODE ,", "  * NODE,\n** continued\n "),
         NODES.replace("11,0,1.5", "*NODE\n11, 0., 1.5D0, 0.") + CELLS + SURFACES,
         NODES + CELLS.replace("1,1,2,", "1,1,\n2,") + SURFACES,
+        NODES + CELLS.replace("1,1,2,", "1,1\n2,").replace("=LOW", "=LOW,") + SURFACES + "*\n",
+        SQUARES + SURFACES + "*SURFACE, NAME=TOP, TYPE=NODE\nALL\n",
         SURFACES + CELLS + NODES,
         SQUARES + "*ELSET, ELSET=A, GENERATE\n1, 1, 1\n*ELSET, ELSET=B\nA\n" + SURFACES.replace("LOW", "B"),
         SQUARES + "*SURFACE, NAME=Top, TYPE=ELEMENT\n1, S3\n*SURFACE, NAME=Bottom\n2, S1\n",
         SQUARES + SURFACES + '*SURFACE, NAME="Top "\nUP, S3\n',
     ],
-    ids=map(str, range(11)),
+    ids=map(str, range(13)),
 )
 def test_a_deck_is_read_however_it_is_written(tmp_path: Path, text: str | bytes) -> None:
     mesh = read(tmp_path, text)
