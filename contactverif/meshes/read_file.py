@@ -15,6 +15,7 @@ import numpy as np
 
 from contactverif.contract.arrays import IntArray
 from contactverif.isolation.wire import PackedArray
+from contactverif.meshes.deck import read_deck
 from contactverif.meshes.exodus import read_exodus
 from contactverif.meshes.mdpa import read_mdpa
 from contactverif.meshes.plain_mesh import Group, PackedMesh, PlainMesh
@@ -80,6 +81,8 @@ def _read(path: Path) -> PlainMesh:
         return read_mdpa(str(path))
     with path.open("rb") as stream:
         head = stream.read(4)
+    if head.startswith(b"*") and path.suffix.lower() != ".f3grid":
+        return read_deck(str(path))
     output, errors = StringIO(), StringIO()
     # Ansys uses the ending .msh too, and a Nastran file may begin with a remark.
     is_gmsh = head.startswith(b"$") and path.suffix.lower() == ".msh"
