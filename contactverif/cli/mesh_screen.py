@@ -9,7 +9,7 @@ from rich.text import Text
 from contactverif.cli.console import columns, line, show
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.meshes.cell_sides import CellSides, label_bodies
-from contactverif.meshes.mesh_file import planar, plane_words
+from contactverif.meshes.mesh_file import find_plane
 from contactverif.meshes.plain_mesh import Group, PlainMesh, read_mesh
 from contactverif_reports.plot.text import is_inside
 from contactverif_reports.tables import Column, Table
@@ -29,8 +29,8 @@ _ROWS, _ASPECT = 16, 2.2  # Rows of a drawing; a character is so many times as h
 def show_mesh(path: Path) -> None:
     """Show the groups, the contact pairs and the materials of a mesh file, and draw a plane one."""
     mesh = read_mesh(path)
-    plane = planar(mesh)
-    points, kinds = (mesh.points, ("triangle", "quad")) if plane is None else (plane, ("line",))
+    points, remark = find_plane(mesh)
+    kinds = ("line",) if points.shape[1] == 2 else ("triangle", "quad")
     labels = label_bodies(mesh.cells.values(), len(points))
     cells = [data for kind, data in mesh.cells.items() if kind not in ("vertex", "line")]
     bodies = {label: number for number, label in enumerate(dict.fromkeys(_labels(labels, cells)), 1)}
@@ -38,8 +38,8 @@ def show_mesh(path: Path) -> None:
     names: dict[tuple[object, ...], list[str]] = {}  # Gmsh's groups have a name and a number.
     for name, group in mesh.groups.items():
         names.setdefault(tuple((kind, data.tobytes()) for kind, data in group.items()), []).insert(0, name)
-    drawn = (each[0] for each in names.values() if not set(kinds).isdisjoint(mesh.groups[each[0]]))
-    inks = dict(zip(drawn, _INKS, strict=False))
+    with_ink = (each[0] for each in names.values() if not set(kinds).isdisjoint(mesh.groups[each[0]]))
+    inks = dict(zip(with_ink, _INKS, strict=False))
     listed = Table([Column("group", wrap=True), Column("of", wrap=True), Column("body"), Column("")], str(path))
     for name, *others in names.values():
         group = mesh.groups[name]
@@ -49,11 +49,11 @@ def show_mesh(path: Path) -> None:
             " or ".join([name, *others]), _count(group), words, inks.get(name, "" if name in able else "not a side")
         )
     show(line(f"{len(points)} nodes; {_count(mesh.cells)}; bodies: {len(bodies)}"), listed.terminal())
-    said = (mesh.warnings + ("" if plane is None else plane_words(mesh, points))).splitlines()
-    said += [f"contact pair {n}: slave {slave}, master {master}" for n, (slave, master) in enumerate(mesh.pairs, 1)]
-    said += [f"material of {name}: E = {young:g}, ν = {poisson:g}" for name, (young, poisson) in mesh.materials.items()]
-    said += ["seen along y, with x to the right and z up"] if plane is None else []
-    show(*map(line, said), *_drawing(mesh, points, kinds, inks))
+    remarks = (mesh.warnings + remark).splitlines()
+    remarks += [f"contact pair {n}: slave {slave}, master {master}" for n, (slave, master) in enumerate(mesh.pairs, 1)]
+    remarks += [f"material of {name}: E = {law[0]:g}, ν = {law[1]:g}" for name, law in mesh.materials.items()]
+    remarks += ["seen along y, with x to the right and z up"] * (points.shape[1] == 3)
+    show(*map(line, remarks), *_drawing(mesh, points, kinds, inks))
     typed = "" if mesh.pairs else " --slave GROUP --master GROUP"
     more = " --pair N" if len(mesh.pairs) > 1 else ""
     show(line(f"to ask about it: contactverif verify NAME --mesh {path}{typed}{more}"))
@@ -70,7 +70,7 @@ def _count(group: Group) -> str:
 
 def _drawing(mesh: PlainMesh, points: FloatArray, kinds: tuple[str, ...], inks: dict[str, str]) -> Iterator[Text]:
     """Yield a drawing to scale: bodies filled, and the lines or faces of groups by the letter of the table."""
-    sides = CellSides.of(mesh.cells, points).outer
+    sides = CellSides.collect(mesh.cells, points).outer
     in_space, plane = points.shape[1] == 3, points[:, [0, -1]]
     strokes = {"░": _edges(sides.values())}
     for name, ink in inks.items():

@@ -25,13 +25,13 @@ _PLANE = ("triangle", "quad", "polygon")
 
 def corners_of(cells: Group, bases: tuple[str, ...]) -> dict[str, IntArray]:
     """Return the corners (n_cells, n_corners) of the cells of some kinds, also of those of higher order."""
-    found: dict[str, list[IntArray]] = {}
+    of_kind: dict[str, list[IntArray]] = {}
     for kind, data in cells.items():
         base = next((base for base in bases if base in kind.lower()), None)
         if base is not None:  # Corners come first, nodes on edges last.
             corners = data[:, : CORNERS.get(base)]
-            found.setdefault(base if base in CORNERS else kind, []).append(corners)
-    return {kind: np.concatenate(parts) for kind, parts in found.items()}
+            of_kind.setdefault(base if base in CORNERS else kind, []).append(corners)
+    return {kind: np.concatenate(parts) for kind, parts in of_kind.items()}
 
 
 def plane_cells(cells: Group) -> dict[str, IntArray]:
@@ -57,7 +57,7 @@ class CellSides:
     inner: dict[int, IntArray]  # Those of several cells, their nodes ascending.
 
     @classmethod
-    def of(cls, cells: Group, points: FloatArray) -> "CellSides":
+    def collect(cls, cells: Group, points: FloatArray) -> "CellSides":
         """Return the sides of the cells of a mesh in a plane, or in space if its points have three coordinates."""
         sides: dict[int, list[IntArray]] = {}
         if points.shape[1] == 2:

@@ -292,7 +292,7 @@ class _Deck:
         """Return the sides that have one of these solid cells, which is behind them, by their corners."""
         cells = self.cells(element for element in elements if "S3" in self.elements[element][2])
         points = self.places[:, :2] if {*cells} <= {"triangle", "quad"} else self.places
-        sides = CellSides.of(cells, points).outer.values()
+        sides = CellSides.collect(cells, points).outer.values()
         return {frozenset(side): side for part in sides for side in part.tolist()}
 
     def surface(self, label: str) -> Group:

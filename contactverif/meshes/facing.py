@@ -1,4 +1,4 @@
-"""Whether two surfaces of a mesh can touch: their normals oppose each other, and no body lies between them."""
+"""Two surfaces of a mesh can touch if their normals oppose each other, and no body lies between them."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, Interface, Surface, turns_of
 
-_RAYS = 50  # So many elements of a surface are asked what lies behind them.
+_RAYS = 50  # So many elements of a surface look behind them.
 
 
 def check_facing(interface: Interface) -> None:
@@ -54,19 +54,19 @@ def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary
     Parameters
     ----------
     points : FloatArray
-        (n_points, dim)
+        Positions, shape (n_points, dim).
     slave, master : IntArray
-        (n, n_corners) The elements of both surfaces, each with its body behind it.
+        The elements of both surfaces, each with its body behind it, shape (n, n_corners).
     boundary : IntArray
-        (n, n_corners) All other elements around the bodies. Where there are none, a body ends behind an element as far
-        away as the element is wide.
+        All other elements around the bodies, shape (n, n_corners). Where there are none, a body ends behind an element
+        as far away as the element is wide.
     """
     master, boundary = _simplices(master), _simplices(boundary)
     of_master, of_boundary = _normals(points[master]), _normals(points[boundary])
-    asked = slave[np.unique(np.linspace(0, len(slave) - 1, _RAYS).astype(np.int64))]
-    origins, normals = points[asked].mean(axis=1), _normals(points[_simplices(asked)[: len(asked)]])
+    rays = slave[np.unique(np.linspace(0, len(slave) - 1, _RAYS).astype(np.int64))]
+    origins, normals = points[rays].mean(axis=1), _normals(points[_simplices(rays)[: len(rays)]])
     votes, places = 0, ""
-    for origin, normal, element in zip(origins, normals, asked, strict=True):
+    for origin, normal, element in zip(origins, normals, rays, strict=True):
         ways = _ways(origin, normal, points[master])[of_master @ normal < 0]
         behind = -ways[ways < 0].max(initial=-np.inf)
         is_back = not np.isfinite(ways[ways >= 0]).any() and np.isfinite(behind)

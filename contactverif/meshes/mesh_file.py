@@ -84,8 +84,8 @@ def read_sides(
     mesh = read_mesh(path) if path is not None else _two_files(slave, master)
     if path is not None and slave is None and master is None and mesh.pairs:
         slave, master = _pair(mesh, pair)
-    plane = planar(mesh)
-    points, kinds = (mesh.points, _FACE_KINDS) if plane is None else (plane, ("line",))
+    points, remark = find_plane(mesh)
+    kinds = ("line",) if points.shape[1] == 2 else _FACE_KINDS
     names = {"--slave": slave, "--master": master}
     for option, name in names.items():
         if name not in mesh.groups:
@@ -93,16 +93,16 @@ def read_sides(
     if slave == master:
         raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
     groups = {option: mesh.groups[str(name)] for option, name in names.items()}
-    if plane is None and any("line" in group for group in groups.values()):
-        widths = " × ".join(f"{width:g}" for width in np.ptp(points[_used(mesh)], axis=0))
+    if points.shape[1] == 3 and any("line" in group for group in groups.values()):
+        widths = " × ".join(f"{width:g}" for width in np.ptp(points[_find_used(mesh)], axis=0))
         raise MisuseError("--mesh", f"lines of a mesh of {widths}", "lines in a plane of two axes, or faces in space")
-    cells = CellSides.of(mesh.cells, points)
+    cells = CellSides.collect(mesh.cells, points)
     sides = {option: _members(option, str(names[option]), group, cells) for option, group in groups.items()}
     shared = np.intersect1d(sides["--slave"], sides["--master"])
     if len(shared):
         actual = f"a node of the slave surface too, at {describe(points[shared[0]])}"
         raise MisuseError("--master", actual, "surfaces without a common node: two nodes where the bodies touch")
-    oriented, words = [], mesh.warnings + plane_words(mesh, points)
+    oriented, words = [], mesh.warnings + remark
     for option, side in sides.items():
         neighbours = _neighbours(option, points, side)
         words += _chain_words(option, points, side, neighbours)
@@ -164,32 +164,26 @@ def _two_files(slave: str | None, master: str | None) -> PlainMesh:
     return PlainMesh(np.concatenate(points), cells, groups, warnings=words)
 
 
-def planar(mesh: PlainMesh) -> FloatArray | None:
-    """Return the positions (n_points, 2) of a mesh in a plane of two axes; None for one in space.
+def find_plane(mesh: PlainMesh) -> tuple[FloatArray, str]:
+    """Return the positions (n_points, 2) of a mesh in a plane of two axes, or (n_points, 3) in space; and what to tell.
 
     The axes keep their order: a mesh in x and z is seen with x to the right and z up.
     """
-    used = _used(mesh)
+    used = _find_used(mesh)
     extent = np.ptp(mesh.points[used], axis=0) if len(used) else np.zeros(2)
     if not np.isfinite(extent).all():
         raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
     if len(extent) == 2:
-        return mesh.points[:, :2]
+        return mesh.points[:, :2], ""
     thin = [axis for axis in (2, 1, 0) if extent[axis] <= FLAT * extent.max()]
-    return np.delete(mesh.points, thin[0], axis=1) if thin else None
+    if not thin:
+        return mesh.points, ""
+    axes = ("y and z", "x and z", "")[thin[0]]
+    remark = f"the mesh lies in a plane of its {axes}, which are x and y here\n" if axes else ""
+    return np.delete(mesh.points, thin[0], axis=1), remark
 
 
-def plane_words(mesh: PlainMesh, points: FloatArray) -> str:
-    """Return which axes of the file are x and y here; empty where they are the same ones."""
-    for axes in ("xz", "yz"):
-        if mesh.points.shape[1] == 3 and points.shape[1] == 2:
-            columns = ["xyz".index(axis) for axis in axes]
-            if np.array_equal(points, mesh.points[:, columns], equal_nan=True) and np.ptp(mesh.points[_used(mesh), 2]):
-                return f"the mesh lies in a plane of its {axes[0]} and {axes[1]}, which are x and y here\n"
-    return ""
-
-
-def _used(mesh: PlainMesh) -> IntArray:
+def _find_used(mesh: PlainMesh) -> IntArray:
     """Return the points of all cells, and of all groups of lines and faces."""
     groups = [mesh.cells, *mesh.groups.values()]
     numbers = [data.reshape(-1) for group in groups for kind, data in group.items() if kind != "vertex"]
@@ -199,25 +193,25 @@ def _used(mesh: PlainMesh) -> IntArray:
 def _members(option: str, name: str, group: Group, cells: CellSides) -> IntArray:
     """Return the nodes of the lines of a group, in space of its faces (n, n_corners), in the order of the file."""
     kinds = ("line",) if cells.points.shape[1] == 2 else _FACE_KINDS
-    own = [group[kind] for kind in kinds if len(group.get(kind, ()))]
+    elements = [group[kind] for kind in kinds if len(group.get(kind, ()))]
     listed = f"{name!r} with elements {', '.join(sorted(group)) or 'none'}"
-    if not own and "vertex" in group:
-        own = [cells.between(group["vertex"], CORNERS[kind]) for kind in kinds]
-        own = [elements for elements in own if len(elements)]
+    if not elements and "vertex" in group:
+        elements = [cells.between(group["vertex"], CORNERS[kind]) for kind in kinds]
+        elements = [each for each in elements if len(each)]
         listed = f"{name!r}, a set of {len(group['vertex'])} nodes without an edge or a face of a cell between them"
     higher = [kind for kind in group if kind not in CORNERS and kind.startswith(("line", "VTK_LAGRANGE", *_FACE_KINDS))]
     needed = "lines of two nodes" if len(kinds) == 1 else "triangles alone or quadrilaterals alone"
-    if higher and not own:
+    if higher and not elements:
         raise MisuseError(option, listed, f"{needed}: a mesh of first order (gmsh -order 1)")
-    if len(own) > 1:
+    if len(elements) > 1:
         raise MisuseError(option, listed, f"{needed} (Gmsh: recombine a whole surface, or none)")
-    if not own:
-        where = " (by its number, where a group of cells has the same name)" if len(kinds) == 1 else ""
-        raise MisuseError(option, listed, f"a group of {needed}{where}, or of nodes on the boundary of cells")
-    if len(np.unique(np.sort(own[0]), axis=0)) < len(own[0]):
+    if not elements:
+        more = " (by its number, where a group of cells has the same name)" if len(kinds) == 1 else ""
+        raise MisuseError(option, listed, f"a group of {needed}{more}, or of nodes on the boundary of cells")
+    if len(np.unique(np.sort(elements[0]), axis=0)) < len(elements[0]):
         word = "line" if len(kinds) == 1 else "face"
         raise MisuseError(option, f"the same {word} twice", f"each {word} once")
-    return own[0]
+    return elements[0]
 
 
 def _chain_words(option: str, points: FloatArray, lines: IntArray, neighbours: list[list[tuple[int, bool]]]) -> str:

@@ -115,9 +115,9 @@ def unknown_group_error(
         others = f", which has {', '.join(map(repr, mesh.groups))} of other cells" if mesh.groups else ""
         listed = f"a group of {' or '.join(kinds)} elements, made in the mesher (a physical group, *SURFACE, …){others}"
     needed = f"{' or '.join(near)}? The groups are {listed}" if near else f"one of {listed}" if able else listed
-    said = f" ({one_line(mesh.warnings, _LONGEST_REASON)})" if mesh.warnings else ""
-    found = "nothing" if name is None else f"{name!r}, which is no group of the file"
-    return MisuseError(option, found, needed + said)
+    remark = f" ({one_line(mesh.warnings, _LONGEST_REASON)})" if mesh.warnings else ""
+    actual = "nothing" if name is None else f"{name!r}, which is no group of the file"
+    return MisuseError(option, actual, needed + remark)
 
 
 SLAVE, MASTER = 1, 2  # The roles of contact edges in a file; 0 is neither.

@@ -34,7 +34,7 @@ _LONGEST_WARNING = 2000  # Characters of what a reader prints.
 def pack_mesh(path: str) -> bytes:
     """Return a mesh file as bytes, in a child process; one that cannot be read is a ValueError."""
     with TemporaryDirectory() as folder:
-        mesh = _read(_cleaned(Path(path), Path(folder)))
+        mesh = _read(_clean(Path(path), Path(folder)))
     return msgspec.msgpack.encode(
         PackedMesh(
             PackedArray.pack(mesh.points, "points"),
@@ -51,7 +51,7 @@ def _pack(group: Group) -> dict[str, PackedArray]:
     return {kind: PackedArray.pack(data, kind) for kind, data in group.items()}
 
 
-def _cleaned(path: Path, folder: Path) -> Path:
+def _clean(path: Path, folder: Path) -> Path:
     """Return a file, or a copy of it that is not compressed, and has no byte order mark or blank at its begin."""
     with path.open("rb") as stream:
         head, suffix = stream.read(4), path.suffix.lower()
@@ -99,10 +99,10 @@ def _read(path: Path) -> PlainMesh:
     for block in mesh.cells:
         cells.setdefault(block.type, []).append(block.data)
     groups = _groups(mesh, errors)
-    return PlainMesh(mesh.points, _joined(cells), groups, warnings=errors.getvalue())
+    return PlainMesh(mesh.points, _join(cells), groups, warnings=errors.getvalue())
 
 
-def _joined(parts: dict[str, list[IntArray]]) -> Group:
+def _join(parts: dict[str, list[IntArray]]) -> Group:
     return {kind: np.concatenate(each) for kind, each in parts.items()}
 
 
@@ -143,8 +143,8 @@ def _groups(mesh: Any, errors: StringIO) -> dict[str, Group]:
         if np.shape(value) == (2,):
             of_dim = {number for number, block in enumerate(mesh.cells) if block.dim == int(value[1])}
             members = numbered.get(str(int(value[0])), {})
-            own = {number: part for number, part in members.items() if number in of_dim}
-            named[name] = _united(own, named.get(name, {}))
+            of_number = {number: part for number, part in members.items() if number in of_dim}
+            named[name] = _unite(of_number, named.get(name, {}))
             # A line in two groups has only the number of the first, but is in the sets of both (.msh 4.1).
             _include(numbered, str(int(value[0])), named[name])
     groups = {name: _nodes_of(mesh, members) for name, members in (numbered | named).items()}
@@ -154,10 +154,10 @@ def _groups(mesh: Any, errors: StringIO) -> dict[str, Group]:
 
 
 def _include(groups: dict[str, _Members], name: str, more: _Members) -> None:
-    groups[name] = _united(groups.get(name, {}), more)
+    groups[name] = _unite(groups.get(name, {}), more)
 
 
-def _united(first: _Members, second: _Members) -> _Members:
+def _unite(first: _Members, second: _Members) -> _Members:
     """Return the members of two groups, each once; the first says which are to be reversed."""
     none = np.empty(0, dtype=np.int64)
     united = {}
@@ -176,4 +176,4 @@ def _nodes_of(mesh: Any, members: _Members) -> Group:
         nodes = block.data[np.abs(those) - 1]
         if len(nodes):
             parts.setdefault(block.type, []).append(np.where((those < 0)[:, None], nodes[:, ::-1], nodes))
-    return _joined(parts)
+    return _join(parts)

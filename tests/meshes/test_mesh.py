@@ -281,8 +281,8 @@ SIDES = ([[0.1, 0.05], [0.9, 0.05]], [[1, 0], [0.5, 0], [0, 0]])
 @pytest.mark.parametrize("axes", ["xy", "xz", "yz"])
 def test_a_mesh_may_lie_in_any_plane_of_two_axes(axes: str, read: Callable[..., Interface], capfd: Capture) -> None:
     assert points_of(read(two_squares(axes=axes))) == SIDES
-    said = f"the mesh lies in a plane of its {axes[0]} and {axes[1]}, which are x and y here\n"
-    assert capfd.readouterr().err == ("" if axes == "xy" else said)
+    words = f"the mesh lies in a plane of its {axes[0]} and {axes[1]}, which are x and y here\n"
+    assert capfd.readouterr().err == ("" if axes == "xy" else words)
 
 
 def test_surfaces_that_turn_their_backs_to_each_other(read: Callable[..., Interface], capfd: Capture) -> None:
