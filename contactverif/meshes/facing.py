@@ -53,13 +53,13 @@ def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary
 
     Parameters
     ----------
-    points : FloatArray
-        Positions, shape (n_points, dim).
-    slave, master : IntArray
-        The elements of both surfaces, each with its body behind it, shape (n, n_corners).
-    boundary : IntArray
-        All other elements around the bodies, shape (n, n_corners). Where there are none, a body ends behind an element
-        as far away as the element is wide.
+    points : FloatArray, shape (n_points, dim)
+        Positions.
+    slave, master : IntArray, shape (n, n_corners)
+        The elements of both surfaces, each with its body behind it.
+    boundary : IntArray, shape (n, n_corners)
+        All other elements around the bodies. Where there are none, a body ends behind an element as far away as the
+        element is wide.
     """
     master, boundary = _simplices(master), _simplices(boundary)
     of_master, of_boundary = _normals(points[master]), _normals(points[boundary])
