@@ -189,8 +189,7 @@ class _Deck:
 
     def _add(self, card: _Card, kind: str, part: _Card | list[int]) -> None:
         """Add members to the set that a card names, if any."""
-        name = card.parameters.get(_SETS[kind], "")
-        if name:
+        if name := card.parameters.get(_SETS[kind]):
             key = kind, card.prefix + _label(name)
             self.names.setdefault(key, (card.instance.replace('"', ""), name.replace('"', "").strip()))
             self.sets.setdefault(key, []).append(part)
@@ -213,10 +212,7 @@ class _Deck:
         points = np.array([card.numbers(line, [*fields, ""][1:4]) for line, fields in rows]).reshape(-1, 3)
         if card.instance:
             points = _move(points, self.instances[card.instance])
-        return [
-            self._number("NSET", card, row, self.points, point)
-            for row, point in zip(rows, points.tolist(), strict=True)
-        ]
+        return [self._number("NSET", card, row, self.points, at) for row, at in zip(rows, points.tolist(), strict=True)]
 
     def _read_elements(self, card: _Card) -> list[int]:
         name, indices, known = card.label("TYPE"), [], self.indices["NSET"]
@@ -327,9 +323,7 @@ class _Deck:
         each = dict.fromkeys(map(tuple, sides))
         if len(each) < len(sides):
             self.warnings.append(f"The surface {label} has {len(sides) - len(each)} of its sides twice.")
-        return {
-            kind: np.array(part) for n, kind in _SIDES.items() if (part := [side for side in each if len(side) == n])
-        }
+        return {_SIDES[n]: np.array([side for side in each if len(side) == n]) for n in sorted({*map(len, each)})}
 
 
 def read_deck(path: str) -> PlainMesh:

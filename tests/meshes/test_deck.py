@@ -9,20 +9,22 @@ from contactverif.meshes.deck import read_deck
 from contactverif.meshes.plain_mesh import PlainMesh
 
 # Two squares, one above the other with a gap of 0.5. Nodes 1 to 4 and 11 to 14, elements 1 and 2.
-NODES = "*NODE, NSET=ALL\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n11,0,1.5\n12,1,1.5\n13,1,2.5\n14,0,2.5\n"
-CELLS = "*ELEMENT, TYPE=CPE4, ELSET=LOW\n1,1,2,3,4\n*ELEMENT, TYPE=CPE4, ELSET=UP\n2,11,12,13,14\n"
+FOUR = "*NODE, NSET=ALL\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n"
+LOW = "*ELEMENT, TYPE=CPE4, ELSET=LOW\n1,1,2,3,4\n"
+NODES = FOUR + "11,0,1.5\n12,1,1.5\n13,1,2.5\n14,0,2.5\n"
+CELLS = LOW + "*ELEMENT, TYPE=CPE4, ELSET=UP\n2,11,12,13,14\n"
 SURFACES = "*SURFACE, NAME=Top\nLOW, S3\n*SURFACE, NAME=Bottom\nUP, S1\n"
 SQUARES = NODES + CELLS
 TOP, BOTTOM = [[2, 3]], [[4, 5]]
 
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
-# {type: (corners, middle of each face)}: the manual of CalculiX and the element library of Abaqus agree.
+# {type: (its corners in the cube, corners of the faces)}: as in the manual of CalculiX and in the library of Abaqus.
 FACES = {
-    "CPE3": (CUBE[[0, 1, 3]], ["0.5 0 0", "0.5 0.5 0", "0 0.5 0"]),
-    "CAX4R": (CUBE[:4], ["0.5 0 0", "1 0.5 0", "0.5 1 0", "0 0.5 0"]),
-    "C3D4": (CUBE[[0, 1, 3, 4]], ["1 1 0", "1 0 1", "1 1 1", "0 1 1"]),
-    "C3D6": (CUBE[[0, 1, 3, 4, 5, 7]], ["1 1 0", "1 1 3", "0.5 0 0.5", "0.5 0.5 0.5", "0 0.5 0.5"]),
-    "C3D8I": (CUBE, ["0.5 0.5 0", "0.5 0.5 1", "0.5 0 0.5", "1 0.5 0.5", "0.5 1 0.5", "0 0.5 0.5"]),
+    "CPE3": ([0, 1, 3], "12 23 31"),
+    "CAX4R": ([0, 1, 2, 3], "12 23 34 41"),
+    "C3D4": ([0, 1, 3, 4], "123 142 243 341"),
+    "C3D6": ([0, 1, 3, 4, 5, 7], "123 456 1254 2365 3146"),
+    "C3D8I": ([0, 1, 2, 3, 4, 5, 6, 7], "1234 5876 1562 2673 3784 4851"),
 }
 
 
@@ -38,46 +40,33 @@ def sides(mesh: PlainMesh, name: str) -> list[list[int]]:
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("name", FACES)
-def test_each_face_of_a_solid_cell_is_where_the_codes_have_it_with_the_cell_behind_it(
-    tmp_path: Path, name: str, mirrored: bool
-) -> None:
-    corners, middles = FACES[name]
-    points = corners * [[-1 if mirrored else 1, 1, 1]]
+def test_a_solid_cell_is_behind_each_of_its_faces(tmp_path: Path, name: str, mirrored: bool) -> None:
+    corners, faces = FACES[name]
+    points = CUBE[corners] * [-1 if mirrored else 1, 1, 1]
     text = "*NODE\n" + "".join(f"{n}, {x}, {y}, {z}\n" for n, (x, y, z) in enumerate(points, 1))
-    text += f"*ELEMENT, TYPE={name}\n7, {', '.join(map(str, range(1, len(points) + 1)))}\n"
-    text += "".join(f"*SURFACE, NAME=F{n}\n7, S{n}\n" for n in range(1, len(middles) + 1)) + "*SURFACE, NAME=SKIN\n7\n"
+    text += f"*ELEMENT, TYPE={name}\n7, {', '.join('12345678'[: len(points)])}\n*SURFACE, NAME=SKIN\n7\n"
+    text += "".join(f"*SURFACE, NAME=F{n}\n7, S{n}\n" for n in range(1, len(faces.split()) + 1))
     mesh = read(tmp_path, text)
-    for number, middle in enumerate(middles, 1):
+    for number, face in enumerate(faces.split(), 1):
         (side,) = sides(mesh, f"F{number}")
-        expected = np.array(middle.split(), dtype=float) * (points.max(axis=0) + points.min(axis=0))
-        if name == "C3D4" or (name == "C3D6" and number < 3):
-            expected = np.array(middle.split(), dtype=float) / 3 * (points.max(axis=0) + points.min(axis=0))
-        np.testing.assert_allclose(points[side].mean(axis=0), expected, atol=1e-15)
+        assert {str(node + 1) for node in side} == {*face}
         a, b, *rest = points[side]
         normal = np.cross(b - a, rest[0] - a if rest else [0, 0, 1])
         assert normal @ (points.mean(axis=0) - a) < 0
-    assert {frozenset(side) for side in sides(mesh, "SKIN")} == {
-        frozenset(sides(mesh, f"F{number}")[0]) for number in range(1, len(middles) + 1)
-    }
+    assert sorted(sorted(side) for side in sides(mesh, "SKIN")) == sorted(
+        sorted(int(node) - 1 for node in face) for face in faces.split()
+    )
 
 
 @pytest.mark.parametrize(
-    ("name", "face", "expected"),
-    [
-        ("R2D2", "SPOS", [[1, 0]]),  # The normal is on the left of 1 → 2, so the body is on the right.
-        ("T2D2", "SNEG", [[0, 1]]),
-        ("S3", "SPOS", [[0, 1, 2]]),
-        ("S4R", "SNEG", [[3, 2, 1, 0]]),
-        ("R3D4", "SPOS", [[0, 1, 2, 3]]),
-        ("S4", "S1", [[3, 2, 1, 0]]),  # CalculiX: the face on the negative side.
-    ],
+    "row",
+    # The normal of a line is on its left, so the body is on its right. In CalculiX S1 is the negative side of a shell.
+    ["R2D2 SPOS 21", "T2D2 SNEG 12", "S3 SPOS 123", "S4R SNEG 4321", "R3D4 SPOS 1234", "S4 S1 4321"],
 )
-def test_the_body_of_a_thin_cell_is_behind_its_face(
-    tmp_path: Path, name: str, face: str, expected: list[list[int]]
-) -> None:
-    nodes = ", ".join(map(str, range(1, len(expected[0]) + 1)))
-    mesh = read(tmp_path, f"{NODES}*ELEMENT, TYPE={name}, ELSET=E\n5, {nodes}\n*SURFACE, NAME=A\nE, {face}\n")
-    assert sides(mesh, "A") == expected
+def test_the_body_of_a_thin_cell_is_behind_its_face(tmp_path: Path, row: str) -> None:
+    name, face, corners = row.split()
+    text = f"{NODES}*ELEMENT, TYPE={name}, ELSET=E\n5, {', '.join(sorted(corners))}\n*SURFACE, NAME=A\nE, {face}\n"
+    assert sides(read(tmp_path, text), "A") == [[int(node) - 1 for node in corners]]
 
 
 @pytest.mark.parametrize(
@@ -127,17 +116,13 @@ def test_pairs_materials_sets_and_names_are_those_of_the_deck(tmp_path: Path) ->
 
 
 def test_instances_are_moved_and_their_names_have_their_own_in_front(tmp_path: Path) -> None:
-    part = (
-        NODES.replace("*NODE, ", "*Part, name=P\n*Node, ").split("11,")[0]
-        + CELLS.split("*ELEMENT, TYPE=CPE4, ELSET=U")[0]
-    )
     assembly = (
         "*Surface, name=S\nLOW, S3\n*End Part\n*Assembly, name=A\n*Instance, name=I-1, part=P\n*End Instance\n"
         "*Instance, name=I-2, part=P\n0., 3., 0.\n1., 3., 0., 1., 3., 1., 180.\n*Elset, elset=own\n1\n*End Instance\n"
         "*Elset, elset=_E, internal, instance=I-1\n1\n*Surface, name=T\n_E, S3\nI-2.LOW, S1\n"
         "*Nset, nset=N\nI-2.3\n*End Assembly\n*Contact Pair, interaction=I\nI-2.S, T\n"
     )
-    mesh = read(tmp_path, part + assembly)
+    mesh = read(tmp_path, "*Part, name=P\n" + FOUR + LOW + assembly)
     np.testing.assert_allclose(mesh.points[4:], [[2, 3], [1, 3], [1, 2], [2, 2]], atol=1e-15)
     assert mesh.pairs == (("I-2.S", "T"),)
     assert (sides(mesh, "I-1.S"), sides(mesh, "I-2.S")) == ([[2, 3]], [[6, 7]])
@@ -150,7 +135,7 @@ def test_instances_are_moved_and_their_names_have_their_own_in_front(tmp_path: P
 def test_files_that_a_deck_includes_are_read_in_their_place(tmp_path: Path) -> None:
     (tmp_path / "mesh.inc").write_text(NODES + "*ELEMENT, TYPE=CPE4, ELSET=UP, INPUT=up.txt\n*INCLUDE, INPUT=low.inc\n")
     (tmp_path / "up.txt").write_text("2,11,12,13,14")
-    (tmp_path / "low.inc").write_text(CELLS.split("*ELEMENT, TYPE=CPE4, ELSET=U")[0])
+    (tmp_path / "low.inc").write_text(LOW)
     mesh = read(tmp_path, '*Include, input="mesh.inc"\n' + SURFACES)
     assert (sides(mesh, "Top"), sides(mesh, "Bottom")) == (TOP, BOTTOM)
 
