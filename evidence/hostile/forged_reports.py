@@ -63,9 +63,11 @@ def _change_real(*names: str) -> Callable[[Any, random.Random], None]:
     """Return a forgery of a real number: it is a little larger."""
 
     def change(file: Any, chance: random.Random) -> None:
-        variable = _variable(file, chance, names)
-        values = np.array(variable[...])
-        places = [tuple(index) for index in np.argwhere(np.isfinite(values) & (np.abs(values) < 1e30) & (values != 0))]
+        places: list[tuple[int, ...]] = []
+        while not places:  # Some variables hold zeros alone.
+            variable = _variable(file, chance, names)
+            values = np.array(variable[...])
+            places = [*zip(*np.nonzero(np.isfinite(values) & (np.abs(values) < 1e30) & (values != 0)), strict=True)]
         place = chance.choice(places)
         values[place] *= 1 + 1e-9
         variable[...] = values
