@@ -144,24 +144,23 @@ class RunOptions:
         Path | None,
         Option("Check on the interface of this mesh file, and on the bodies of its cells.", "FILE", group=PLACE),
     ] = None
-    slave: Annotated[str | None, Option("Group of the mesh's slave lines, or faces in space.", "TAG", group=PLACE)] = (
-        None
-    )
-    master: Annotated[
-        str | None, Option("Group of the mesh's master lines, or faces in space.", "TAG", group=PLACE)
+    slave: Annotated[
+        str | None,
+        Option("Slave: a group of the mesh, or a file. (default: of its contact pair)", "GROUP", group=PLACE),
     ] = None
+    master: Annotated[str | None, Option("Master: as the slave.", "GROUP", group=PLACE)] = None
     pair: Annotated[int, Option("Number of the contact pair of the mesh, if it has several.", "N", group=PLACE)] = 0
     flip: Annotated[bool, Option("Exchange inside and outside of the mesh's lines.", group=PLACE)] = False
     material: Annotated[
         tuple[str, ...],
-        Option("Material of the body of a group of the mesh. (default: 1,0.3) Repeatable.", "TAG=E,ν", group=PLACE),
+        Option("Material of the body of a group of the mesh. (default: 1,0.3) Repeatable.", "GROUP=E,ν", group=PLACE),
     ] = ()
     support: Annotated[
         tuple[str, ...],
         Option(
             "Displacement imposed on a group of the mesh, each a number or free. (default: bodies are held far from "
             "the contact, and the slave is pushed) Repeatable.",
-            "TAG=X,Y",
+            "GROUP=X,Y",
             group=PLACE,
         ),
     ] = ()
