@@ -1,4 +1,4 @@
-"""Mesh files as plain arrays: a reader in a child process makes them, and scenes are written.
+"""Mesh files as plain arrays, which a reader in a child process makes.
 
 What comes back is checked here: whoever gets a `PlainMesh` may rely on every statement of its docstring.
 """
@@ -7,15 +7,11 @@ import os
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from pathlib import Path
-from typing import Any
 
-import meshlane
 import msgspec
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.engine import SceneArrays
 from contactverif.contract.errors import MisuseError, one_line
 from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
 from contactverif.isolation.wire import PackedArray
@@ -118,50 +114,3 @@ def unknown_group_error(
     remark = f" ({one_line(mesh.warnings, _LONGEST_REASON)})" if mesh.warnings else ""
     actual = "nothing" if name is None else f"{name!r}, which is no group of the file"
     return MisuseError(option, actual, needed + remark)
-
-
-SLAVE, MASTER = 1, 2  # The roles of contact edges in a file; 0 is neither.
-
-
-def write_arrays(arrays: SceneArrays, path: str | Path) -> None:
-    """Write a scene to a file of which meshlane knows the format by its ending, such as `.vtu` or `.msh`.
-
-    Parameters
-    ----------
-    arrays : SceneArrays
-        The scene. Its contact edges are lines of the mesh.
-    path : str | Path
-        The file.
-
-    Raises
-    ------
-    MisuseError
-        If meshlane does not know the ending.
-    """
-    triangles = arrays.cells[:, 3] < 0
-    blocks: list[tuple[str, Any, Any, int]] = [  # (kind, corners, body, role)
-        ("line", arrays.slave, np.full(len(arrays.slave), -1), SLAVE),
-        ("line", arrays.master, np.full(len(arrays.master), -1), MASTER),
-        ("triangle", arrays.cells[triangles, :3], arrays.body_of_cell[triangles], 0),
-        ("quad", arrays.cells[~triangles], arrays.body_of_cell[~triangles], 0),
-    ]
-    blocks = [block for block in blocks if len(block[1])]
-    mesh = meshlane.Mesh(
-        np.column_stack([arrays.nodes, np.zeros(len(arrays.nodes))]),
-        [(kind, corners) for kind, corners, _, _ in blocks],
-        point_data={
-            "fixed": arrays.fixed.astype(np.int64),
-            "imposed": arrays.imposed,
-            "load": arrays.load,
-            "start": arrays.start,
-            "body": arrays.body_of_node,
-        },
-        cell_data={
-            "body_of_cell": [body for _, _, body, _ in blocks],
-            "role": [np.full(len(corners), role) for _, corners, _, role in blocks],
-        },
-    )
-    try:
-        mesh.write(path)
-    except meshlane.ReadError as error:
-        raise MisuseError("path", f"{path} ({error})", "an ending that meshlane writes, such as .vtu") from None

@@ -60,7 +60,12 @@ def _clean(path: Path, folder: Path) -> Path:
             data, name = stream.read(_LARGEST + 1), path.name.removesuffix(".gz")
         if len(data) > _LARGEST:
             raise ValueError(f"it is longer than {_LARGEST / 2**30:g} GiB when it is not compressed")
-    elif head.startswith(_MARK) or (head[:1].isspace() and suffix != ".stl") or suffix in _NASTRAN:
+    elif (
+        suffix != ".inp"
+        and (  # A deck stays where the files are that it includes.
+            head.startswith(_MARK) or (head[:1].isspace() and suffix != ".stl") or suffix in _NASTRAN
+        )
+    ):
         data, name = path.read_bytes(), path.name
     else:
         return path
@@ -80,8 +85,8 @@ def _read(path: Path) -> PlainMesh:
     if path.suffix.lower() == ".mdpa":
         return read_mdpa(str(path))
     with path.open("rb") as stream:
-        head = stream.read(4)
-    if head.startswith(b"*") and path.suffix.lower() != ".f3grid":
+        head = stream.read(100)
+    if head.removeprefix(_MARK).lstrip().startswith(b"*") and path.suffix.lower() != ".f3grid":
         return read_deck(str(path))
     output, errors = StringIO(), StringIO()
     # Ansys uses the ending .msh too, and a Nastran file may begin with a remark.

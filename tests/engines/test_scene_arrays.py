@@ -1,8 +1,5 @@
 """A scene as arrays is the same scene, and an answer to a turned or lowered one is an answer to the scene."""
 
-from pathlib import Path
-
-import meshlane
 import msgspec
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.isolation.plain_msgpack import decode, encode
 from contactverif.mechanics.accuracy import Solution
 from contactverif.mechanics.changed_scenes import turn
-from contactverif.meshes.plain_mesh import write_arrays
 
 
 def test_arrays_make_the_scene_again() -> None:
@@ -91,26 +87,3 @@ def test_long_messages_too(size: int) -> None:
         decode(encode(1) + b"\x00")
     with pytest.raises(ValueError, match="unknown kind"):
         decode(b"\xc1")
-
-
-@pytest.mark.parametrize("name", ["c", "a1", "example-2"])
-def test_a_file_of_a_scene_holds_its_bodies_and_edges(name: str, tmp_path: Path) -> None:
-    arrays = load_scene(name).arrays()
-    write_arrays(arrays, tmp_path / "scene.vtu")
-    mesh = meshlane.read(tmp_path / "scene.vtu")
-    np.testing.assert_array_equal(mesh.points[:, :2], arrays.nodes)
-    np.testing.assert_array_equal(mesh.point_data["load"][:, :2], arrays.load)
-    edges = {role: np.vstack([block.data[roles == role] for block, roles in blocks(mesh, "line")]) for role in (1, 2)}
-    np.testing.assert_array_equal(edges[1], arrays.slave)
-    np.testing.assert_array_equal(edges[2], arrays.master)
-    assert sum(len(block.data) for block in mesh.cells if block.type != "line") == len(arrays.cells)
-
-
-def blocks(mesh: meshlane.Mesh, kind: str) -> list[tuple[meshlane.CellBlock, np.ndarray]]:
-    pairs = zip(mesh.cells, mesh.cell_data["role"], strict=True)
-    return [(block, roles) for block, roles in pairs if block.type == kind]
-
-
-def test_an_ending_that_nobody_knows_is_a_mistake(tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match=r"an ending that meshlane writes, such as \.vtu"):
-        write_arrays(load_scene("c").arrays(), tmp_path / "scene.xyz1")
