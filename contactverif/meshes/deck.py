@@ -25,8 +25,8 @@ _TYPES = (
     ("C3D4", "tetra", "S1=132 S2=124 S3=234 S4=143"),
     ("C3D6", "wedge", "S1=132 S2=456 S3=1254 S4=2365 S5=3146"),
     ("C3D8", "hexahedron", "S1=1432 S2=5678 S3=1265 S4=2376 S5=3487 S6=4158"),
-    ("(S|STRI|[RM]3D|SFM3D)3", "triangle", "SPOS=123 SNEG=321 S2=123 S1=321"),
-    ("(S|[RM]3D|SFM3D)4", "quad", "SPOS=1234 SNEG=4321 S2=1234 S1=4321"),
+    ("(S|STRI|[RM]3D|SFM3D)3", "triangle", "SPOS=123 SNEG=321 S2=123 S1=321 S3=12 S4=23 S5=31"),
+    ("(S|[RM]3D|SFM3D)4", "quad", "SPOS=1234 SNEG=4321 S2=1234 S1=4321 S3=12 S4=23 S5=34 S6=41"),
     ("[TR]2D2|RAX2|B21", "line", "SPOS=21 SNEG=12"),
     ("T3D2|B31", "line", "=12"),  # Without a normal: the cells beside such a line tell its side.
     ("C3D(10|15|20|27).*|(CP[ES]|CAX|M3D)[689].*|S[689]R?|STRI6|[TR][23]D3|B[23]2.*", "quadratic", ""),
@@ -51,6 +51,11 @@ _Key = tuple[str, str]  # SURFACE, ELSET or NSET, and the label of a set.
 def _label(name: str) -> str:
     """Return a name as the codes compare it: in capitals and without blanks, but for what is in quotes."""
     return "".join(part if n % 2 else "".join(part.split()).upper() for n, part in enumerate(name.split('"')))
+
+
+def _is_solid(faces: dict[str, list[int]]) -> bool:
+    """Return whether elements have a body behind each face; a shell may have edges as faces, too (`cgx`)."""
+    return "S3" in faces and "SPOS" not in faces
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +291,7 @@ class _Deck:
 
     def boundary(self, elements: Iterable[int]) -> dict[frozenset[int], list[int]]:
         """Return the sides that have one of these solid cells, which is behind them, by their corners."""
-        cells = self.cells(element for element in elements if "S3" in self.elements[element][2])
+        cells = self.cells(element for element in elements if _is_solid(self.elements[element][2]))
         points = self.places[:, :2] if {*cells} <= {"triangle", "quad"} else self.places
         sides = CellSides.collect(cells, points).outer.values()
         return {frozenset(side): side for part in sides for side in part.tolist()}
@@ -306,7 +311,7 @@ class _Deck:
                 face = _label((*rest, "")[0])
                 for element in self.members("ELSET", card, member, line):
                     name, _, faces, nodes = self.elements[element]
-                    proper = face in faces or (not face and "S3" in faces)
+                    proper = face in faces or (not face and _is_solid(faces))
                     needed = f"needed {', '.join(faces) or 'elements that are read'}"
                     card.need(proper, f"face {face or 'none'} of elements {name}; {needed}", line)
                     (owners if face in faces else whole).append(element)

@@ -98,7 +98,8 @@ def _normals(corners: FloatArray) -> FloatArray:
         normals = np.column_stack([along[:, 1], -along[:, 0]])
     else:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    units: FloatArray = normals / np.linalg.norm(normals, axis=1)[:, None]
+    lengths = np.linalg.norm(normals, axis=1)[:, None]
+    units: FloatArray = normals / np.where(lengths > 0, lengths, 1.0)  # A boundary may have sides without an area.
     return units
 
 

@@ -169,10 +169,10 @@ def find_plane(mesh: PlainMesh) -> tuple[FloatArray, str]:
 
     The axes keep their order: a mesh in x and z is seen with x to the right and z up.
     """
-    used = _find_used(mesh)
-    extent = np.ptp(mesh.points[used], axis=0) if len(used) else np.zeros(2)
-    if not np.isfinite(extent).all():
+    used = mesh.points[_find_used(mesh)]
+    if not np.isfinite(used).all():
         raise MisuseError("--mesh", "NaN or infinity among its coordinates", "finite coordinates")
+    extent = np.ptp(used, axis=0) if len(used) else np.zeros(2)
     if len(extent) == 2:
         return mesh.points[:, :2], ""
     thin = [axis for axis in (2, 1, 0) if extent[axis] <= FLAT * extent.max()]

@@ -71,7 +71,7 @@ def _clean(path: Path, folder: Path) -> Path:
         return path
     data = data.removeprefix(_MARK).lstrip()
     if suffix in _NASTRAN:  # Most programs write the cards of the mesh alone, and go on with a card by eight blanks.
-        data = re.sub(rb"(?m)^ {8}(?=\S)", b"+       ", data)
+        data = re.sub(rb"(?m)^ {8}(?=.)", b"+       ", data)
         data = data if b"BEGIN BULK" in data.upper() else b"BEGIN BULK\n" + data
     copy = folder / name
     copy.write_bytes(data)

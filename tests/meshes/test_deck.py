@@ -61,12 +61,26 @@ def test_a_solid_cell_is_behind_each_of_its_faces(tmp_path: Path, name: str, mir
 @pytest.mark.parametrize(
     "row",
     # The normal of a line is on its left, so the body is on its right. In CalculiX S1 is the negative side of a shell.
-    ["R2D2 SPOS 21", "T2D2 SNEG 12", "S3 SPOS 123", "S4R SNEG 4321", "R3D4 SPOS 1234", "S4 S1 4321"],
+    [
+        "R2D2 SPOS 21",
+        "T2D2 SNEG 12",
+        "S3 SPOS 123",
+        "S4R SNEG 4321",
+        "R3D4 SPOS 1234",
+        "S4 S1 4321",
+        "S4 S5 34",
+        "S3 S4 23",
+    ],
 )
 def test_the_body_of_a_thin_cell_is_behind_its_face(tmp_path: Path, row: str) -> None:
     name, face, corners = row.split()
     text = f"{NODES}*ELEMENT, TYPE={name}, ELSET=E\n5, {', '.join(sorted(corners))}\n*SURFACE, NAME=A\nE, {face}\n"
     assert sides(read(tmp_path, text), "A") == [[int(node) - 1 for node in corners]]
+
+
+def test_an_edge_of_a_shell_is_a_face_as_cgx_writes_it(tmp_path: Path) -> None:
+    mesh = read(tmp_path, FOUR + "*ELEMENT, TYPE=S4\n7,1,2,3,4\n*SURFACE, NAME=TOP\n7, S5\n")
+    assert sides(mesh, "TOP") == TOP
 
 
 @pytest.mark.parametrize(
