@@ -68,8 +68,6 @@ def test_a_solid_cell_is_behind_each_of_its_faces(tmp_path: Path, name: str, mir
         "S4R SNEG 4321",
         "R3D4 SPOS 1234",
         "S4 S1 4321",
-        "S4 S5 34",
-        "S3 S4 23",
     ],
 )
 def test_the_body_of_a_thin_cell_is_behind_its_face(tmp_path: Path, row: str) -> None:
