@@ -38,11 +38,14 @@ def _mesh(data: netCDF4.Dataset) -> PlainMesh:
     coordinates = data["coord"][:] if "coord" in data.variables else [data[f"coord{axis}"][:] for axis in axes]
     blocks: list[tuple[str, str, IntArray]] = []  # (name, key of `_TYPES`, nodes)
     cells: Group = {}
+    side_sets = list(_entries(data, "num_side_sets", "ss", "num_side_ss"))
+    least = min((data[f"side_ss{index}"][:].min(initial=3) for index, _ in side_sets), default=3)
     for index, name in _entries(data, "num_el_blk", "eb", "num_el_in_blk"):
         variable = data[f"connect{index}"]
         type_, n_nodes = str(variable.elem_type).strip("\0 ").upper(), variable.shape[-1]
-        # The library takes all triangles in space as shells.
-        key = f"{'SHE' if type_.startswith('TRI') and len(axes) == 3 else type_[:3]}{n_nodes}"
+        # The library takes triangles in space as shells, whose sides 1 and 2 are faces. In a plane others do not.
+        is_shell = type_.startswith("TRI") and len(axes) == 3 and (least > 2 or np.ptp(coordinates[2]) > 0)
+        key = f"{'SHE' if is_shell else type_[:3]}{n_nodes}"
         if key not in _TYPES:
             raise ValueError(f"elements {type_} of {n_nodes} nodes, block {name!r}; mesh at first order (QUAD4, HEX8)")
         nodes = variable[:].astype(np.int64) - 1
@@ -51,7 +54,7 @@ def _mesh(data: netCDF4.Dataset) -> PlainMesh:
     if (n_elements := sum(len(nodes) for _, _, nodes in blocks)) != len(data.dimensions["num_elem"]):
         raise ValueError(f"{n_elements} elements in blocks, not {len(data.dimensions['num_elem'])}; write it again")
     entries: list[tuple[str, str, Group]] = []  # (what it is, name, members)
-    for index, name in _entries(data, "num_side_sets", "ss", "num_side_ss"):
+    for index, name in side_sets:
         elements, sides = (data[f"{word}_ss{index}"][:].astype(np.int64) - 1 for word in ("elem", "side"))
         entries.append(("side set", name, _sides(name, blocks, elements, sides)))
     entries += [("block", name, {_TYPES[key][0]: nodes}) for name, key, nodes in blocks]

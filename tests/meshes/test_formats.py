@@ -79,9 +79,9 @@ def check(interface: Interface, truth: Bodies) -> None:
         assert cycles(interface.nodes[elements]) == cycles(truth.points[side])
 
 
-def write_exodus(path: Path, truth: Bodies, mesh: meshlane.Mesh, *, is_old: bool) -> None:
+def write_exodus(path: Path, truth: Bodies, mesh: meshlane.Mesh, *, is_old: bool, in_space: bool) -> None:
     """Write the blocks by meshlane, and add side sets; files of today have a variable for each axis."""
-    meshlane.write(path, meshlane.Mesh(truth.points, mesh.cells[2:]), file_format="exodus")
+    meshlane.write(path, meshlane.Mesh(mesh.points if in_space else truth.points, mesh.cells[2:]), file_format="exodus")
     with netCDF4.Dataset(path, "a") as data:
         data.createDimension("num_side_sets", 2)
         data.createVariable("ss_names", "S1", ("num_side_sets", "len_string"))[:, :5] = [[*"punch"], [*"base\0"]]
@@ -92,7 +92,7 @@ def write_exodus(path: Path, truth: Bodies, mesh: meshlane.Mesh, *, is_old: bool
             data.createVariable(f"side_ss{k + 1}", "i4", size)[:] = FIRST_FACE[truth.kind]
         if not is_old:
             data.renameVariable("coord", "unused")
-            for axis, values in zip("xyz", truth.points.T, strict=False):
+            for axis, values in zip("xyz", (mesh.points if in_space else truth.points).T, strict=False):
                 data.createVariable(f"coord{axis}", "f8", "num_nodes")[:] = values
 
 
@@ -134,7 +134,7 @@ def test_what_is_written_is_read(
         field_data={name: np.array([n, dim - 1]) for n, name in enumerate(NAMES, 1)} if is_gmsh else {},
     )
     if format_ == "exodus":
-        write_exodus(path, truth, mesh, is_old=is_turned)
+        write_exodus(path, truth, mesh, is_old=is_turned, in_space=binary)
     elif format_ == "mdpa":
         write_mdpa(path, mesh)
     else:
