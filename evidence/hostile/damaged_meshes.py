@@ -6,6 +6,7 @@ does harm is kept in the folder damaged/. An ending is good if the file is read,
 
 import os
 import random
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
@@ -13,13 +14,14 @@ from io import StringIO
 from pathlib import Path
 
 import meshlane
+import netCDF4
 import numpy as np
-from damage import BYTES, Campaign, Ending, main, run_command
+from damage import BYTES, ENDINGS, GOOD, Campaign, Ending, main, run_command
 
 from contactverif import MisuseError, read_interface
 
 PUNCH = Path(__file__).parents[2] / "tests" / "data" / "punch.msh"
-# {file: (format of meshlane, options of its writer, the groups)}, without those that need a further package.
+# {file: (format of meshlane, options of its writer, the groups)}
 NAMES, BY_NUMBER = ("punch", "base"), ("-1", "2")
 FORMATS = {
     "ascii22.msh": ("gmsh22", {"binary": False}, NAMES),
@@ -33,8 +35,16 @@ FORMATS = {
     "a.inp": ("abaqus", {}, NAMES),
     "a.mesh": ("medit", {}, BY_NUMBER),
     "a.meshb": ("medit", {}, BY_NUMBER),
+    "a.med": ("med", {}, NAMES),
+    "a.xdmf": ("xdmf", {"data_format": "XML"}, ("1", "2")),
+    "a.bdf": ("nastran", {}, ("1", "2")),
+    "a.avs": ("avsucd", {}, ("1", "2")),
+    "a.g": ("exodus", {}, NAMES),
+    "a.mdpa": ("", {}, NAMES),
+    "pair.inp": ("", {}, (None, None)),
 }
-KEYS = {"medit": "medit:ref"}
+SPLIT = {"triangle": ([0, 1, 2],), "quad": ([0, 1, 2], [0, 2, 3])}
+KEYS = {"medit": "medit:ref", "nastran": "nastran:ref", "avsucd": "avsucd:material"}
 SUFFIXES = (".msh", ".vtk", ".vtu", ".inp", ".mesh", ".su2", ".xdmf", ".med", ".e", ".cgns", ".h5m", ".stl", ".xyz")
 NUMBERS = (b"-1", b"0", b"99999999", b"9999999999999999999", b"nan", b"inf", b"1e400", b"x", b"", b"2147483648", b"1.5")
 
@@ -49,21 +59,81 @@ def members(mesh: meshlane.Mesh, tags: list[np.ndarray], number: int) -> list[np
 
 def write_meshes(folder: Path) -> dict[str, bytes]:
     """Return the bytes of the same mesh in many formats, by the name of a file."""
-    files = {}
     for name, (format_, options, _) in FORMATS.items():
         with redirect_stdout(StringIO()):
             mesh = meshlane.read(PUNCH, file_format="gmsh")
             tags = mesh.cell_data["gmsh:physical"]
             if format_ not in ("gmsh22", "gmsh"):
+                tags = tags if format_ in ("vtk", "vtu", "medit") else [np.abs(part) for part in tags]
                 mesh.cell_data, mesh.point_data = {KEYS.get(format_, "gmsh:physical"): tags}, {}
-                mesh.cell_sets = (
-                    {name: members(mesh, tags, number) for number, name in enumerate(NAMES, 1)}
-                    if format_ == "abaqus"
-                    else {}
-                )
-            meshlane.write(folder / name, mesh, file_format=format_, **options)
-        files[name] = (folder / name).read_bytes()
-    return files
+                sets = {name: members(mesh, tags, number) for number, name in enumerate(NAMES, 1)}
+                mesh.cell_sets = sets if format_ in ("abaqus", "med", "") else {}
+            if format_ in ("med", "exodus", ""):
+                mesh = merge(mesh, sets)
+            if format_:
+                meshlane.write(folder / name, mesh, file_format=format_, **options)
+        if format_ in ("exodus", ""):
+            {".g": add_side_sets, ".mdpa": write_mdpa, ".inp": write_pair}[Path(name).suffix](folder / name, mesh)
+    return {name: (folder / name).read_bytes() for name in FORMATS}
+
+
+def merge(mesh: meshlane.Mesh, sets: dict[str, list[np.ndarray]]) -> meshlane.Mesh:
+    """Return a mesh with the lines of each set in one block, and its triangles in another."""
+    lines = [
+        np.vstack([b.data[part] for b, part in zip(mesh.cells, each, strict=True) if len(part)])
+        for each in sets.values()
+    ]
+    cells = np.vstack([block.data[:, c] for block in mesh.cells for c in SPLIT.get(block.type, ())])
+    numbers = np.split(np.arange(sum(map(len, lines))), [len(lines[0])])
+    blocks = [("line", np.vstack(lines)), ("triangle", cells)]
+    return meshlane.Mesh(
+        mesh.points, blocks, cell_sets={name: [n, n[:0]] for name, n in zip(sets, numbers, strict=True)}
+    )
+
+
+def sides(mesh: meshlane.Mesh) -> list[np.ndarray]:
+    """Return (cell, side) of the lines of each set, both counted from 1."""
+    cells = mesh.cells[1].data
+    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1)).tolist()
+    place = {tuple(edge): (c + 1, s + 1) for c, cell in enumerate(edges) for s, edge in enumerate(cell)}
+    lines = np.sort(mesh.cells[0].data).tolist()
+    return [np.array([place[tuple(lines[n])] for n in part]) for part, _ in mesh.cell_sets.values()]
+
+
+def add_side_sets(path: Path, mesh: meshlane.Mesh) -> None:
+    """Add side sets to a file of Exodus, whose first block is the lines."""
+    with netCDF4.Dataset(path, "a") as data:
+        data.createDimension("num_side_sets", 2)
+        data.createVariable("ss_names", "S1", ("num_side_sets", "len_string"))[:, :5] = [[*"punch"], [*"base\0"]]
+        for k, part in enumerate(sides(mesh), 1):
+            size = data.createDimension(f"num_side_ss{k}", len(part)).name
+            data.createVariable(f"elem_ss{k}", "i4", size)[:] = part[:, 0] + len(mesh.cells[0].data)
+            data.createVariable(f"side_ss{k}", "i4", size)[:] = part[:, 1]
+
+
+def write_mdpa(path: Path, mesh: meshlane.Mesh) -> None:
+    """Write a file of Kratos with conditions in sub model parts."""
+    lines = ["Begin Nodes", *(f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(mesh.points, 1)), "End Nodes"]
+    for block, word in zip(mesh.cells, ("Condition", "Element"), strict=True):
+        rows = [f"{n} 0 {' '.join(map(str, row + 1))}" for n, row in enumerate(block.data)]
+        lines += [f"Begin {word}s {word}2D{block.data.shape[1]}N", *rows, f"End {word}s"]
+    for name, (part, _) in mesh.cell_sets.items():
+        lines += [f"Begin SubModelPart {name}", "Begin SubModelPartConditions", *map(str, part)]
+        lines += ["End SubModelPartConditions", "End SubModelPart"]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_pair(path: Path, mesh: meshlane.Mesh) -> None:
+    """Write a deck with a contact pair of two surfaces of sides of elements."""
+    cells = mesh.cells[1].data
+    lines = ["*NODE", *(f"{n}, {x}, {y}" for n, (x, y, _) in enumerate(mesh.points, 1))]
+    lines += [
+        f"*ELEMENT, TYPE=CPE{cells.shape[1]}",
+        *(f"{n}, {', '.join(map(str, row + 1))}" for n, row in enumerate(cells, 1)),
+    ]
+    for name, part in zip(NAMES, sides(mesh), strict=True):
+        lines += [f"*SURFACE, NAME={name}", *(f"{cell}, S{side}" for cell, side in part)]
+    path.write_text("\n".join([*lines, "*CONTACT PAIR, INTERACTION=hard", "punch, base", ""]))
 
 
 def lie(whole: bytes, chance: random.Random) -> bytes:
@@ -96,12 +166,29 @@ def mix(whole: bytes, chance: random.Random) -> bytes:
     return b"\n".join(lines)
 
 
+def swap_cards(whole: bytes, chance: random.Random) -> bytes:
+    """Return the cards of a file, each with the lines below it, in another order."""
+    cards = re.split(rb"(?m)^(?=[*$<]|Begin|[A-Z]{3})", whole)
+    place, other = chance.randrange(len(cards)), chance.randrange(len(cards))
+    cards[place], cards[other] = cards[other], cards[place]
+    return b"".join(cards)
+
+
+def rename(whole: bytes, chance: random.Random) -> bytes:
+    """Return the bytes with a letter of one of the longer words changed."""
+    word = chance.choice(list(re.finditer(rb"[A-Za-z_]{4,}", whole)) or [re.match(b"", whole)])
+    place = chance.randrange(word.start(), max(word.end(), word.start() + 1))
+    return whole[:place] + chance.choice([b"a", b"X", b"_", b"base"]) + whole[place + 1 :]
+
+
 KINDS: dict[str, Callable[[bytes, random.Random], bytes]] = {
     **BYTES,
     "a word that lies": lie,
     "an integer that lies": lie_in_integer,
     "lines exchanged": mix,
     "rubbish": rubbish,
+    "cards exchanged": swap_cards,
+    "a name changed": rename,
 }
 
 
@@ -113,7 +200,9 @@ def read(path: Path) -> None:
     except MisuseError as error:
         print(f"contactverif: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(2)
-    print(len(interface.slave), len(interface.master), float(np.abs(interface.nodes).max()))
+    sides = interface.slave.segments, interface.master.segments
+    print([sorted(interface.nodes[side].tolist()) for side in sides])
+    print([side.tolist() for side in sides])
 
 
 def strange_files(folder: Path) -> Iterator[tuple[str, Path]]:
@@ -136,10 +225,25 @@ def strange_files(folder: Path) -> Iterator[tuple[str, Path]]:
     yield "a device", Path("/dev/zero")
 
 
+class Reading(Ending):
+    """The end of reading an interface: a number that is another one moves a node, which no reader can know."""
+
+    def word(self, undamaged: Ending) -> str:
+        """Return one of `Damage.endings`."""
+        if self.status or not self.output or ".py:" in self.errors:
+            return super().word(undamaged)
+        (where, elements), before = self.output.splitlines(), undamaged.output.splitlines()
+        if where == before[0]:
+            return "as before"
+        return "told" if self.errors else "moved nodes" if elements == before[1] else "other elements"
+
+
 class Damage(Campaign):
     """Damaged mesh files of all formats."""
 
     kinds = tuple(KINDS)
+    endings = ("as before", "moved nodes", "told", "other elements", *ENDINGS[2:])
+    harmful = frozenset(ENDINGS) - GOOD | {"other elements"}
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
@@ -159,7 +263,7 @@ class Damage(Campaign):
         file = chance.choice(list(self.files))
         path = self.folder / f"damaged-{file}"
         path.write_bytes(KINDS[kind](self.files[file], chance))
-        ending, title = run_command([], main=lambda: read(path)), f"{name}-{file}"
+        ending, title = Reading(**vars(run_command([], main=lambda: read(path)))), f"{name}-{file}"
         return self.judge_file(kind, ending, self.undamaged[file], title, title, path.read_bytes())
 
 
