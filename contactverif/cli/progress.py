@@ -45,8 +45,9 @@ def _patience(seconds: float) -> str:
 class Bar:
     """A progress bar, up as long as its `with` block lasts."""
 
-    def __init__(self) -> None:
+    def __init__(self, first_wait: float = 0.0) -> None:
         console = QuietConsole(stderr=True)
+        self._first_wait = first_wait  # Seconds that the first call of a plugin may take; 0 if that is not known.
         self._progress = Progress(
             TextColumn("{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True)),
             BarColumn(_BAR_WIDTH),
@@ -97,8 +98,10 @@ class Bar:
                 self._print(line)
         if step.remark:
             self._print(Text(step.remark))
-            return
+            if step.count:
+                return
         words = f"{f'{step.formulation} {step.property_id}'.rstrip()}: {step.phase} {step.count}/{step.planned}"
+        words += f", waits {self._first_wait:g} s at most" if self._first_wait and not step.property_id else ""
         if self._of_run is None:
             self.update(words, 0, None)
         else:

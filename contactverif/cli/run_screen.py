@@ -21,6 +21,7 @@ from contactverif.contract import result as results
 from contactverif.contract.counterexample import Counterexample, counterexamples, failing_examples
 from contactverif.contract.property import Finding, Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import CaseCounts, Coverage, Result, Row, Run
+from contactverif.diagnosis.diagnose import TANGENT
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.plot.text import as_text
@@ -119,7 +120,10 @@ def summary(run: Run, *, quiet: bool = False, status: int | None = None) -> Text
                 names.append(f"{row.formulation} {row.property_id}{f' ({row.unexpected})' if otherwise else ''}")
         names += [item.formulation for item in run.not_loaded] if result is Result.NOT_LOADED else []
         if names:
-            named = f": {_list(names, _MOST_SUMMED_UP)}" if result is not Result.OMITTED else ""
+            named = f": {_list(names, _MOST_SUMMED_UP)}"
+            if result is Result.OMITTED:  # What is wrong is said before, or it is the reason.
+                reason = next(row.reason for row in run.rows if row.omitted)
+                named = "" if sentences else f": {reason.removeprefix(results.OMITTED)}"
             sentences.append(f"{len(names)} {words[len(names) > 1]}{named}.")
     return Text(" ".join(sentences) or "Nothing was checked.", style="red")
 
@@ -181,7 +185,10 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
     if name in run.opposite_signs:
         yield fold(results.OPPOSITE_SIGN, width, "bold red", indent=2)
     if name in run.diagnoses:
-        yield fold(f"diagnosis: {run.diagnoses[name]}", width, "bold", indent=2)
+        words, _, of_tangent = run.diagnoses[name].partition(TANGENT)
+        yield fold(f"diagnosis: {words}", width, "bold", indent=2)
+        if of_tangent:
+            yield fold(f"diagnosis of the tangent: {of_tangent}", width, "bold", indent=2)
     if (first := first_failure(rows)) is not None:
         examples = counterexamples(run).values() if first.verdict in (Verdict.FAIL, Verdict.CRASHED) else ()
         example = next((each for each in examples if each.row is first), None)

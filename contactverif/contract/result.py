@@ -35,6 +35,7 @@ from contactverif.contract.property import (
 _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what right formulations decide was decided.
 BROKEN_BY_FAILING = "promised to pass, but fails"
+BREAKS_LAW = "breaks a basic law, which no trait states"
 BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"
 OMITTED = "not asked: "  # The beginning of the reason of a row that another row made pointless.
@@ -66,6 +67,7 @@ class Result(StrEnum):
 
 _WAYS_TO_FAIL = {
     Result.BROKEN_PROMISE: "against a promise",
+    BREAKS_LAW: "against a basic law",
     Result.CRASHED: "by a crash",
     Result.WRONG_TRAITS: "by a mistake in the traits",
     Result.FAIL: "without a promise",
@@ -380,7 +382,8 @@ class Row:
             case Verdict.NOT_JUDGED:
                 return NOT_JUDGED
             case Verdict.FAIL if not self.known:
-                return "breaks the contract" if self.breach else BROKEN_BY_FAILING if self.promise else ""
+                broken = BROKEN_BY_FAILING if self.promised_by else BREAKS_LAW
+                return "breaks the contract" if self.breach else broken if self.promise else ""
             case Verdict.NOT_PROVIDED if self.promise and not self.known:
                 return "promised to pass, but a part that it needs is not provided"
             case Verdict.PASS if self.promise is False:
@@ -421,10 +424,10 @@ def describe_failures(rows: Iterable[Row]) -> str:
     tested = any(row.info.role == "exact" and row.info.family == "patch" for row in failing)
     patch = ", the patch test among them" if tested else ""
     words = f"fails {len(failing)} of {sum(row.verdict in DECIDED for row in rows)}{patch}"
-    counts = Counter(row.result for row in failing)
+    counts = Counter(BREAKS_LAW if row.unexpected == BREAKS_LAW else row.result for row in failing)
     if len(counts) > 1:
         return f"{words}: {', '.join(f'{counts[each]} {way}' for each, way in _WAYS_TO_FAIL.items() if counts[each])}"
-    return f"{words}, {'and promises none of these' if counts[Result.FAIL] else _WAYS_TO_FAIL[failing[0].result]}"
+    return f"{words}, {'and promises none of these' if counts[Result.FAIL] else _WAYS_TO_FAIL[next(iter(counts))]}"
 
 
 def describe(rows: Sequence[Row]) -> str:
@@ -522,7 +525,9 @@ class Run:
         words = {name: describe_failures(self.rows_of(name)) for name in self.formulations}
         if failures := [f"{name} {text}" for name, text in words.items() if text]:
             more = f"; and {len(failures) - _MOST_NAMED} more fail" if len(failures) > _MOST_NAMED else ""
-            return f"{'; '.join(failures[:_MOST_NAMED])}{more}. No promise is broken."
+            stated = any(row.promised_by or row.promise is False for row in self.rows)
+            end = "No promise is broken." if stated else "No trait is stated, so no promise can be broken."
+            return f"{'; '.join(failures[:_MOST_NAMED])}{more}. {end}"
         if unasked := {row.formulation for row in self.rows} - {row.formulation for row in self.rows if row.planned}:
             return f"Nothing was judged of {', '.join(sorted(unasked))}: no property applies. What was judged is kept."
         names = [f"{row.formulation} {row.property_id}" for row in self.rows if row.result is Result.UNDECIDED]

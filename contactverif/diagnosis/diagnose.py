@@ -12,6 +12,7 @@ from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residu
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
+TANGENT = "; and of the tangent: "  # Between what is said of forces and what is said of the tangent.
 _OF_TANGENTS = ("tangent.", "newton.")
 _SCALES = range(4, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
 # A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
@@ -23,8 +24,8 @@ _SLIDE = 0.625  # The way along the surface after which most slave nodes face an
 def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> str:
     """Return what kind of mistake a formulation makes that fails a property, in a sentence; empty if no rule knows it.
 
-    For a property of tangents the tangent is looked at, for one of purity what calls change, else the forces. Where one
-    of the other properties that fail is of forces, these come first: a tangent of wrong forces fits nothing.
+    For a property of purity, what calls change is looked at, else the forces and then the tangent. Where all properties
+    that fail are of tangents, the forces are not.
     """
     try:
         with np.errstate(all="ignore"):
@@ -43,7 +44,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             # Whether digits are lost depends on sizes, too, without any length in the code.
             if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
                 text = _diagnose_scale(subject)
-            return text or (diagnose_tangent(subject) if property_id.startswith(_OF_TANGENTS) else "")
+            return TANGENT.join(filter(None, (text, diagnose_tangent(subject))))
     except ContractError:
         return ""
 

@@ -98,7 +98,8 @@ def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> It
     if in_full:
         yield from _patterns_of_pieces(state, pushes)
     if same(pushes[:n], np.full(n, PENALTY * DEPTH)):
-        yield "each slave node has a whole spring: ε̂ |g| without the length that belongs to the node"
+        nodal = 'for nodal springs state penalty = "nodal" in the traits'
+        yield f"each slave node has a whole spring, ε̂ |g|: {nodal}; else the length at the node is missing"
     if in_full:
         yield _side_pattern(state, pushes)
 

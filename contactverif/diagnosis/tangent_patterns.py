@@ -90,6 +90,7 @@ def _measure(subject: Subject, states: Sequence[FlatState]) -> Tangents:
 def _patterns(pair: Tangents) -> Iterator[str]:
     yield _as_a_whole(pair)
     yield _one_line(pair)
+    yield _one_entry(pair)
     number = np.arange(pair.tangents.shape[1])
     for side, columns in (("slave", number < pair.n_slave), ("master", number >= pair.n_slave)):
         if not pair.tangents[:, :, columns].any() and _is_small(pair.errors[:, :, ~columns], pair.scale):
@@ -137,6 +138,22 @@ def _one_line(pair: Tangents) -> str:
             rank = {0: "the first, ", len(lines) - 1: "the last, "}.get(place, "")
             change = "missing" if missing else "wrong"
             return f"{name} {place} ({rank}{_unknown(place, pair)}) is {change}, all others are right"
+    return ""
+
+
+def _one_entry(pair: Tangents) -> str:
+    """Return which entry is wrong in the matrix of each slave node and its segment, if it is one and the same."""
+    wrong, n = np.max(np.abs(pair.errors), axis=0) > SAME * pair.scale, len(SLAVE)
+    nodes = np.add.outer(n - 1 + np.searchsorted(-MASTER, -SLAVE), [0, 1])
+    unknowns = (2 * np.column_stack([np.arange(n), nodes])[:, :, None] + [0, 1]).reshape(n, -1)
+    names = [f"{axis} of the {node}" for node in ("slave node", "first master node", "second one") for axis in "xy"]
+    for row, column in product(range(len(names)), repeat=2):
+        entries = np.zeros_like(wrong)
+        entries[unknowns[:, row], unknowns[:, column]] = True
+        if np.array_equal(entries, wrong):
+            change = _change(pair.tangents[:, wrong], pair.derivatives[:, wrong], pair.scale)
+            place = f"row {names[row]}, column {names[column]}: AMATRX({row + 1}, {column + 1}) of a UEL"
+            return f"one entry of each slave node and its segment {change}, in {place}"
     return ""
 
 

@@ -43,7 +43,9 @@ from contactverif.isolation.wire import (
     join,
 )
 
-_MOST_ENDS = 60  # A process starts in about a second. After so many ends the formulation is not asked any more.
+# A process starts in about a second. After so many ends the formulation is not asked any more, or after so many if it
+# has never returned forces or a solution.
+_MOST_ENDS, _MOST_ENDS_AT_FIRST = 60, 3
 # The calls without an answer after which a formulation is not asked any more, in all of its processes, and why. One of
 # a method that never answered, and an import, count for as many, since they take five times as long.
 _AT_IMPORT, _AT_FIRST = 100, 10
@@ -90,7 +92,8 @@ class Host:
         """Start the process anew and let it load the formulation, until `load` waits for that."""
         self.end()
         reason = next((words for least, words in _MOST_HANGS.items() if _hangs[self._key] >= least), "")
-        if reason or self.n_ended >= _MOST_ENDS:
+        answered = self._first_seconds.keys() & {"residual", "residual_and_tangent", "solve"}
+        if reason or self.n_ended >= (_MOST_ENDS if answered else _MOST_ENDS_AT_FIRST):
             raise PluginError(reason or f"its process ended {self.n_ended} times", "not asked")
         _make_room(self._name)
         self._process = PluginProcess(self._command, self._limits, second=self._second)

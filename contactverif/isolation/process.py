@@ -161,7 +161,7 @@ class PluginProcess:
             except TooLateError:
                 clock = clock or ActiveClock(self._child.pid)
                 clock.look()
-        raise TooLateError(f"no answer within {seconds:g} s")
+        raise TooLateError(f"no answer within {seconds:g} s: an endless loop? (--time-limit)")
 
     def _last_verb(self, questions: Sequence[Question]) -> str:
         # A file that is read cannot do harm. One that is mapped into memory can: the plugin may cut it.
@@ -197,8 +197,10 @@ class PluginProcess:
         if status < 0:
             return PluginError(f"{verb}: {name_of_signal(-status)} ended its process", "signal", ended=True)
         kind = NoBoxError if self._encloses and self.output.last.startswith(b"bwrap: ") else PluginError
-        last = self.output.last.decode(errors="replace").strip().splitlines()[-1:] if verb == "import" else []
-        words = "".join(f": {one_line(line)}" for line in last)  # One that cannot start says why.
+        printed = self.output.last.decode(errors="replace").splitlines()
+        # Behind the error, the library of gfortran prints a trace of calls.
+        lines = [line for line in printed if line.strip() and not line.startswith("#") and "Backtrace" not in line]
+        words = f": {one_line(lines[-1])}" if lines else " (a STOP?)" if status == 0 else ""
         return kind(f"{verb}: its process ended with status {status}{words}", "exit", ended=True)
 
     def end(self) -> None:

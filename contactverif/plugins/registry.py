@@ -246,7 +246,7 @@ def load_formulation(text: str, limits: Limits | None = None) -> Subject | NotLo
             return make if isinstance(make, NotLoaded) else subject_of(text, make)
         return remote.load_remote(_worker(), text, _with_store(limits, text))
     except MisuseError as error:
-        if text not in formulation_names():
+        if text not in formulation_names() or error.found == f"no {_FILE}":
             raise
         return NotLoaded(text, str(error))
 
@@ -390,7 +390,9 @@ def _load_factory(text: str, depth: int = 0) -> Callable[..., Any] | NotLoaded:
     outer, slash, inner_text = text.partition("/")
     if ":" in outer and not wraps:  # A "/" behind the options of a name that wraps nothing belongs to a value.
         outer, slash = text, ""
-    name, options = parse_name("formulation", outer, _FORM)
+    required = [] if isinstance(make, NotLoaded) else _required_among(_parameters_of(make))
+    form = next((f"{outermost}:{_NEEDED[option]}" for option in required if option in _NEEDED), _FORM)
+    name, options = parse_name("formulation", outer, form)
     if isinstance(make, NotLoaded):
         return make
     _check_options(text, make, options)
@@ -449,7 +451,7 @@ def _check_options(text: str, make: Callable[..., Any], options: Mapping[str, An
             raise MisuseError(f"option of {text!a}", ascii(option), f"an option that exists; {names}{nearest}")
     for name in _required_among(known):
         if name not in options:
-            raise MisuseError(f"options of {text!a}", f"no {name}", f"{name}=VALUE; {names}")
+            raise MisuseError(f"options of {text!a}", f"no {name}", f"{_NEEDED.get(name, f'{name}=VALUE')}; {names}")
 
 
 def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:

@@ -6,7 +6,7 @@ Whatever a plugin does is an outcome. What the harness or a property does wrong 
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, nan
 from time import perf_counter
 
 import numpy as np
@@ -24,7 +24,7 @@ from contactverif.contract.property import (
     checked_numbers,
     judge,
 )
-from contactverif.contract.result import JUDGED_SHARE, NodalForces, Row, exceeds
+from contactverif.contract.result import JUDGED_SHARE, OPPOSITE_SIGN, NodalForces, Row, exceeds
 from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
 from contactverif.problems.named_states import IN_SPACE, first_state, named_case
 from contactverif.problems.open_states import fit_to_traits
@@ -32,6 +32,10 @@ from contactverif.sampling.hypothesis_draws import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 RAISED = "the property raised "
+ACTS_APART = (
+    "it acts where the gap is open, and not where it is closed: look at the sign of the normal or of the gap, "
+    "and at the order of the master's nodes"
+)
 SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
 
 
@@ -151,13 +155,13 @@ def forces_to_draw(question: Property, case: Case, subject: Subject) -> NodalFor
 class FirstCall:
     """The findings of the first calls of a formulation."""
 
-    opposite_sign: bool = False
+    mistake: str = ""  # `OPPOSITE_SIGN`, `ACTS_APART` or nothing.
     answers: FirstAnswers | None = None
     seconds: float | None = None  # Of a pairing and a residual that are asked once more; a kernel is compiled then.
 
 
 def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
-    """Call a formulation for the first time, and return whether its forces have the opposite sign, and its answers.
+    """Call a formulation for the first time, and return whether its sign or its gap is turned round, and its answers.
 
     Many compile their kernels in the first call. `parts` are the optional parts that the run will need; no other part
     is called. What else goes wrong here, the properties will say: then there are no answers.
@@ -172,40 +176,49 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
             first = ask_first(subject, first_case, parts)
             name, *others = STATES if subject.traits.abilities.in_plane else (IN_SPACE,)
             start = perf_counter()
-            opposite = _pulls(subject, name)
+            push = _push(subject, name)
             seconds = perf_counter() - start
             if seconds >= SLOW_CALL:  # A busy machine makes one call slow, and hardly two.
                 start = perf_counter()
-                _pulls(subject, name)
+                _push(subject, name)
                 seconds = min(seconds, perf_counter() - start)
-            opposite = opposite and all(_pulls(subject, name) for name in others)
+            mistake = ""
+            if push < 0 and all(_push(subject, name) < 0 for name in others):
+                mistake = OPPOSITE_SIGN
+            elif (
+                push == 0
+                and subject.traits.rules.enforcement == "penalty"
+                and abs(_push(subject, name, apart=True)) > 0
+            ):
+                mistake = ACTS_APART
             if "contact_points" in parts:  # Their kernels are compiled, too.
                 with suppress(ContractError):
                     formulation, case = subject.for_case(first.case), first.case
                     formulation.contact_points(case.interface, formulation.pair(case.interface, case.z), case.z)
     except ContractError:
         return FirstCall()
-    return FirstCall(opposite, first, seconds)
+    return FirstCall(mistake, first, seconds)
 
 
-def _pulls(subject: Subject, state: str) -> bool:
-    """Return whether the forces of a formulation pull the slave towards the master in a state with a name.
+def _push(subject: Subject, state: str, *, apart: bool = False) -> float:
+    """Return the force on the slave away from the master in a state with a name, or where its surfaces are apart.
 
-    A residual with all signs turned round is the most frequent mistake of a first plugin. Then nearly every property
-    fails, and none of the numbers says why. Where anything else can explain the answer, this returns False.
+    A residual with all signs turned round is the most frequent mistake of a first plugin, and a normal turned round
+    that of a first element. Then nearly every property fails, and none of the numbers says why. It is NaN for an error.
     """
     try:
         case = fit_to_traits(named_case(state), subject.traits)[0]
         formulation, interface = subject.for_case(case), case.interface
         pressure = case.penalty * case.parameter("penetration")  # Multipliers, if any, press.
-        state_z = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure)).z
+        state_z = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure)).z.copy()
+        x, y = case.parameters.get("direction", (0.0, 0.0))
+        normal = (
+            np.array([-y, x]) if interface.dim == PLANE else case.parameters["normal"]
+        )  # It points out of the master.
+        slave = slice(interface.n_slave_nodes * interface.dim)
+        if apart:
+            state_z[slave] += np.tile(2 * case.parameter("penetration") * normal, interface.n_slave_nodes)
         residual = formulation.residual(interface, formulation.pair(interface, state_z), state_z)
     except ContractError:
-        return False
-    if interface.dim == PLANE:
-        x, y = case.parameters["direction"]
-        normal = np.array([-y, x])
-    else:
-        normal = case.parameters["normal"]
-    slave = -residual[: interface.n_unknowns].reshape(interface.nodes.shape)[: interface.n_slave_nodes]
-    return float((slave @ normal).sum()) < 0  # The force on the slave along the master's outward normal.
+        return nan
+    return -float((residual[slave].reshape(-1, interface.dim) @ normal).sum())

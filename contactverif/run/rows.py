@@ -235,7 +235,8 @@ def open_row(
     """
     promise = question.promise(subject.traits)
     traits = traits_behind(question.promise, subject.traits) if promise else {}
-    stated = {name: value for name, value in traits.items() if value is not False}  # Of a table, its name says enough.
+    # Of a table, its name says enough.
+    stated = {name: value for name, value in traits.items() if value is not False} or traits
     words = ", ".join(name if isinstance(value, Mapping) else f"{name}={value!r}" for name, value in stated.items())
     if stated and stated.keys() <= RULES:  # No author calls a rule a promise, and a question may follow from it.
         words = f"the rule{'s' * (len(stated) > 1)} {words}"

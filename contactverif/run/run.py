@@ -27,10 +27,11 @@ from contactverif.contract.interface import SEGMENT, Interface
 from contactverif.contract.property import LAST_TURN, Outcome, Property, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
+from contactverif.contract.traits import Traits
 from contactverif.diagnosis.diagnose import diagnose
 from contactverif.isolation.remote import has_process, in_one_process, places
 from contactverif.plugins.provenance import collect_provenance
-from contactverif.plugins.registry import unknown_property_error
+from contactverif.plugins.registry import files_within, unknown_property_error
 from contactverif.run import judge
 from contactverif.run.failure_memory import Failures
 from contactverif.run.profiles import FIRST_CASES, Profile, Shrink, profile_named
@@ -46,7 +47,7 @@ from contactverif.run.rows import (
     row_of_case,
     shrink_case,
 )
-from contactverif.run.scheduler import CaseChunk, Job, Progress, RunProgress, Scheduler, in_words
+from contactverif.run.scheduler import CaseChunk, Job, Phase, Progress, RunProgress, Scheduler, in_words
 from contactverif.run.store import WITNESS, Store
 from contactverif.sampling import draw
 from contactverif.sampling.draw import BLOCK, SHRINK_CALLS, PlannedCases, Sampling
@@ -184,7 +185,7 @@ class Driver:
         self._first_calls: dict[str, float] = {}  # {formulation: seconds of a pairing and a residual}
         self._first: dict[_Key, OpenRow] = {}  # The rows of the first round, with a few of their cases.
         self._first_wrong: dict[_Key, Row] = {}  # What fails in it, or again.
-        self._whole: _Key | None = None  # The row that is judged although its formulation is asked nothing more.
+        self._whole = set[_Key]()  # The rows that are judged although their formulation is asked nothing more.
         # Properties with the same cases. Those that state a turn come first, and those that solve bodies last: they
         # take long.
         self._groups: dict[tuple[str, bool], list[Property]] = {}
@@ -196,7 +197,7 @@ class Driver:
                 self._groups.setdefault(sampling.group(variant), []).append(variant)
         self._meter = RunMeter(self._variants, subjects, sampling)
         self._fail_again: dict[_Key, Outcome] = {}
-        self._opposite_signs: set[str] = set()
+        self._mistakes: dict[str, str] = {}  # {formulation: the mistake that its first call shows}
         self._diagnoses: dict[str, str] = {}
         self._stopped: dict[str, str] = {}  # {formulation: why it is asked nothing more}
 
@@ -207,7 +208,8 @@ class Driver:
             self.call_first()
             recheck_store(self._store, self._subjects, self._questions, sampling, self._scheduler)
             if self._stop == "foundation":
-                self._stopped |= dict.fromkeys(self._opposite_signs, "the forces have the opposite sign")
+                reasons = {OPPOSITE_SIGN: "the forces have the opposite sign"}
+                self._stopped |= {name: reasons.get(words, words) for name, words in self._mistakes.items()}
                 pairs = product(self._subjects, self._questions)
                 lacking = (subject.name for subject, question in pairs if lacks_witness(subject, question, sampling))
                 self._stopped |= dict.fromkeys(lacking, "the traits state a failure without a witness")
@@ -234,15 +236,17 @@ class Driver:
     def _call_each(self) -> Iterator[Job]:
         needs: frozenset[str] = frozenset().union(*(question.needs for question in self._questions))
         for subject in self._subjects:
-            before = Progress(subject.name, "", "first call (compiles)", 0, 1)
+            # A library is compiled, and its first call may be an endless loop.
+            phase: Phase = "first call" if files_within(subject.name) else "first call (compiles)"
+            before = Progress(subject.name, "", phase, 0, 1, remark=_describe_no_traits(subject))
             self._report(before)
             yield Job(judge.call_first, (subject, needs & subject.provides), partial(self._note_first, before, subject))
 
     def _note_first(self, before: Progress, subject: Subject, first: judge.FirstCall) -> None:
         subject.first_answers = subject.first_answers or first.answers  # In a second run the process is warm.
-        self._opposite_signs |= {subject.name} if first.opposite_sign else set()
+        self._mistakes |= {subject.name: first.mistake} if first.mistake else {}
         self._first_calls[subject.name] = first.seconds or 0.0
-        remark = f"{subject.name}: {OPPOSITE_SIGN}" if first.opposite_sign else ""
+        remark = f"{subject.name}: {first.mistake}" if first.mistake else ""
         self._report(replace(before, count=1, remark=remark))
 
     def _ask_first_round(self) -> None:
@@ -256,9 +260,16 @@ class Driver:
         of_cases = {case.kind for each in cases.values() for case in each if case.kind}
         words = f"first round: {len(cases)} of {len(self._questions)} properties, {FIRST_CASES} cases each"
         words += f", of {len(of_cases)} of {len(kinds)} kinds" if kinds else ""
-        words += f"; {len(self._first_wrong) or 'none'} wrong{self._meter.price(self._first_calls)}"
+        n_wrong = sum(not row.is_trait for row in self._first_wrong.values())
+        words += f"; {n_wrong or 'none'} wrong{self._meter.price(self._first_calls)}"
         if cases:
             self._report(Progress("", "", "first round", 1, 1, remark=words))
+        for row in (
+            sorted(self._first.values(), key=lambda row: row.question.turn) if self._stop == "foundation" else ()
+        ):
+            if _always_crashes(row) and row.subject.name not in self._stopped:
+                self._stopped[row.subject.name] = f"the plugin crashes in {row.question.id}"
+                self._whole.add((row.subject.name, row.question.id))
 
     def _first_round(self, cases_of: dict[str, tuple[Case, ...]]) -> Iterator[Job]:
         """Yield the jobs of the first round, and note the cases that each property is asked about."""
@@ -266,6 +277,8 @@ class Driver:
         for question, subject in product(sorted(variants, key=attrgetter("turn")), self._subjects):
             key, source = (subject.name, question.id), self._sampling.source(question)
             if question is not self._variants[key] or subject.name in self._stopped or source is None:
+                continue
+            if any(early.subject is subject and _always_crashes(early) for early in self._first.values()):
                 continue
             row = open_row(subject, question, source, self._known.get(question.id, ""), self._sampling)
             # A tangent takes a hundred calls.
@@ -304,8 +317,8 @@ class Driver:
             self._scheduler.work(chain.from_iterable(self._parts_of_next()))
             rows = wrong_rows(row.row for row in self._open_rows())
         for row in rows[:1]:
-            self._whole = row.formulation, row.property_id
-            reason = f"{' '.join(self._whole)} is wrong (-x)"
+            self._whole = {(row.formulation, row.property_id)}
+            reason = f"{row.formulation} {row.property_id} is wrong (-x)"
             self._stopped |= {subject.name: reason for subject in self._subjects}
 
     def _earlier_failures(self) -> Iterator[Job]:
@@ -369,7 +382,7 @@ class Driver:
     @property
     def opposite_signs(self) -> tuple[str, ...]:
         """The formulations with forces of the opposite sign, once all are called."""
-        return tuple(subject.name for subject in self._subjects if subject.name in self._opposite_signs)
+        return tuple(subject.name for subject in self._subjects if self._mistakes.get(subject.name) == OPPOSITE_SIGN)
 
     def check_written(self) -> None:
         """Check that all outcomes are kept."""
@@ -411,7 +424,7 @@ class Driver:
             if question is not self._variants[key]:
                 continue
             known = self._known.get(question.id, "")
-            stopped = self._stopped.get(subject.name, "") if key != self._whole else ""
+            stopped = self._stopped.get(subject.name, "") if key not in self._whole else ""
             self._rows[key] = row = open_row(subject, question, source, known, self._sampling, stopped)
             if isinstance(row, OpenRow):
                 opened.append(row)
@@ -535,7 +548,11 @@ class Driver:
         """Yield the jobs to diagnose, and to shrink, the failure of each formulation with the lowest rank."""
         for subject in self._subjects:
             rows = {id(row.row): row for row in self._open_rows() if row.subject is subject}
-            failure = first_failure(row.row for row in rows.values())
+            failure = first_failure(row.row for row in rows.values()) or next(
+                # A wrong tangent of which nothing is stated.
+                (row.row for row in rows.values() if row.row.result is Result.FAIL and "tangent" in row.question.needs),
+                None,
+            )
             if failure is None or failure.verdict not in (Verdict.FAIL, Verdict.CRASHED):
                 continue
             row, crashed = rows[id(failure)], failure.verdict is Verdict.CRASHED
@@ -574,6 +591,21 @@ def _check_place(subject: Subject, interface: Interface | None) -> None:
     if not corners <= takes:
         place, faces = (" and ".join(_FACE_NAMES[count] for count in sorted(each)) for each in (corners, takes))
         raise MisuseError("place", f"an interface of {place}", f"one of {faces}, on which {subject.name} is asked")
+
+
+def _always_crashes(row: OpenRow) -> bool:
+    return bool(row.row.unexpected) and row.row.judged == row.row.tally.verdicts.get(Verdict.CRASHED, 0) > 1
+
+
+def _describe_no_traits(subject: Subject) -> str:
+    if isinstance(subject, EngineSubject) or subject.traits != Traits():
+        return ""
+    looked = [
+        f" (looked for {file.stem}.toml and [tool.contactverif.traits.{file.stem}] in pyproject.toml)"
+        for file in files_within(subject.name)[:1]
+    ]
+    words = f"{subject.name}: no traits found{''.join(looked)}: nothing but the basic laws is held against it. "
+    return words + 'To begin: tangent = "exact" and penalty = "nodal" or "distributed"'
 
 
 def _check_once(argument: str, names: Iterable[str]) -> None:

@@ -34,7 +34,9 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.remote import code_files, note_code_files, start_process
 from contactverif.plugins.registry import installed_properties, load_property, load_subject, start_loading
 
-Phase = Literal["first call (compiles)", "asking again", "first round", "drawing", "judging", "diagnosis", "shrinking"]
+Phase = Literal[
+    "first call", "first call (compiles)", "asking again", "first round", "drawing", "judging", "diagnosis", "shrinking"
+]
 _SILENCE = 5.0  # Seconds after which the job that all wait for is reported, to show that the run goes on.
 _FURTHER_WORKERS = 32  # The number of workers of an executor that does not say it.
 _NOT_HERE = b""  # The answer of a worker that cannot import what a job refers to.

@@ -30,6 +30,7 @@ from contactverif.contract.traits import Traits
 _GROUPS = ("promises", "patch", "rules", "abilities", "evidence")
 _FORBIDDEN = ("batched", "takes_complex", "takes_longdouble")  # A library takes one state of doubles.
 _PROJECT = "pyproject.toml"
+_SOURCES = (".for", ".f", ".f90")
 _GUARD = np.uint64(0x7FF8C0DEC0DEC0DE)  # Not a number, so what reads it shows.
 _LEAST_GUARD = 8  # Words around an array.
 
@@ -49,8 +50,13 @@ def load_library(path: Path) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
-        needed = "a shared library for this machine that refers to no function of the solver"
-        raise MisuseError("option file", " ".join(str(error).split()), needed) from None
+        words, needed = " ".join(str(error).split()), "a shared library for this machine"
+        _, symbol, missing = words.partition("undefined symbol: ")
+        if symbol:
+            needed = f"a stub of it, such as: subroutine {missing.rstrip('_')}; end subroutine"
+        elif path.suffix.lower() in _SOURCES:
+            needed = f"a shared library; this is source text: gfortran -shared -fPIC -o {path.stem}.so {path.name}"
+        raise MisuseError("option file", words, needed) from None
 
 
 def find_function(library: ctypes.CDLL, path: Path, *names: str) -> Any:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import sparse
 
 from contactverif.contract.arrays import Array, FloatArray, IntArray
-from contactverif.contract.errors import ContractError, MisuseError
+from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError
 from contactverif.contract.formulation import Handle, Pairing, check_count, check_penalty, check_tau
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
@@ -134,6 +134,9 @@ class UserElement:
         rows.call(self.routine.function, values, describe_row)
         if (flaw := convention.flaw(rows)) is not None:
             raise ContractError(f"{describe_row(flaw[0])}: {flaw[1]}")
+        if len(places := np.argwhere(~np.isfinite(rows[convention.forces]))):
+            words = f"number {places[0, 1] + 1} of {convention.forces} is not finite; is an array read past its end?"
+            raise NonFiniteError(f"{describe_row(places[0, 0])}: {words} What lies behind it is NaN")
         return rows[convention.forces][:, :size].copy(), rows[convention.matrix].reshape(-1, size, size).copy()
 
 
