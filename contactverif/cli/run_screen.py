@@ -21,7 +21,6 @@ from contactverif.contract import result as results
 from contactverif.contract.counterexample import Counterexample, counterexamples, failing_examples
 from contactverif.contract.property import Finding, Outcome, PropertyInfo, Verdict, checked_numbers
 from contactverif.contract.result import CaseCounts, Coverage, Result, Row, Run
-from contactverif.diagnosis.diagnose import TANGENT
 from contactverif.run.ranking import by_rank, first_failure, wrong_rows
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.plot.text import as_text
@@ -61,6 +60,7 @@ _MEANINGS = {  # The results that are explained below the table where they occur
     Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
     Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
 }
+_BASIC = "no trait: it is a basic law of contact"
 _KIND_COLUMNS = ("planned", "judged", "failed", "undecided", "idle")
 _NO_KIND = "other"  # The line of the cases that name no kind.
 
@@ -123,7 +123,7 @@ def summary(run: Run, *, quiet: bool = False, status: int | None = None) -> Text
             named = f": {_list(names, _MOST_SUMMED_UP)}"
             if result is Result.OMITTED:  # What is wrong is said before, or it is the reason.
                 reason = next(row.reason for row in run.rows if row.omitted)
-                named = "" if sentences else f": {reason.removeprefix(results.OMITTED)}"
+                named = "" if sentences else f": {reason.removeprefix(results.OMITTED).partition(': ')[0]}"
             sentences.append(f"{len(names)} {words[len(names) > 1]}{named}.")
     return Text(" ".join(sentences) or "Nothing was checked.", style="red")
 
@@ -185,7 +185,7 @@ def _formulation(run: Run, name: str, width: int, report: Path | None, *, alone:
     if name in run.opposite_signs:
         yield fold(results.OPPOSITE_SIGN, width, "bold red", indent=2)
     if name in run.diagnoses:
-        words, _, of_tangent = run.diagnoses[name].partition(TANGENT)
+        words, _, of_tangent = run.diagnoses[name].partition(results.OF_TANGENT)
         yield fold(f"diagnosis: {words}", width, "bold", indent=2)
         if of_tangent:
             yield fold(f"diagnosis of the tangent: {of_tangent}", width, "bold", indent=2)
@@ -243,7 +243,8 @@ def _words(row: Row, room: int) -> str:
 
     Where there is no room for all, it is the name of the number that is cut.
     """
-    before = f"{row.unexpected}; " if row.unexpected not in ("", results.BROKEN_BY_FAILING, results.NOT_JUDGED) else ""
+    known_ways = "", results.BROKEN_BY_FAILING, results.BREAKS_LAW, results.NOT_JUDGED
+    before = f"{row.unexpected}; " if row.unexpected not in known_ways else ""
     behind = f"; known: {row.known}" if row.known else ""
     if row.verdict is not Verdict.FAIL or row.breach or row.closest is None or row.fails_in_words:
         return _shorten(f"{before}{row.reason}{behind}".removesuffix("; "), room)
@@ -300,7 +301,11 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     text = indent_below(
         "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
         *chain.from_iterable(words),
-        *([f"promised by {row.promised_by}"] if row.promised_by else []),
+        *(
+            [f"promised by {row.promised_by or _BASIC}"]
+            if row.promised_by or row.unexpected == results.BREAKS_LAW
+            else []
+        ),
         *as_text(outcome.case).splitlines(),
         *([] if report is None else [example.replay_command(str(report))]),
     )

@@ -165,12 +165,6 @@ class Job:
         files = self.files.paths.values()
         return self.options.limits([*files, *map(journal_folder, files), *self.hidden])
 
-    @property
-    def first_wait(self) -> float:
-        """The seconds that the first call of a plugin may take; 0 where plugins live in this process."""
-        inline = self.options.isolation is Isolation.INLINE
-        return 0.0 if inline else Limits(self.options.time_limit).start_seconds
-
     def run_options(self, **others: Any) -> dict[str, Any]:
         """Return the options of `contactverif.run.run.run`, and others beside them."""
         options = self.options
@@ -302,7 +296,10 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
     failures = FailureMemory() if memory and job.place is None else None
     with watch_for_stops(job), ExitStack() as stack:
         alone = len(job.options.names) == 1 and job.options.isolation is not Isolation.INLINE
-        with worker_pool(job.jobs, parent_judges=alone) as executor, Bar(job.first_wait) as bar:
+        with (
+            worker_pool(job.jobs, parent_judges=alone) as executor,
+            Bar(Limits(job.options.time_limit).start_seconds) as bar,
+        ):
             plugins, store = stack.enter_context(job.begin(partial(job.load, executor)))
             if failures is not None:
                 store.failures = failures.recall(job.options.names, job.options.properties)

@@ -35,13 +35,15 @@ from contactverif.contract.property import (
 _NUMBER = re.compile(r"[-+]?\b\d+(\.\d+)?(e[-+]?\d+)?\b|\b(nan|inf)\b")
 JUDGED_SHARE = 0.9  # A property counts as judged if at least this share of what right formulations decide was decided.
 BROKEN_BY_FAILING = "promised to pass, but fails"
-BREAKS_LAW = "breaks a basic law, which no trait states"
+BREAKS_CONTRACT = "breaks the contract"
+BREAKS_LAW = "against a basic law"  # One of every formulation, whatever its traits state.
 BROKEN_BY_PASSING = "stated to fail, but passes"
 NOT_JUDGED = "not judged"
 OMITTED = "not asked: "  # The beginning of the reason of a row that another row made pointless.
 WRONG_TRAITS = "wrong traits"
 NOT_HERE = "needs "  # The beginning of the reason of a row without cases on the place of the run.
 OF_TRAITS = "traits: "  # The beginning of the reason of a row whose traits name no witness that can be judged.
+OF_TANGENT = "; and of the tangent: "  # Between the diagnosis of the forces and that of the tangent.
 OPPOSITE_SIGN = (
     "your forces have the opposite sign: contact must push the slave along the master's outward normal; "
     "see docs/concepts/signs.md"
@@ -67,7 +69,8 @@ class Result(StrEnum):
 
 _WAYS_TO_FAIL = {
     Result.BROKEN_PROMISE: "against a promise",
-    BREAKS_LAW: "against a basic law",
+    BREAKS_LAW: BREAKS_LAW,
+    BREAKS_CONTRACT: "against the contract",
     Result.CRASHED: "by a crash",
     Result.WRONG_TRAITS: "by a mistake in the traits",
     Result.FAIL: "without a promise",
@@ -383,7 +386,7 @@ class Row:
                 return NOT_JUDGED
             case Verdict.FAIL if not self.known:
                 broken = BROKEN_BY_FAILING if self.promised_by else BREAKS_LAW
-                return "breaks the contract" if self.breach else broken if self.promise else ""
+                return BREAKS_CONTRACT if self.breach else broken if self.promise else ""
             case Verdict.NOT_PROVIDED if self.promise and not self.known:
                 return "promised to pass, but a part that it needs is not provided"
             case Verdict.PASS if self.promise is False:
@@ -424,7 +427,7 @@ def describe_failures(rows: Iterable[Row]) -> str:
     tested = any(row.info.role == "exact" and row.info.family == "patch" for row in failing)
     patch = ", the patch test among them" if tested else ""
     words = f"fails {len(failing)} of {sum(row.verdict in DECIDED for row in rows)}{patch}"
-    counts = Counter(BREAKS_LAW if row.unexpected == BREAKS_LAW else row.result for row in failing)
+    counts = Counter(row.unexpected if row.unexpected in _WAYS_TO_FAIL else row.result for row in failing)
     if len(counts) > 1:
         return f"{words}: {', '.join(f'{counts[each]} {way}' for each, way in _WAYS_TO_FAIL.items() if counts[each])}"
     return f"{words}, {'and promises none of these' if counts[Result.FAIL] else _WAYS_TO_FAIL[next(iter(counts))]}"

@@ -7,12 +7,12 @@ import numpy as np
 from contactverif.contract.arrays import Array, FloatArray, dense
 from contactverif.contract.errors import ContractError, NonFiniteError
 from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.result import OF_TANGENT
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residual_of
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
-TANGENT = "; and of the tangent: "  # Between what is said of forces and what is said of the tangent.
 _OF_TANGENTS = ("tangent.", "newton.")
 _SCALES = range(4, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
 # A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
@@ -44,7 +44,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             # Whether digits are lost depends on sizes, too, without any length in the code.
             if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
                 text = _diagnose_scale(subject)
-            return TANGENT.join(filter(None, (text, diagnose_tangent(subject))))
+            return OF_TANGENT.join(filter(None, (text, diagnose_tangent(subject))))
     except ContractError:
         return ""
 

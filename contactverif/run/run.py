@@ -264,10 +264,9 @@ class Driver:
         words += f"; {n_wrong or 'none'} wrong{self._meter.price(self._first_calls)}"
         if cases:
             self._report(Progress("", "", "first round", 1, 1, remark=words))
-        for row in (
-            sorted(self._first.values(), key=lambda row: row.question.turn) if self._stop == "foundation" else ()
-        ):
-            if _always_crashes(row) and row.subject.name not in self._stopped:
+        crashing = [] if self._stop != "foundation" else filter(_always_crashes, self._first.values())
+        for row in sorted(crashing, key=lambda row: row.question.turn):
+            if row.subject.name not in self._stopped:
                 self._stopped[row.subject.name] = f"the plugin crashes in {row.question.id}"
                 self._whole.add((row.subject.name, row.question.id))
 
@@ -548,11 +547,11 @@ class Driver:
         """Yield the jobs to diagnose, and to shrink, the failure of each formulation with the lowest rank."""
         for subject in self._subjects:
             rows = {id(row.row): row for row in self._open_rows() if row.subject is subject}
-            failure = first_failure(row.row for row in rows.values()) or next(
-                # A wrong tangent of which nothing is stated.
-                (row.row for row in rows.values() if row.row.result is Result.FAIL and "tangent" in row.question.needs),
-                None,
-            )
+            news = [
+                row.row for row in rows.values() if row.row.result is Result.FAIL and "tangent" in row.question.needs
+            ]
+            # A wrong tangent is news where nothing is stated of it.
+            failure = first_failure(row.row for row in rows.values()) or next(iter(news), None)
             if failure is None or failure.verdict not in (Verdict.FAIL, Verdict.CRASHED):
                 continue
             row, crashed = rows[id(failure)], failure.verdict is Verdict.CRASHED
@@ -594,18 +593,18 @@ def _check_place(subject: Subject, interface: Interface | None) -> None:
 
 
 def _always_crashes(row: OpenRow) -> bool:
-    return bool(row.row.unexpected) and row.row.judged == row.row.tally.verdicts.get(Verdict.CRASHED, 0) > 1
+    n_crashed = row.row.tally.verdicts.get(Verdict.CRASHED, 0)
+    return len(row.outcomes) > 1 and row.row.judged == n_crashed > 0 and bool(row.row.unexpected)
 
 
 def _describe_no_traits(subject: Subject) -> str:
     if isinstance(subject, EngineSubject) or subject.traits != Traits():
         return ""
-    looked = [
-        f" (looked for {file.stem}.toml and [tool.contactverif.traits.{file.stem}] in pyproject.toml)"
-        for file in files_within(subject.name)[:1]
-    ]
-    words = f"{subject.name}: no traits found{''.join(looked)}: nothing but the basic laws is held against it. "
-    return words + 'To begin: tangent = "exact" and penalty = "nodal" or "distributed"'
+    looked = ""
+    if files := files_within(subject.name):
+        looked = f" (looked for {files[0].stem}.toml and [tool.contactverif.traits.{files[0].stem}] in pyproject.toml)"
+    words = f"no traits found{looked}: nothing but the basic laws is held against it, and -x stops at nothing else"
+    return f'{subject.name}: {words}. To begin: tangent = "exact" and penalty = "nodal" or "distributed"'
 
 
 def _check_once(argument: str, names: Iterable[str]) -> None:

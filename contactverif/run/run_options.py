@@ -123,7 +123,7 @@ class RunOptions:
         ),
     ] = False
     exit_first: Annotated[
-        bool, Option("Stop at the first row that is wrong, and ask nothing more.", flags=("--exitfirst", "-x"))
+        bool, Option("Ask nothing more once a row is wrong, beyond rows with its cases.", flags=("--exitfirst", "-x"))
     ] = False
     quick: Annotated[bool, Option("Ask the first round alone: cheap properties, 5 cases each.", flags=("--quick",))] = (
         False

@@ -184,7 +184,8 @@ def test_who_promises_nothing_is_told_so_and_how_stiff_its_springs_are(ask: Ask)
     assert answer.status == 0
     assert "your springs are 2.00 ε̂ L: two passes, or twice too stiff" in answer.out
     assert answer.out.splitlines()[-2:] == [
-        "✗ twice fails 1 of 2, the patch test among them, and promises none of these. No promise is broken (exit 0).",
+        "✗ twice fails 1 of 2, the patch test among them, and promises none of these. "
+        "No trait is stated, so no promise can be broken (exit 0).",
         "Properties promised to pass: 1, to fail: 0, neither: 2.",
     ]
 
@@ -194,7 +195,7 @@ def test_a_wrong_stiffness_breaks_a_promise_that_everybody_makes(ask: Ask) -> No
     answer = ask(f"verify three_times {STIFFNESS}")
     assert answer.status == 1
     assert "your springs are 3.00 ε̂ L: one pass has 1 ε̂ L, two passes have 2 ε̂ L" in answer.out
-    assert answer.out.endswith("1 broken promise: three_times total-stiffness.\n")
+    assert answer.out.endswith("1 broken promise: three_times total-stiffness (against a basic law).\n")
     assert "Properties promised" not in answer.out
 
 
@@ -220,7 +221,10 @@ def test_a_run_that_judges_nothing_does_not_say_that_all_was_judged() -> None:
     assert Run((judged,)).conclusion == "Every promise is kept and every property was judged."
     swap, patch = (Row("mine", load_property(id_).info, Verdict.FAIL, None) for id_ in ("swap", TRANSMISSION))
     assert Run((judged, swap)).result == "pass"  # A trait of the method is no mistake.
-    words = "mine fails 1 of 2, the patch test among them, and promises none of these. No promise is broken."
+    words = (
+        "mine fails 1 of 2, the patch test among them, and promises none of these. No trait is stated, so no promise "
+    )
+    words += "can be broken."
     assert (Run((judged, patch)).result, Run((judged, patch)).conclusion) == ("fail", words)
 
 
