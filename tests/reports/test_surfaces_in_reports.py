@@ -1,6 +1,7 @@
 """A counterexample in space is listed, drawn and stored so that a person can rebuild it."""
 
 from dataclasses import astuple
+from itertools import combinations
 from pathlib import Path
 
 import meshlane
@@ -22,7 +23,7 @@ from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
 from contactverif_reports.netcdf.stored_outcomes import counterexample_groups, read_forces
 from contactverif_reports.netcdf.write import write
-from contactverif_reports.plot.case_figures import plot_case, view_from_above, widen
+from contactverif_reports.plot.case_figures import make_case_figure, plot_case, view_from_above, widen
 from contactverif_reports.plot.text import as_text
 from contactverif_reports.plot.vtu import write_surfaces
 
@@ -81,6 +82,17 @@ def test_a_failure_is_drawn(tmp_path: Path, suffix: str) -> None:
         assert "error of the nodal forces, up to" in text
 
 
+def test_labels_do_not_cover_each_other_and_the_largest_error_has_its_own() -> None:
+    case = next(iter(load_property("hard.deep").for_traits(load_subject("nts-ar-3d").traits).cases(None)))
+    forces = np.arange(3.0 * case.interface.n_nodes).reshape(-1, 3)
+    figure = make_case_figure(case, forces=forces, exact=np.ones_like(forces), width=5.4)
+    figure.draw_without_rendering()
+    labels = [text for axes in figure.axes for text in axes.texts if text.get_text()]
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(first.overlaps(second) for first, second in combinations(boxes, 2))
+    assert any(label.get_text().startswith(f"{case.interface.n_nodes - 1}: ") for label in labels)
+
+
 @pytest.fixture(scope="module")
 def failing_run() -> Run:
     return run([load_subject("nts-3d")], [load_property("patch.flat.transmission")], examples=4, seed=1, shrink="all")
@@ -114,7 +126,7 @@ def test_the_forces_found_and_exact_are_stored_and_stand_on_the_page(path: Path,
     np.testing.assert_equal(astuple(stored), astuple(forces))  # type: ignore[type-var]
     page = report_page(again, path)
     assert page == report_page(failing_run, path)
-    assert "at the nodes: number, force and, where it differs, exact force" in page
+    assert "at the nodes, given room: number, force and, where it differs, exact force" in page
     assert page.count(">exact 0.") + page.count(">exact 1") >= 2
     figure = page[page.index("<svg data-figure") :]
     assert "segment" not in figure[: figure.index("</svg>")]
@@ -176,7 +188,7 @@ def test_forces_of_one_size_and_two_directions_are_told_apart(tmp_path: Path) ->
     plot_case(CROSSED, tmp_path / "case.svg", forces=-forces, exact=forces)
     text = (tmp_path / "case.svg").read_text(encoding="utf-8")
     assert text.count("other way") == 8
-    assert "slave, seen through its body" in text  # The view is against the master's normal.
+    assert "slave, from inside" in text  # The view is against the master's normal.
     plot_case(CROSSED, tmp_path / "nan.svg", forces=np.nan * forces, exact=forces)
     assert "error of the nodal forces, not finite" in (tmp_path / "nan.svg").read_text(encoding="utf-8")
 

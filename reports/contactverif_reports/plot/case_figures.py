@@ -6,6 +6,7 @@ import textwrap
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.transforms import BboxBase
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
@@ -292,13 +294,13 @@ def _surface_figure(
         difference = (forces - exact).reshape(case.interface.nodes.shape)
         largest = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
         errors = np.linalg.norm(difference, axis=1) / (largest or 1.0)
-    figure = Figure(figsize=(width, width / 2 + 1.2), layout="constrained")
+    figure = Figure(figsize=(width, width / 2 + 1.2), layout="compressed")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     interface = case.interface
-    titles = "slave, seen through its body", "master, seen from outside"
+    titles = "slave, from inside", "master, from outside"
     for axes, surface, name in zip(panels, (interface.slave, interface.master), titles, strict=True):
         _plot_faces(axes, surface, places, errors, _force_labels(surface, forces, exact))
-        axes.set_title(name, fontsize=9, pad=6 if forces is None else 22)  # Forces stand above the upper nodes.
+        axes.set_title(name, fontsize=8, pad=6 if forces is None else 22)  # Forces stand above the upper nodes.
         axes.margins(0.08)
         axes.set_aspect("equal", adjustable="box")
         axes.set_axis_off()
@@ -308,15 +310,31 @@ def _surface_figure(
         axes.autoscale_view()
     lines = [surfaces_headline(case) + (f", drawn {format_number(stretch)} times wider across" if stretch > 1 else "")]
     if forces is not None:
-        lines.append(
-            "at the nodes: number, force" + (" and, where it differs, exact force" if errors is not None else "")
-        )
+        exactly = " and, where it differs, exact force" if errors is not None else ""
+        lines.append(f"at the nodes, given room: number, force{exactly}")
     if errors is not None:
         share = f"up to {errors.max():.3g} of the largest exact force" if np.isfinite(errors).all() else "not finite"
         lines.append(f"shade: error of the nodal forces, {share}")
-    lines += textwrap.wrap(reference_sizes(case, 1.0), 92)
-    figure.suptitle("\n".join([*textwrap.wrap(title, 92), *lines]), fontsize=9, x=0.02, ha="left", parse_math=False)
+    wrapped = (textwrap.wrap(line, int(14 * width)) for line in [title, *lines, reference_sizes(case, 1.0)])
+    figure.suptitle("\n".join(chain.from_iterable(wrapped)), fontsize=9, x=0.02, ha="left", parse_math=False)
+    _thin_out(figure, np.zeros(len(places)) if errors is None else np.nan_to_num(errors, nan=np.inf))
     return figure
+
+
+def _thin_out(figure: Figure, errors: FloatArray) -> None:
+    """Shorten labels that cover others to the number of their node, or drop them; larger errors (n_nodes,) go first."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # What stands nowhere else now will not move.
+    kept: list[BboxBase] = []
+    labels = [text for axes in figure.axes for text in axes.texts]
+    for label in sorted(labels, key=lambda text: -errors[int(text.get_gid())] if text.get_gid() else 1.0):
+        words = label.get_text()
+        for shorter in (words, words.partition(":")[0], ""):
+            label.set_text(shorter)
+            if not any(label.get_window_extent().overlaps(box) for box in kept):
+                break
+        if label.get_text():
+            kept.append(label.get_window_extent())
 
 
 def view_from_above(case: Case) -> FloatArray:
@@ -377,7 +395,7 @@ def _plot_faces(
         right, upper = (places[node] >= middle).tolist()
         aligned: dict[str, Any] = {"ha": "right" if right else "left", "va": "bottom" if upper else "top"}
         offset = (0, 3 if upper else -3)
-        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "fontweight": "bold"}
+        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "fontweight": "bold", "gid": str(node)}
         axes.annotate(label, places[node], offset, **aligned, **style)
 
 
