@@ -327,7 +327,7 @@ def _thin_out(figure: Figure, errors: FloatArray) -> None:
     figure.set_layout_engine("none")  # What stands nowhere else now will not move.
     kept: list[BboxBase] = []
     labels = [text for axes in figure.axes for text in axes.texts]
-    for label in sorted(labels, key=lambda text: -errors[int(text.get_gid())] if text.get_gid() else 1.0):
+    for label in sorted(labels, key=lambda text: -errors[int(gid)] if (gid := text.get_gid()) else 1.0):
         words = label.get_text()
         for shorter in (words, words.partition(":")[0], ""):
             label.set_text(shorter)
