@@ -21,15 +21,15 @@ def promise_exact_tangent(traits: Traits) -> bool | None:
     return None if traits.promises.tangent is None else traits.promises.tangent == "exact"
 
 
-def refuse_unstated_penalty(traits: Traits) -> str:
-    """Return why the unit of the penalty is unknown, or an empty string if the traits name it."""
-    known = traits.rules.penalty is not None
-    return "" if known else "the trait `penalty` (nodal or distributed) is not stated, so its unit is unknown"
+def refuse_unstated(traits: Traits, *names: str) -> str:
+    """Return which of these rules the traits have to state, in words that a screen collects, or an empty string."""
+    missing = ", ".join(f"rules.{name}" for name in names if getattr(traits.rules, name) is None)
+    return f"state {missing} to be asked" if missing else ""
 
 
 def refuse_unknown_pressure(traits: Traits) -> str:
     """Return why springs or multipliers have no pressure that is known, or an empty string."""
-    return refuse_dependent_multipliers(traits) or refuse_unstated_penalty(traits)
+    return refuse_dependent_multipliers(traits) or refuse_unstated(traits, "penalty")
 
 
 def knows_total(traits: Traits) -> bool:
@@ -49,9 +49,7 @@ def refuse_unknown_total(traits: Traits) -> str:
     """Return why the total force is unknown from the traits, or an empty string if they say enough."""
     if traits.rules.penalty == "nodal":
         return "there are no distributed springs"
-    if traits.rules.penalty is None or traits.rules.area is None:
-        return "the traits `penalty` and `area` are not both stated, so the total is unknown"
-    return ""
+    return refuse_unstated(traits, "penalty", "area")
 
 
 def promise_single(traits: Traits) -> bool | None:

@@ -229,7 +229,7 @@ Function = Callable[[FloatArray], FloatArray]
 def _refuse_unstated_continuity(traits: Traits) -> str:
     if traits.rules.enforcement == "multiplier":
         return "multipliers would change on the way, and here nothing is solved"
-    return "the trait `continuity` is not stated" if traits.promises.continuity is None else ""
+    return "state promises.continuity to be asked" if traits.promises.continuity is None else ""
 
 
 @Property.define(

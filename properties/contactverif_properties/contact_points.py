@@ -27,6 +27,7 @@ from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lie
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
+from contactverif_properties.applicability import refuse_unstated
 from contactverif_properties.roundoff import (
     WEIGHT_REASON,
     WEIGHT_ROUNDINGS,
@@ -237,7 +238,12 @@ def _longest_edges(corners: FloatArray) -> FloatArray:
 
 
 def _refuse_without_rule(traits: Traits) -> str:
-    return "" if traits.rules.gap is not None else "the trait `gap` states no rule of projection"
+    return refuse_unstated(traits, "gap")
+
+
+def _refuse_unknown_areas(traits: Traits) -> str:
+    nodal = traits.rules.penalty == "nodal"
+    return "there are no distributed springs" if nodal else refuse_unstated(traits, "penalty")
 
 
 # Two ends of an overlap are scalar products of two terms, each rounded by 2u of the lengths.
@@ -500,7 +506,7 @@ SUM = Quantity("error of the sum of weights", "192u", f"{WEIGHT_REASON} Nodes th
     rank=210,
     quantities=(WEIGHT, ENDS, SUM),
     cases_in_space=ON_FACES,
-    applicable=lambda traits: "" if traits.rules.penalty == "distributed" else "there are no distributed springs",
+    applicable=_refuse_unknown_areas,
 )
 def projection_area(case: Case, subject: Subject) -> Measurement:
     """Areas of competence and weights add up to the slave's length, or to what of it is covered.

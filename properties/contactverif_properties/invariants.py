@@ -35,7 +35,7 @@ from contactverif.strategies.general import closed_cases
 from contactverif.strategies.straight import bent_end_cases, cases_over_a_body, plane_cases_by_a_plate
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif_properties import roundoff
-from contactverif_properties.applicability import refuse_unstated_penalty
+from contactverif_properties.applicability import refuse_unstated
 from contactverif_properties.exact_forces import worst_force
 from contactverif_properties.kinks import explain_by_kink
 from contactverif_properties.states import FrozenState, any_cases, ask_forces_and_tangents, freeze_state
@@ -488,7 +488,7 @@ TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGM
 
 def _refuse_unknown_unit(traits: Traits) -> str:
     if traits.rules.enforcement != "barrier":
-        return refuse_unstated_penalty(traits)
+        return refuse_unstated(traits, "penalty")
     if traits.rules.activation_unit == "length":
         return "the activation distance of the barrier is a length, which another unit would change"
     return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"

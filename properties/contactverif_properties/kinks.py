@@ -48,6 +48,8 @@ def explain_by_kink(state: FrozenState, reach: float, errors: dict[str, float], 
             in_columns = columns is None or FAR * measure_jump_of_slope(state, reach, directions, columns) >= size
             jumps = in_columns and measure_jump_of_slope(state, reach, directions) >= size
         reason = "a kink: moving the nodes by roundoff changes the answer as much" if jumps else ""
+    if reason and "forces" in errors and state.case.interface.dim != PLANE:
+        reason = "a kink: the forces change at a rounding; if that is often so, do faces overlap in your search?"
     return reason if reason and is_like_its_surroundings(state, reach) else ""
 
 

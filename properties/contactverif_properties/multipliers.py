@@ -16,7 +16,7 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.refined_blocks import refinement_cases, refinements
 from contactverif.strategies.solids import block_cases, dead_zone_cases, solid_cases
-from contactverif_properties.applicability import refuse_dependent_multipliers, refuse_unstated_penalty
+from contactverif_properties.applicability import refuse_dependent_multipliers, refuse_unstated
 from contactverif_properties.newton_method import find_solution, is_untouched, solution_details, solution_floor
 from contactverif_properties.patch_solved import exact_solution
 
@@ -172,7 +172,7 @@ SLOPE = Quantity(
     cases=Cases.from_list(refinement_cases),
     promise=lambda traits: traits.promises.inf_sup,
     asks=frozenset({"multiplier"}),
-    applicable=refuse_unstated_penalty,
+    applicable=lambda traits: refuse_unstated(traits, "penalty"),
     bodies=True,
 )
 def inf_sup(case: Case, subject: Subject) -> Measurement:

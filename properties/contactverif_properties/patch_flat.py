@@ -24,7 +24,13 @@ from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
 from contactverif.strategies.straight import steep_cases, tilted_cases, tilted_plane_cases
 from contactverif_properties import exact_forces, roundoff
-from contactverif_properties.applicability import may_act_twice, promise_normal, promise_single, refuse_unknown_total
+from contactverif_properties.applicability import (
+    may_act_twice,
+    promise_normal,
+    promise_single,
+    refuse_unknown_total,
+    refuse_unstated,
+)
 from contactverif_properties.kinks import explain_by_kink
 from contactverif_properties.states import FrozenState
 
@@ -205,6 +211,7 @@ _define_class = partial(
 @_define_class(
     id="patch.flat.normal",
     rank=160,
+    turn=3,
     role="exact",
     cases=Cases.random(normal_cases),
     cases_in_space=Cases.random(surfaces.matched_surface_cases),
@@ -267,7 +274,9 @@ def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     cases_in_space=Cases.random(surfaces.overhung_surface_cases),
     promise=lambda traits: True if traits.rules.penalty == "nodal" and traits.rules.enforcement == "penalty" else None,
     asks=frozenset({"penalty"}),
-    applicable=lambda traits: "" if traits.rules.penalty == "nodal" else "there are no nodal springs",
+    applicable=lambda traits: (
+        "there are no nodal springs" if traits.rules.penalty == "distributed" else refuse_unstated(traits, "penalty")
+    ),
 )
 def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     """Nodal springs push each node with their stiffness times the gap, shared by the lever rule.
@@ -491,11 +500,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
     cases_in_space=Cases.random(tilted_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
-    applicable=lambda traits: (
-        ""
-        if traits.rules.force_along
-        else "the trait `force_along` is not stated, so the direction of the force is unknown"
-    ),
+    applicable=lambda traits: refuse_unstated(traits, "force_along"),
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
@@ -546,9 +551,9 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
 def _refuse_unknown_integral(traits: Traits) -> str:
     if traits.rules.enforcement == "multiplier":
         return "multipliers have pressures of their own, not those of a gap"
-    if not exact_forces.knows_linear_total(traits):
-        return "the traits `penalty`, `area`, `gap` and `force_along` do not state all of the integral"
-    return ""
+    if traits.rules.penalty == "nodal":
+        return "there are no distributed springs"
+    return refuse_unstated(traits, "penalty", "area", "gap", "force_along")
 
 
 @Property.define(

@@ -133,7 +133,7 @@ def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_plugin_that_does_not_load_is_a_row_and_the_others_run(ask: Ask) -> None:
     answer = ask("verify absent unlicensed nts -p purity --examples 3 --seed 1 -v")
     assert answer.status == 1
-    assert "absent\n      not loaded: ModuleNotFoundError: No module named 'no_such_module'\n" in answer.out
+    assert "absent\n      not loaded: ModuleNotFoundError: No module named 'no_such_module'; " in answer.out
     assert "unlicensed\n      not loaded: make: RuntimeError: no licence [red] left (test_cli_verify.py, " in answer.out
     assert rows(answer.out)["nts", "purity"][:3] == ["passes", "pass", "3/3"]
     assert answer.out.endswith("2 plugins not loaded: absent; unlicensed.\n")

@@ -332,7 +332,7 @@ def test_the_other_kind_of_penalty_does_not(promised: Any, actual: Any) -> None:
 
 
 def test_a_penalty_whose_kind_is_not_stated_is_not_asked() -> None:
-    assert "not stated" in units.refusal(Traits())
+    assert units.refusal(Traits()) == "state rules.penalty to be asked"
     assert units.refusal(Traits(rules=Rules(penalty="nodal"))) == ""
     assert units.refusal(Traits(rules=Rules(penalty="nodal", enforcement="multiplier"))) == ""
     assert "barrier" in units.refusal(Traits(rules=Rules(penalty="nodal", enforcement="barrier")))

@@ -8,7 +8,7 @@ from handmade import Handmade, OneForce, case, over_a_node, subject
 from scipy import sparse
 from subjects import judge_as, load_property, with_verbs
 
-from contactverif import Verdict
+from contactverif import Verdict, named_case
 from contactverif.contract.arrays import dense
 from contactverif.contract.case import Case
 from contactverif.diagnosis.flat_state import flat_state
@@ -111,6 +111,15 @@ def test_a_jump_is_seen_from_both_sides() -> None:
     assert measure_jump(state, REACH, directions) == pytest.approx(0.25, rel=1e-4)
     assert measure_jump(beside, REACH, directions) < 1e-5
     assert measure_jump_of_slope(beside, REACH, directions) < 1e-5
+
+
+def test_forces_that_jump_in_space_may_come_of_faces_that_overlap() -> None:
+    def overlap(right: Any, interface: Any, pairing: Any, z: Any) -> Any:
+        return right(interface, pairing, z) * np.where(z[..., :1] > 0, 1.2, 1.0)
+
+    state, overlapping = named_case("crossed-diagonals"), with_verbs("nts-3d", residual=overlap)
+    frozen = FrozenState.at(overlapping.for_case(state), state)
+    assert "do faces overlap" in explain_by_kink(frozen, REACH, {"forces": 0.01})
 
 
 class Sided(OneForce):

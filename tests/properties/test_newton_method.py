@@ -243,7 +243,7 @@ def test_another_pairing_in_other_units_is_told_in_words() -> None:
 
 
 def test_who_does_not_state_the_unit_of_its_penalty_is_not_asked() -> None:
-    assert "unit is unknown" in newton_units.refusal(Traits())
+    assert newton_units.refusal(Traits()) == "state rules.penalty to be asked"
     assert "not independent" in newton_units.refusal(load_subject("vts-ppt-lm").traits)
 
 
