@@ -442,7 +442,6 @@ def _warn(words: str) -> None:
 
 
 def _judge_last_failed(job: Job) -> int:
-    """Judge what failed in earlier runs, show what became of it, and return 1 if a promise is not kept, else 0."""
     others = ["--resume"] if job.resumes else ["--out"] if job.files.names else []
     others += [] if job.place is None else ["a mesh or a scene"]
     if others:

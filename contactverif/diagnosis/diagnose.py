@@ -50,7 +50,6 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
 
 
 def _diagnose_numbering(subject: Subject) -> str:
-    """Return with which numbers of nodes the forces on a mesh are not finite, if they are with others."""
     state = flat_state()
     numbers, mesh = np.arange(len(state.along)), state.case.interface
     words: dict[bool, str] = {}  # {whether the forces are finite: how nodes are numbered}
@@ -80,7 +79,6 @@ def _diagnose_scale(subject: Subject) -> str:
 
 
 def _scaled_forces(subject: Subject, factor: float) -> FloatArray:
-    """Return the forces (n_unknowns,) on a mesh of another size, over the square of its size."""
     case = flat_state().case
     interface = case.interface.at(case.interface.nodes * factor)
     return residual_of(subject, interface, case.z * factor) / factor**2  # A force is ε̂ |g| times a length.

@@ -105,7 +105,6 @@ def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> It
 
 
 def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
-    """Yield the patterns of mistakes that are wrong in any formulation: by node, or by whole segments."""
     exact, n = state.exact, state.n_slave_nodes
     factor = float(pushes @ exact / (exact @ exact))
     if same(pushes, factor * exact):
@@ -133,7 +132,6 @@ def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
 
 
 def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
-    """Yield the patterns of mistakes in the pieces on which two segments face each other, or in their integration."""
     exact, n = state.exact, state.n_slave_nodes
     parts = [*state.pieces]
     for numbers in state.segments:
@@ -173,7 +171,6 @@ def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
 
 
 def _exchange(state: FlatState, pushes: FloatArray, side: int) -> str:
-    """Return whether the two shape functions of each segment of a side, 0 or 1, are exchanged."""
     ends, nodes = state.ends[side], state.sides[side]
     swapped = np.zeros(len(pushes))
     np.add.at(swapped, ends[:, ::-1], np.take_along_axis(state.pieces, ends, axis=1))
@@ -194,7 +191,6 @@ def _segment_factors(state: FlatState, pushes: FloatArray, side: int) -> tuple[I
 
 
 def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
-    """Return what factors the segments of a side have, if the forces are the sum of their parts with such factors."""
     segments, factors = _segment_factors(state, pushes, side)
     if factors is None or (wrong := ~equal(factors, np.ones(len(factors)))).all():
         return ""
@@ -217,7 +213,6 @@ def _ends(numbers: Sequence[int], total: int) -> str:
 
 
 def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
-    """Return which pieces are left out, or whether a length of the master is counted, if the pieces have factors."""
     factors = np.asarray(np.linalg.lstsq(state.pieces.T, pushes, rcond=None)[0], dtype=np.float64)
     if not same(state.pieces.T @ factors, pushes):
         return ""
@@ -308,7 +303,6 @@ def _find_lost_places(subject: Subject) -> str:
 
 
 def _find_lost_sums(subject: Subject) -> str:
-    """Return whether the master gets less than the slave where several points press, and as much where one does."""
     sums = []
     for lift in (-1.0, *_LIFTS):
         state = flat_state(places=FINE, depths=DEPTH * np.array([1.0, *[-lift] * (len(FINE[0]) - 1)]))
@@ -336,7 +330,6 @@ def _diagnose_turned(subject: Subject) -> str:
 
 
 def _diagnose_digits(subject: Subject) -> str:
-    """Return whether the forces do not see a change of places that has its digit in double precision alone."""
     state = flat_state()
     formulation, interface = subject.for_case(state.case), state.case.interface
 

@@ -142,7 +142,6 @@ def _one_line(pair: Tangents) -> str:
 
 
 def _one_entry(pair: Tangents) -> str:
-    """Return which entry is wrong in the matrix of each slave node and its segment, if it is one and the same."""
     wrong, n = np.max(np.abs(pair.errors), axis=0) > SAME * pair.scale, len(SLAVE)
     nodes = np.add.outer(n - 1 + np.searchsorted(-MASTER, -SLAVE), [0, 1])
     unknowns = (2 * np.column_stack([np.arange(n), nodes])[:, :, None] + [0, 1]).reshape(n, -1)
@@ -171,7 +170,6 @@ def _wrong_nodes(pair: Tangents, axis: int) -> str:
 
 
 def _one_part(pair: Tangents) -> str:
-    """Return the part of the tangent that is wrong, if its size, its place and its growth are those of one part."""
     numbers = {axis: np.arange("tn".index(axis), pair.errors.shape[1], 2) for axis in "tn"}  # t is x, and n is y.
     blocks = {
         rows + columns: np.ix_(np.arange(len(DEPTHS)), numbers[rows], numbers[columns])
@@ -200,7 +198,6 @@ def _one_part(pair: Tangents) -> str:
 
 
 def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
-    """Return the part of a tangent that stands in a block with such errors, and grows with the penetration so."""
     n = pair.n_slave // 2  # The rows, and the columns, of the slave in a block.
     on_slave = {"rows": errors[:, :n], "columns": errors[:, :, :n]}
     on_master = errors[:, :, n:]

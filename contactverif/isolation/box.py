@@ -73,7 +73,6 @@ def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ..
 
 
 def _close(hidden: Iterable[str], opened: Iterable[str]) -> list[str]:
-    """Return the arguments that let nobody write to folders that only the box has, and that are not open."""
     # A plugin of root could write the settings of the whole system in /proc, and a folder of the box takes memory.
     closed = {"/proc", "/dev", *map(os.path.realpath, hidden)} - set(map(os.path.realpath, opened))
     return [word for path in sorted(closed) if os.path.isdir(path) for word in ("--remount-ro", path)]
@@ -178,7 +177,6 @@ def _always_hidden() -> list[str]:
 
 
 def _holds_code(folder: str) -> bool:
-    """Return whether Python, or a folder in which it looks for modules, lies in a folder."""
     code = [sys.executable, sys.prefix, sys.base_prefix, *sys.path, os.getcwd()]
     return any(Path(folder).resolve() in (path := Path(place).resolve(), *path.parents) for place in code if place)
 

@@ -89,7 +89,6 @@ def _unpack(dtype: str, shape: list[int], data: bytes) -> Any:
 
 
 def _words(error: BaseException) -> str:
-    """Return an error in words, with the place where the code raised it."""
     trace, place = error.__traceback__, ""
     while trace is not None:
         place = f" ({os.path.basename(trace.tb_frame.f_code.co_filename)}, line {trace.tb_lineno})"

@@ -16,8 +16,6 @@ Wish = Callable[[], bool]
 
 
 class _Lane(Generic[_Result]):
-    """A call that stops wherever it needs an answer."""
-
     def __init__(self, call: Callable[[], _Result]) -> None:
         self._call = call
         self._greenlet = greenlet(self._work)

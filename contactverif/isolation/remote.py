@@ -186,7 +186,6 @@ def list_libraries(files: Iterable[Path]) -> list[str]:
 
 @cache
 def _digest(path: Path) -> str:
-    """Return the digest of a file, the size of a large one, or that it is gone."""
     try:
         # A plugin names the file. One that nobody writes to, such as a pipe, would not be read to its end.
         number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
@@ -333,7 +332,6 @@ class RemotePairing(Pairing):
 
     @property
     def _arrays(self) -> dict[str, Array]:  # type: ignore[override]
-        """Return the arrays, which come here when they are wanted for the first time."""
         if self._content is None:
             if self._question.answer is None:
                 self._host.flush()

@@ -336,7 +336,6 @@ def _end_what_is_left() -> None:
 
 
 def _empty(folder: str) -> None:
-    """Delete what lies in a folder, whatever rights a plugin took from it."""
     for place, folders, files in os.walk(folder):
         for name in folders:
             with suppress(OSError):

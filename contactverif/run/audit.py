@@ -136,7 +136,6 @@ class DerivedOutcomes(Outcomes):
 
 
 def _derive(row: Row, opened: OpenRow | Row, *, on_scene: bool) -> Row:
-    """Return a stored row with all that follows from its numbers, and with what the formulation states today."""
     if isinstance(opened, Row):
         return replace(opened, info=row.info, seconds=row.seconds)
     outcomes = DerivedOutcomes(row.info, row.outcomes)
@@ -148,7 +147,6 @@ def _derive(row: Row, opened: OpenRow | Row, *, on_scene: bool) -> Row:
 
 
 def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str:
-    """Return in what a stored property is not that of today; its words may change with the version."""
     info = (opened if isinstance(opened, Row) else opened.row).info
     judged = ("id", "needs", "least_contact", "usual_undecided", "quantities")
     for name in judged if other_version else tuple(part.name for part in fields(PropertyInfo)):

@@ -125,7 +125,6 @@ def _list_shards(folder: Path, argument: str) -> list[Shard]:
 
 
 def _outcomes_at_end(folder: Path) -> int | None:
-    """Return how many outcomes a shard had at its end; None if it is not finished."""
     try:
         mark = read_record(folder / _MARK, _EndMark)
     except OSError:

@@ -231,7 +231,6 @@ def _sign(folder: Path) -> bytes:
 
 
 def _remove_stale(folder: Path) -> None:
-    """Remove what processes left behind that were killed while they made a journal of this name."""
     name = re.compile(rf"\.{re.escape(folder.name)}\.(\d{{1,9}})\.part")
     for path in list(folder.parent.iterdir()):
         match = name.fullmatch(path.name)
@@ -285,7 +284,6 @@ def hold_journal(folder: Path, argument: str) -> Iterator[str]:
 
 
 def _check_there(folder: Path, argument: str) -> None:
-    """Check that no other process has completed the run, and removed the journal, since it was read."""
     if not folder.exists():
         reason = f"no journal {folder.name} any more, since another process has completed the run"
         raise MisuseError(argument, reason, "that of a run that was stopped")

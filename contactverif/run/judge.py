@@ -32,10 +32,7 @@ from contactverif.sampling.hypothesis_draws import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 RAISED = "the property raised "
-ACTS_APART = (
-    "it acts where the gap is open, and not where it is closed: look at the sign of the normal or of the gap, "
-    "and at the order of the master's nodes"
-)
+ACTS_APART = "it acts where the gap is open, not where it is closed: look at the normal, and the order of master nodes"
 SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
 
 

@@ -390,7 +390,6 @@ class Driver:
             raise MisuseError("--out", error, "a disk with room")
 
     def _parts(self) -> Iterator[Iterable[Job]]:
-        """Yield the jobs of each part; those of a part are made when they are wanted."""
         while self._groups:
             yield from self._parts_of_next()
 
@@ -411,7 +410,6 @@ class Driver:
             yield from (self._blocks(rows, number) for number in range(n_blocks))
 
     def _open_next(self) -> list[OpenRow]:
-        """Open the rows of the next properties with the same cases, and return those whose cases are to be judged."""
         group, questions = next(iter(self._groups.items()))
         source = self._sampling.source(questions[0])
         if isinstance(source, tuple):
@@ -505,7 +503,6 @@ class Driver:
         return self._add(row, first, outcomes)
 
     def _add(self, row: OpenRow, first: int, outcomes: Sequence[Outcome]) -> Iterable[Job]:
-        """Add the outcomes of a chunk to its row, and return the job to shrink what failed once it is complete."""
         if self._share is not None:
             self.check_written()
             return ()
@@ -526,7 +523,6 @@ class Driver:
         return self._shrink_row(row, shrinks=shrinks)
 
     def _shrink_row(self, row: OpenRow, *, shrinks: bool) -> Iterable[Job]:
-        """Return the job to shrink what failed in a row; of a list of cases nothing is smaller."""
         if (goal := row.goal()) is None:
             return ()
         add = partial(self._add_shrunk, row, goal.first)
@@ -567,7 +563,6 @@ class Driver:
                 yield from self._shrink_row(row, shrinks=True)
 
     def _measure_forces(self) -> Iterator[Job]:
-        """Yield the jobs to ask for the forces on each counterexample without bodies, which are solved for."""
         for row in self._open_rows():
             outcome = counterexample_of(row.row)
             if outcome is not None and not outcome.case.packed_bodies and outcome.verdict is Verdict.FAIL:

@@ -199,7 +199,6 @@ def _submit(executor: Executor | None, function: Callable[..., Any], *arguments:
 
 
 def _fetch(future: Future[bytes], here: Callable[[], Any]) -> Any:
-    """Return the result of a call that a worker has done, or that of a call here if the worker could not import it."""
     try:
         answer = future.result()
     except BrokenExecutor as error:
@@ -239,7 +238,6 @@ def begin_loading(names: Sequence[str], limits: Limits | None, executor: Executo
 
 
 def _load(name: str, limits: Limits) -> tuple[Subject | NotLoaded | tuple[str, str, str], list[Path]]:
-    """Return what a worker has loaded, or the words of its MisuseError, and the files of compiled code there."""
     try:
         subject = load_subject(name, limits)
     except MisuseError as error:

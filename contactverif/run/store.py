@@ -199,7 +199,6 @@ class Store:
         self._keys, self._places = self._read_places()
 
     def _read_places(self) -> tuple[Any, Any]:
-        """Return the sorted keys of all outcomes, and the place of each: of several of one case, that of the last."""
         keys, places, rejected = array("q"), array("q"), set[tuple[int, str]]()
         for file, path in enumerate(self._paths):
             for place, message in read_messages(path):

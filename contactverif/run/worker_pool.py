@@ -92,7 +92,6 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _context() -> Any:
-    """Return the way to start processes: from a server that has imported the harness, where there is one."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")

@@ -34,8 +34,6 @@ _NUMBERS = ("n_slave_nodes", "n_master_nodes", "n_slave_segments", "n_master_seg
 
 
 class _View(ctypes.Structure):
-    """The structure `cv_view`."""
-
     _fields_ = (
         *((name, ctypes.c_int) for name in _NUMBERS),
         ("penalty", ctypes.c_double),
@@ -149,8 +147,6 @@ _ROOM = 16  # Integers that `cv_pair` may write in its first call.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Functions:
-    """The functions of a library, with the memory of their calls."""
-
     element: Any
     pair: Any  # None if the library has none.
     slots: dict[tuple[Any, ...], GuardedSlot] = field(default_factory=dict)
@@ -221,7 +217,6 @@ class LibraryForces:
         return [Views(label + 1, label, np.arange(interface.n_nodes)[None], interface.n_slave_nodes, arrays)]
 
     def _groups(self, interface: Interface, pairing: Pairing) -> list[tuple[Views, IntArray]]:
-        """Return elements with as many nodes and decisions together, and their decisions (n, n_decisions)."""
         if self.functions.pair is None:
             every = self._views(interface, pairing.handle)
             return [(views, np.zeros((len(views.places), 0), dtype=np.int64)) for views in every]
@@ -247,7 +242,6 @@ class LibraryForces:
         return rows
 
     def _decide(self, interface: Interface, views: Views, x: FloatArray) -> dict[int, IntArray]:
-        """Return the integers of each element by its place."""
         room = _ROOM
         while True:
             slot = self.functions.slot(views.shape, len(self.props), room, pairs=True)

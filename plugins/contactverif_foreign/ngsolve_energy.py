@@ -85,7 +85,6 @@ class NGSolveContact:
         return whole[energy.numbers][:, energy.numbers]
 
     def _make_mesh(self, interface: Interface) -> Any:
-        """Return a mesh with the nodes of both surfaces first, and a triangle behind each segment."""
         meshing, mesh = self._meshing, self._meshing.Mesh(dim=2)
         points = [mesh.Add(meshing.MeshPoint(meshing.Pnt(x, y, 0.0))) for x, y in interface.nodes.tolist()]
         for side, (name, surface) in enumerate((("slave", interface.slave), ("master", interface.master)), start=1):

@@ -74,7 +74,6 @@ class OpenSeesContact:
         return elements
 
     def _arguments(self, n_slave: int, nodes: list[int]) -> list[Any]:
-        """Return the arguments of an element behind its tag."""
         counts = ["-sNdNum", n_slave, "-mNdNum", len(nodes) - n_slave]
         unknowns_of_a_node = ["-dof", 2, 2] if self.element == _ELEMENTS["interface"] else []
         return [*counts, *unknowns_of_a_node, "-Nodes", *nodes, self.penalty, *_NO_FRICTION]

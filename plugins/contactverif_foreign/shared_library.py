@@ -134,7 +134,6 @@ def _to_traits(table: Any, place: str) -> Traits:
 
 
 def _flatten(table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the names and values of a table, groups taken apart."""
     for name, value in table.items():
         yield from _flatten(value) if name in _GROUPS and isinstance(value, dict) else [(name, value)]
 

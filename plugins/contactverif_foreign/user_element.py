@@ -118,7 +118,6 @@ class UserElement:
         return assemble(z.size, parts, by_columns=True)
 
     def _sweep(self, elements: Elements, reference: FloatArray, displacements: FloatArray) -> tuple[Array, Array]:
-        """Call the element for each pair; return copies of its vectors (n, size) and matrices (n, size, size)."""
         convention, size = self.routine.convention, 2 * elements.nodes.shape[1]
         properties = np.empty((len(elements.nodes), 2 + len(self.properties)))
         properties[:, 0], properties[:, 1], properties[:, 2:] = self.penalty, elements.lengths, self.properties

@@ -96,17 +96,17 @@ def test_state_variables_are_zero_before_each_call(ask: Callable[..., Any]) -> N
 
 
 @pytest.mark.parametrize(
-    ("options", "limits", "cause"),
+    ("options", "limits", "cause", "words"),
     [
-        ("svars=4,props=4", Limits(), "signal"),
-        ("svars=4,props=6", Limits(), "exit"),
-        ("props=13", Limits(seconds=2.0), "hang"),
+        ("svars=4,props=4", Limits(), "signal", "ended its process"),
+        ("svars=4,props=6", Limits(), "exit", "its process ended with status 3: STOP 3"),
+        ("props=13", Limits(seconds=2.0), "hang", r"an endless loop\? \(--time-limit\)"),
     ],
 )
 def test_a_crash_or_a_hang_ends_the_process_of_the_plugin_alone(
-    options: str, limits: Limits, cause: str, ask: Callable[..., Any]
+    options: str, limits: Limits, cause: str, words: str, ask: Callable[..., Any]
 ) -> None:
-    with pytest.raises(PluginError) as error:
+    with pytest.raises(PluginError, match=words) as error:
         ask(options, limits)
     assert error.value.cause == cause
 

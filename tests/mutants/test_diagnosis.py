@@ -7,15 +7,17 @@ from pathlib import Path
 import bugs_campaign
 import numpy as np
 import pytest
-from subjects import load_subject, plane_names
+from subjects import Changed, load_subject, plane_names
 from zoo.killing import MUTANTS
 from zoo.right import STRANGERS
 from zoo.springs import EVERY, FORCES, FRESH, KNOWN, NOT_NAMED, TANGENTS, Springs
 
 from contactverif import Run, Subject, load_properties
+from contactverif.contract.arrays import dense
+from contactverif.contract.result import OF_TANGENT
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 from contactverif.diagnosis.diagnose import diagnose
-from contactverif.diagnosis.flat_state import flat_state
+from contactverif.diagnosis.flat_state import SLAVE, flat_state
 from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif.run.run import run
 
@@ -193,6 +195,27 @@ class Linear:
 
     def tangent(self, interface, pairing, z):
         return np.tri(z.size).T + np.diag([1.0, 2.0], z.size - 2)
+
+
+def make_flipped(*, penalty):
+    """Return springs at nodes that state nothing, in whose tangent one entry of each has the opposite sign."""
+    inner = load_subject("nts").with_penalty(penalty).plugin
+
+    def tangent(interface, pairing, z):
+        matrix, nodes = dense(inner.tangent(interface, pairing, z)), np.arange(len(SLAVE))
+        matrix[2 * nodes, 2 * (2 * len(SLAVE) - 1 - nodes) + 1] *= -1
+        return matrix
+
+    return Changed(inner, tangent=tangent, traits=Traits())
+
+
+def test_springs_that_state_nothing_hide_no_wrong_entry_of_a_tangent() -> None:
+    forces, tangent = diagnose(Subject("flipped", make_flipped), "balance.force").split(OF_TANGENT)
+    assert 'for nodal springs state penalty = "nodal"' in forces
+    assert tangent == (
+        "one entry of each slave node and its segment has the opposite sign, in row x of the slave node, "
+        "column y of the first master node: AMATRX(1, 4) of a UEL"
+    )
 
 
 def test_a_wrong_tangent_of_linear_forces_is_none_of_differences() -> None:

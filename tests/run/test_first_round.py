@@ -15,6 +15,7 @@ from contactverif.contract.case import Cases
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.property import Measurement
 from contactverif.contract.result import OPPOSITE_SIGN, Result
+from contactverif.run.judge import ACTS_APART
 from contactverif.run.run import RunStopped, Stop, run
 from contactverif.run.scheduler import Progress
 from contactverif.run.store import Store
@@ -49,11 +50,27 @@ def steps_of(questions: list[Property], answer: Callable[[int], Any], **options:
     return log
 
 
-def test_an_opposite_sign_is_told_at_once() -> None:
+class ActsApart(ResidualAlone):
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        return super().residual(interface, pairing, 2 * interface.nodes.reshape(-1) - z)
+
+
+@pytest.mark.parametrize(("make", "words"), [(Pulls, OPPOSITE_SIGN), (ActsApart, ACTS_APART)])
+def test_a_sign_or_a_gap_turned_round_is_told_at_once(make: Any, words: str) -> None:
     steps: list[Progress] = []
-    wrong = Subject("pulls", lambda *, penalty: Pulls(nts_ar(penalty=penalty)))
-    run([wrong], [FIRST], examples=1, seed=1, progress=steps.append, shrink="none")
-    assert next(step.remark for step in steps if step.remark) == f"pulls: {OPPOSITE_SIGN}"
+    wrong = Subject("wrong", lambda *, penalty: make(nts_ar(penalty=penalty)))
+    result = run([wrong], [FIRST], examples=1, seed=1, progress=steps.append, shrink="none", stop="foundation")
+    assert next(step.remark for step in steps if step.remark) == f"wrong: {words}"
+    assert (result.rows[0].result, result.promises_kept) == (Result.OMITTED, False)
+
+
+def test_a_crash_in_each_case_of_a_property_ends_the_first_round_and_then_the_run() -> None:
+    def crash(size: int) -> float:
+        raise IndexError
+
+    steps = steps_of([LATE, SECOND, FIRST], crash, stop="foundation", shrink="none")
+    rows = [(step.phase, step.row.property_id, step.row.judged) for step in steps if step.row is not None]
+    assert rows == [("first round", "patch.first", 5), ("judging", "patch.first", 20)]
 
 
 def test_what_is_wrong_is_shown_before_any_row_is_whole() -> None:
