@@ -125,10 +125,7 @@ def _number_line(number: CheckedNumber, numbers: Mapping[str, float]) -> str:
 
 
 def _formula_that_fits(number: CheckedNumber, numbers: Mapping[str, float]) -> str:
-    """Return the formula with the numbers of the case put in if they make the tolerance, else an empty string.
-
-    Some formulas are about another state than the case's.
-    """
+    """Return the formula with the numbers of the case put in if they make the tolerance, else an empty string."""
     formula = number.quantity.tolerance
     if not numbers or not symbols_of(formula):
         return ""

@@ -166,10 +166,7 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
 
 
 def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[float, float, str]:
-    """Return the work in closed loops, its tolerance, and why work that is left decides nothing.
-
-    Positions are rounded at the distance Z, a length. Loops become smaller until no work is left.
-    """
+    """Return the work in closed loops, its tolerance, and why work that is left decides nothing."""
     # A barrier begins with a jump in the curvature of its forces, which a loop may cross on a frozen pairing, too.
     is_barrier = subject.traits.rules.enforcement == "barrier"
     steady = state.pairing is not None and not is_barrier
@@ -361,10 +358,8 @@ class _Bracket:
 
 
 def _halve(brackets: list[_Bracket], function: Function, times: int) -> list[_Bracket]:
-    """Return the parts to which halving leads, always towards the larger excess.
-
-    The function is asked for three places of each bracket at once, so that two halvings take one question.
-    """
+    """Return the parts to which halving leads, always towards the larger excess."""
+    # Three places of each bracket are asked for at once, so that two halvings take one question.
     while times > 0:
         middles = [bracket.middle for bracket in brackets]
         if times == 1:

@@ -194,11 +194,7 @@ def lift_slave(case: Case, height: float) -> Case:
 
 
 def _open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
-    """Return a flat case with its slave lifted so that the gap grows along it, and only its first part is closed.
-
-    The gap grows linearly, and nodes move only across the interface, so that every slave stays straight. `closed` is
-    the share of the slave's length that is closed.
-    """
+    """Return a flat case with its slave lifted so that the gap grows along it, and only its first part is closed."""
     depth, positions = case.parameter("penetration"), case.positions.copy()
     shallow = min(depth, SHALLOW * case.slave_length)
     heights = depth + shallow * (_slave_places(case) / closed - 1)

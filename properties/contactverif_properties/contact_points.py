@@ -547,10 +547,7 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
 
 
 def _area_breach(reported: _Reported, *, fits: bool) -> str:
-    """Return how the points break the contract, or an empty string; `fits` says that weights have the right sums.
-
-    Idle points are left out if no point is idle, and lengths are missing.
-    """
+    """Return how the points break the contract, or an empty string; `fits` says that weights have the right sums."""
     points = reported.points
     # What a cell of no more than rounding covers may have either sign.
     rounding = 16 * UNIT_ROUNDOFF * reported.distant ** (reported.state.interface.dim - 1)

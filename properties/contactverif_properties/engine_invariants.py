@@ -46,10 +46,7 @@ def _compare_scenes(
     action: str,
     back: Callable[[int, FloatArray], FloatArray] = lambda body, forces: forces,
 ) -> Measurement:
-    """Solve the scene of a case and a changed one, and return the largest change of a nodal force over p L.
-
-    `back` takes the forces of all nodes of a body of the changed scene to those of the scene.
-    """
+    """Solve a scene and a changed one, and return the largest change of a force, taken `back`, over p L."""
     assert isinstance(subject, EngineSubject)
     scene = scene_of(case)
     first, second = (solve_by_engine(item, subject)[0] for item in (scene, changed))

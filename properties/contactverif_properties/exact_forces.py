@@ -326,11 +326,7 @@ def point_errors(state: FrozenState, penalty: float, pressure: float) -> tuple[f
 
 
 def _beside_master(case: Case, points: ContactPoints) -> BoolArray:
-    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end; in space none does.
-
-    A point that names no place on its surface does not lie beside the other. Where the master covers the slave, no
-    point of the slave does. A point of a second pass lies on the master, and the other surface is the slave.
-    """
+    """Return which points (n_points,) lie beside the other surface, or within roundoff of its end; none in space."""
     beside = np.zeros(len(points.c), bool)
     if case.interface.dim != PLANE:
         return beside

@@ -211,10 +211,7 @@ SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASS
 
 
 def _measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measurement:
-    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap.
-
-    So much of the force may point `aside`, a force ≥ 0.
-    """
+    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap."""
     traits, edges = subject.traits, case.parameters["edges"]
     bounds = case.parameters["segment_bounds" if traits.rules.gap else "bounds"] * case.penalty
     slave = exact_forces.pushing_forces(exact_forces.uniform_state(case, subject))[: case.interface.n_slave_nodes]

@@ -65,10 +65,7 @@ def _same_answer(situation: str) -> tuple[Quantity, Quantity]:
 
 
 def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tuple[FrozenState, FloatArray, FloatArray]:
-    """Return a state with uniform multipliers if there are any, its forces (n_nodes, dim) and tangent.
-
-    The tangent has the rows and columns of positions, and none where the plugin has no tangent.
-    """
+    """Return a state with uniform multipliers if there are any, its forces (n_nodes, dim) and tangent."""
     formulation, n = subject.with_penalty(penalty), case.interface.n_unknowns
     if formulation.n_multipliers(case.interface):
         formulation = subject.with_penalty(1.0)
@@ -419,11 +416,7 @@ def _as_part(nodes: FloatArray) -> _Part:
 
 
 def _add_parts(case: Case, slave: _Part, master: _Part, *, first: bool = False) -> tuple[Case, Carry]:
-    """Return a case with one more part on each side, and the new numbers of its nodes.
-
-    The nodes of the new parts are in the same places in the reference. They come behind the others of their side, or
-    `first`.
-    """
+    """Return a case with one more part on each side, and the new numbers of its nodes."""
     interface, n_slave = case.interface, case.interface.n_slave_nodes
     parts = np.split(np.arange(interface.n_nodes), [n_slave])
     more = np.split(interface.n_nodes + np.arange(len(slave[0]) + len(master[0])), [len(slave[0])])

@@ -186,10 +186,7 @@ def _settling_iterate(system: System, trace: Trace) -> int:
 
 
 def _gives_same_forces(system: System, u: FloatArray, pairing: Pairing | None, other: Pairing | None) -> bool:
-    """Return whether two pairings give the same forces at u bit by bit: roundoff may decide what else they hold.
-
-    Far from its own state a pairing may give no forces at all.
-    """
+    """Return whether two pairings give the same forces at u bit by bit: roundoff may decide what else they hold."""
     try:
         return pairing == other or bool((system.forces(u, pairing) == system.forces(u, other)).all())
     except ContractError:
@@ -280,10 +277,7 @@ def _fit_steps(
     condition: float,
     directions: Sequence[int] = range(N_DIRECTIONS),
 ) -> _Steps:
-    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
-
-    The matrix is the one at the solution, and the condition its reciprocal condition. Directions have numbers.
-    """
+    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order."""
     solution, pairing = trace.u[-1], trace.pairing
     units = scale_factors(matrix, system.scene.n_free)[1]
     floor = solution_floor(system.scene, solution, units, condition)
@@ -437,10 +431,7 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
 def _compare_step(
     system: System, case: Case, trace: Trace, number: int, change: FloatArray | None, factors: FloatArray
 ) -> float:
-    """Return the difference of the steps from an iterate in both systems of units over what roundoff does to it.
-
-    The step in other units is a change (n,), or None without an inverse; the factors (n,) are those of the unknowns.
-    """
+    """Return the difference of the steps from an iterate in both systems of units over what roundoff does to it."""
     u, after, condition = trace.u[number], trace.u[number + 1], float(trace.conditions[number])
     if change is None:
         return np.inf if condition > STEP_ROUNDINGS * UNIT_ROUNDOFF * system.size else 0.0

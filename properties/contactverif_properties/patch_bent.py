@@ -193,10 +193,7 @@ def count_bare(interface: Interface, forces: FloatArray) -> int:
 
 
 def _mean_errors(solution: Solution, fit: FiniteFit, slave: Role, angle: float) -> FloatArray:
-    """Return the relative errors (3,) of the mean pressure over an angle, by slave, master and reported points.
-
-    The last is NaN if nothing is reported.
-    """
+    """Return the relative errors (3,) of the mean pressure over an angle: slave, master, reported points (or NaN)."""
     nodes, n_slave = solution.interface.nodes, solution.interface.n_slave_nodes
     outwards = nodes / np.linalg.norm(nodes, axis=1)[:, None]
     radial = (solution.forces * outwards).sum(axis=1) * (-1 if slave == "inner" else 1)

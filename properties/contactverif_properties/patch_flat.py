@@ -178,10 +178,7 @@ def _is_within(measurement: Measurement, factor: float) -> bool:
 
 
 def _move_ends_inwards(case: Case) -> Case | None:
-    """Return the case with end nodes of the slave that face a free end of the master exactly moved inwards by roundoff.
-
-    None if there is no such node, or in space.
-    """
+    """Return the case with end nodes of the slave that face a free end of the master moved inwards, or None."""
     if case.interface.dim != PLANE:
         return None
     slave, master = case.interface.slave, case.interface.master
@@ -464,10 +461,7 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
 
 
 def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
-    """Return the forces that push the slave out of the master, and the master out of the slave, over ε̂ |g| L.
-
-    The third number is the largest force on a node.
-    """
+    """Return the forces that push the slave out, the master out, and a node at most, over ε̂ |g| L."""
     pushes = -exact_forces.uniform_state(case, subject).forces @ exact_forces.normal_of(case)
     size = case.penalty * case.parameter("penetration") * case.slave_measure
     slave, master = np.split(pushes / size, [case.interface.n_slave_nodes])

@@ -51,11 +51,7 @@ class _Question(NamedTuple):
 def _count_changes(
     first: CheckedFormulation, second: CheckedFormulation, questions: Sequence[_Question]
 ) -> tuple[float, dict[str, float]]:
-    """Ask two instances the same questions in different orders, and count the entries of the answers that differ.
-
-    The first number is that of entries that change when an instance is asked the same again. The others, by method, are
-    those of entries that change with the order of the questions.
-    """
+    """Ask two instances the same questions in different orders, and count the entries of the answers that differ."""
     with_pairings = len(questions) > 3
     calls, others = (
         [call for call in order + (of_pairings if with_pairings else ()) if call[0] in {"residual", *first.provides}]

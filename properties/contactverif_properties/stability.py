@@ -178,10 +178,7 @@ def _moved_by(case: Case) -> str:
 
 
 def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
-    """Return the errors {quantity: of each row, or of the total force} that the traits make known.
-
-    Constraint rows are not judged here, and get 0. With multipliers only the distribution of the forces counts.
-    """
+    """Return the errors {quantity: of each row, or of the total force} that the traits make known."""
     knows_forces = _knows_forces(traits)
     if not knows_forces and not _knows_total_of_springs(traits):
         return {}

@@ -456,10 +456,7 @@ def _worst_entry(judge: BlockJudge, comparison: _Comparison, row: int, column: i
 
 
 def _excuse(judge: BlockJudge, comparison: _Comparison) -> tuple[FloatArray, int, int]:
-    """Return the excess (count, count) of the blocks that are not excused, and how many kinks and bends excuse.
-
-    The worst blocks that fail are looked at first. As soon as one has no excuse, it decides.
-    """
+    """Return the excess (count, count) of the blocks that are not excused, and how many kinks and bends excuse."""
     excess, kinked, bent = comparison.excess, 0, 0
     order = np.argsort(-excess, axis=None)[: int((excess > 1).sum())]
     columns: dict[int, _Sides] = {}

@@ -133,11 +133,7 @@ def _make_axes(width: float, height: float) -> tuple[Figure, Axes]:
 
 
 def _positions_to_draw(case: Case, gaps: Gaps, roundoff: float, with_forces: bool) -> tuple[FloatArray, str]:
-    """Return positions (n_nodes, 2) to draw, a length each, and how the slave is moved for it, in words.
-
-    It is drawn apart to make room for arrows; else a factor of one digit makes the largest gap visible, if that is more
-    than roundoff.
-    """
+    """Return positions (n_nodes, 2) to draw, a length each, and how the slave is moved for it, in words."""
     positions = case.positions.copy()
     size, largest, factor = float(np.ptp(positions, axis=0).max()), float(np.abs(gaps.gap).max()), 1.0
     if with_forces:
@@ -189,10 +185,7 @@ _ARROWS: dict[str, dict[str, Any]] = {
 def _plot_surface(
     axes: Axes, surface: Surface, nodes: FloatArray, labels: Sequence[str], pen: Pen, *, body: float, side: float
 ) -> None:
-    """Draw segments with the texts of their lengths, nodes, and a hatched strip of the body that is `body` wide.
-
-    `side` is 1 for labels and node numbers on the side of the body, −1 for the other side.
-    """
+    """Draw segments, nodes and a hatched strip `body` wide, texts on the side of the body (1) or the other (−1)."""
     lefts = _lefts(surface, nodes)
     hatch(axes, nodes[surface.segments], (nodes + body * lefts)[surface.segments], "0.82", pen.hatch)
     few = len(surface.nodes) <= _NUMBERED
@@ -234,10 +227,7 @@ def _plot_side(axes: Axes, edges: IntArray, nodes: FloatArray, pen: Pen, size: f
 def _plot_arrows(
     axes: Axes, nodes: FloatArray, forces: FloatArray | None, exact: FloatArray | None, *, longest: float
 ) -> None:
-    """Draw nodal forces as arrows of one scale: those of the formulation, thin, over the exact ones, broad and light.
-
-    `longest` is the length of the longest arrow; forces of None are not drawn.
-    """
+    """Draw nodal forces as arrows, at most `longest`: the formulation's, thin, over the exact ones, broad and light."""
     kinds = (("exact", exact), ("formulation", forces))
     by_kind = {kind: np.reshape(values, (-1, 2)) for kind, values in kinds if values is not None}
     largest = max((float(np.linalg.norm(values, axis=1).max()) for values in by_kind.values()), default=0.0)
@@ -324,17 +314,18 @@ def _surface_figure(
 def _thin_out(figure: Figure, errors: FloatArray) -> None:
     """Shorten labels that cover others to the number of their node, or drop them; larger errors (n_nodes,) go first."""
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # What stands nowhere else now will not move.
-    kept: list[BboxBase] = []
+    figure.set_layout_engine("none")  # Labels stay where they are compared.
+    boxes: list[BboxBase] = []
     labels = [text for axes in figure.axes for text in axes.texts]
     for label in sorted(labels, key=lambda text: -errors[int(gid)] if (gid := text.get_gid()) else 1.0):
         words = label.get_text()
+        label.set_gid(None)  # The file would have it as an id.
         for shorter in (words, words.partition(":")[0], ""):
             label.set_text(shorter)
-            if not any(label.get_window_extent().overlaps(box) for box in kept):
+            if not any(label.get_window_extent().overlaps(box) for box in boxes):
                 break
         if label.get_text():
-            kept.append(label.get_window_extent())
+            boxes.append(label.get_window_extent())
 
 
 def view_from_above(case: Case) -> FloatArray:

@@ -181,10 +181,7 @@ class _Link(NamedTuple):
 
 
 def _draw_strips(case: Case, course: Course, unit: float, width: int) -> tuple[list[str], str]:
-    """Draw the surfaces of a flat or nearly flat interface as two lines, with node numbers above and below.
-
-    `unit` is that of the lengths that are written, `width` the largest number of columns.
-    """
+    """Draw the surfaces of a flat or nearly flat interface as two lines, with node numbers above and below."""
     places, number = _places(course, case.interface.n_slave_nodes)
     width -= _MARGIN + len(str(case.interface.n_nodes)) - 1  # The last node number ends behind its node.
     surfaces = (case.interface.slave, case.interface.master)
