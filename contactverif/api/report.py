@@ -110,11 +110,7 @@ class Failure(Counterexample):
         """Draw the mesh, with the forces of the formulation beside the exact ones where they are known.
 
         The formulation is asked once more for its forces on this case.
-
-        Returns
-        -------
-        Drawing
-            The picture: a notebook shows it, ``write("failure.svg")`` stores it, and ``figure`` is that of matplotlib.
+        A notebook shows the picture, ``write("failure.svg")`` stores it, and ``figure`` is that of matplotlib.
         """
         try:
             return make_drawing(self.subject, self.question, self.outcome)
@@ -167,13 +163,9 @@ class Report(Run):
         ]
 
     def table(self) -> pd.DataFrame:
-        """Return all rows as a table.
+        """Return a table with a line for each formulation and property, and the columns of the rows in the JSON file.
 
-        Returns
-        -------
-        pd.DataFrame
-            A line for each formulation and property, with the columns of the rows in the JSON file. ``quantity``,
-            ``value`` and ``tolerance`` are of the number that came closest to its tolerance.
+        ``quantity``, ``value`` and ``tolerance`` are of the number that came closest to its tolerance.
         """
         import pandas as pd
 
@@ -189,13 +181,9 @@ class Report(Run):
         return pd.DataFrame(lines)
 
     def to_xarray(self) -> xr.DataTree:
-        """Return the report as xarray reads it from the netCDF file.
+        """Return the report as xarray reads it from the netCDF file, in memory.
 
-        Returns
-        -------
-        xr.DataTree
-            The groups, in memory: ``summary``, a group for each property such as ``patch/flat/transmission``, and the
-            counterexamples.
+        The groups are ``summary``, one for each property such as ``patch/flat/transmission``, and the counterexamples.
         """
         from contactverif_reports.netcdf.write import as_tree
 

@@ -88,11 +88,6 @@ def from_residual(residual: Element, *, pair: Pair, traits: Traits | None = None
     Callable
         The factory ``make(*, penalty)`` that an entry point names.
 
-    Raises
-    ------
-    MisuseError
-        As for `from_energy`.
-
     See Also
     --------
     from_energy : The same with an energy, whose gradient the forces are.

@@ -189,15 +189,4 @@ class Engine(Protocol):
         """The statements of the engine about itself."""
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
-        """Solve a scene; a code that finds no solution returns what it has, with ``converged=False``.
-
-        Parameters
-        ----------
-        scene : SceneArrays
-            The scene.
-
-        Returns
-        -------
-        EngineAnswer
-            The answer.
-        """
+        """Solve a scene; a code that finds no solution returns what it has, with ``converged=False``."""

@@ -420,23 +420,13 @@ class Formulation(ResidualOnly, Protocol):
         Newton's method needs both at each iterate, and they share most of their work. A plugin that has this method has
         ``tangent`` too. The answers may differ from those of the two methods by roundoff; the property ``purity``
         compares them.
-
-        Returns
-        -------
-        residual : FloatArray, shape (n_unknowns,)
-            What ``residual`` returns.
-        tangent : FloatArray or scipy.sparse matrix, shape (n_unknowns, n_unknowns)
-            What ``tangent`` returns.
         """
         ...
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return where the formulation looks for contact at one state, and what it finds there. Optional.
 
-        Returns
-        -------
-        ContactPoints
-            Gaps, pressures and places of all contact points, active or not.
+        All contact points are told, active or not.
         """
         ...
 

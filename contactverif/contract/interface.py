@@ -91,13 +91,7 @@ class Surface:
 
     @property
     def segments(self) -> IntArray:
-        """The faces of a surface in the plane, (n_segments, 2).
-
-        Raises
-        ------
-        MisuseError
-            If the surface has triangles or quadrilaterals.
-        """
+        """The faces (n_segments, 2) of a surface in the plane; one in space raises a MisuseError."""
         if self.faces.shape[1] != SEGMENT:
             raise MisuseError("segments", f"faces of {self.faces.shape[1]} corners", "`faces` of a surface in space")
         return self.faces
@@ -221,11 +215,6 @@ class Interface:
         -------
         Interface
             Its nodes are numbered in walking order, slave first.
-
-        Raises
-        ------
-        MisuseError
-            If the points form no such chain.
         """
         points = _as_points({"slave": slave, "master": master}, PLANE, 2, "shape (n ≥ 2, 2), the points of a chain")
         n_slave, numbers = len(points[0]), np.arange(sum(map(len, points)))
@@ -248,16 +237,6 @@ class Interface:
             The points of the master.
         master_faces : ArrayLike, shape (n_faces, 3 or 4)
             Its faces, likewise, with node numbers of their own.
-
-        Returns
-        -------
-        Interface
-            Its nodes are those of the slave, then those of the master.
-
-        Raises
-        ------
-        MisuseError
-            If the faces form no such surface.
 
         Examples
         --------

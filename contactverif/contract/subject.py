@@ -441,12 +441,7 @@ def copy_entries(verb: str, tangent: Any) -> Any:
 def ask_first(subject: Subject, case: Case, parts: Collection[str]) -> FirstAnswers:
     """Ask a flat case, whose multipliers press, for its pairing, its residual and, if it is among `parts`, its tangent.
 
-    A tangent that breaks the contract is None here.
-
-    Raises
-    ------
-    ContractError
-        If pairing or residual break the contract, or the plugin raises an exception there.
+    A tangent that breaks the contract is None here; pairing and residual raise their `ContractError`.
     """
     formulation, interface = subject.for_case(case), case.interface
     pressure = case.penalty * case.parameter("penetration")
@@ -467,26 +462,8 @@ SOLVE = "solve"  # The one part that an engine provides; a formulation provides 
 class EngineSubject(Subject):
     """An engine as it was loaded. It has no penalty of its own: each scene says its own.
 
-    Parameters
-    ----------
-    name : str
-        The name as on the command line, with options.
-    engine : Engine
-        The engine.
-
-    Attributes
-    ----------
-    engine : Engine
-        The engine itself.
-    engine_traits : EngineTraits
-        The statements of the engine.
-    traits : Traits
-        The same statements, as far as formulations can state them.
-
-    Raises
-    ------
-    ContractError
-        If it has no ``solve``, or its ``traits`` are no `EngineTraits`.
+    Its `traits` are its `engine_traits`, as far as formulations can state them. An engine without ``solve``, or with
+    ``traits`` that are no `EngineTraits`, raises a `ContractError`.
     """
 
     def __init__(self, name: str, engine: Engine) -> None:
@@ -516,17 +493,7 @@ class EngineSubject(Subject):
         raise ContractError("an engine gives displacements alone")
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
-        """Return the checked answer of the engine to a scene.
-
-        Raises
-        ------
-        PluginError
-            If the engine raises an exception, or its process ends.
-        ContractError
-            If the answer has the wrong kind, shape or dtype.
-        NonFiniteError
-            If it says that it has converged, and a displacement is NaN or infinite.
-        """
+        """Return the checked answer of the engine to a scene."""
         answer = _call_plugin(SOLVE, self.engine.solve, scene)
         if not isinstance(answer, EngineAnswer):
             raise ContractError(f"solve: returned a {type(answer).__name__}; needed an EngineAnswer")

@@ -115,11 +115,6 @@ def block(
     Body
         The block; its nodes are numbered row by row, from bottom to top.
 
-    Raises
-    ------
-    MisuseError
-        If grid lines do not ascend, or as `Body` does.
-
     Examples
     --------
     A punch under pressure on a base that is held below:
@@ -176,7 +171,7 @@ def block(
 def rigid_surface(
     points: ArrayLike, *, axis: ArrayLike = (1.0, 0.0), displacement: ArrayLike = (0.0, 0.0), name: str = "rigid"
 ) -> Body:
-    """Return a rigid surface.
+    """Return a rigid surface, a body without cells.
 
     Parameters
     ----------
@@ -188,16 +183,6 @@ def rigid_surface(
         The displacement imposed on the surface, a length each, in the body's axes.
     name : str
         The name of the body in messages and drawings.
-
-    Returns
-    -------
-    Body
-        A body without cells.
-
-    Raises
-    ------
-    MisuseError
-        If the points form no surface, or as `Body` does.
 
     Examples
     --------

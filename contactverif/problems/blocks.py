@@ -66,11 +66,6 @@ def two_blocks(
         "direction" (2,), the interface's unit vector. If the pressure is known exactly, then also "compliance" (2,),
         height over oedometric modulus of slave and master, and "pressure" or "approach".
 
-    Raises
-    ------
-    MisuseError
-        As `Body` and `Scene` do.
-
     Examples
     --------
     >>> from contactverif import Rectangle, load_formulation, solve, two_blocks

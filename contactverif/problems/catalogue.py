@@ -144,11 +144,6 @@ def load_scene(text: str, argument: str = "--scene") -> Scene:
     argument : str
         The beginning of error messages.
 
-    Returns
-    -------
-    Scene
-        The scene.
-
     Raises
     ------
     MisuseError

@@ -60,17 +60,12 @@ _FLAT = _LENGTHS | {f"{name}-swapped": (master, slave) for name, (slave, master)
 
 
 def named_case(name: str) -> Case:
-    """Return the interface state of that name.
+    """Return the interface state of that name, a case which solves no bodies.
 
     Parameters
     ----------
     name : str
         One of `NAMED`, such as ``"c"``.
-
-    Returns
-    -------
-    Case
-        The case, which solves no bodies.
 
     Raises
     ------

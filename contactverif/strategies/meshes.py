@@ -21,16 +21,6 @@ def interfaces(*, closed: bool = False) -> SearchStrategy[Interface]:
     closed : bool
         True for closed rings alone.
 
-    Returns
-    -------
-    SearchStrategy[Interface]
-        Interfaces in their reference configuration.
-
-    Raises
-    ------
-    MisuseError
-        If `closed` is neither True nor False.
-
     Examples
     --------
     >>> from hypothesis import find
@@ -53,16 +43,6 @@ def faces(*, corners: Collection[int] = (TRIANGLE,)) -> SearchStrategy[Interface
     corners : Collection[int]
         The numbers of corners that the faces of an interface may have: 3, 4 or both. All faces of a surface have as
         many.
-
-    Returns
-    -------
-    SearchStrategy[Interface]
-        Interfaces in their reference configuration.
-
-    Raises
-    ------
-    MisuseError
-        If `corners` is empty, or has other numbers.
 
     Examples
     --------
@@ -93,16 +73,6 @@ def states(
         The numbers of corners of random faces, as in `faces`.
     smooth : bool
         True for states that are not at a kink, for derivatives. Otherwise some states are.
-
-    Returns
-    -------
-    SearchStrategy[Case]
-        The states.
-
-    Raises
-    ------
-    MisuseError
-        If the interface has another dimension, or an argument is none of these.
 
     Examples
     --------

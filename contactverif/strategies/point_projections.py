@@ -77,7 +77,7 @@ class Projection:
     def find_mistake(
         self, segment: int, *, xi: float | None = None, side: int | None = None, distance: float | None = None
     ) -> str:
-        """Return what is wrong with the answer of a search and not explained by roundoff.
+        """Return what is wrong with the answer of a search and not explained by roundoff; empty if nothing is.
 
         Roundoff explains a length of 4u(L + |P − A|), with u = 2⁻⁵³, the length L of the segment and its first node A:
         in the distance, in ξ L, in a gap whose side is wrong, and, for both segments together, in the distance of a
@@ -93,11 +93,6 @@ class Projection:
             −1 if the point is inside the body, 1 if it is outside, 0 if it is on the surface.
         distance : float | None
             The distance to the closed segment.
-
-        Returns
-        -------
-        str
-            The mistake in words; empty if there is none.
         """
         if segment not in range(len(self.segments)):
             return f"segment {segment} of {len(self.segments)}"
@@ -159,16 +154,6 @@ def projections(*, kinds: Collection[str] | None = None) -> SearchStrategy[Proje
         - ``far-away``: a distance of 1e3 to 1e9 lengths;
         - ``other-units``: all coordinates times 2^-60 or 2^60;
         - ``long-chain``: a chain of a thousand segments.
-
-    Returns
-    -------
-    SearchStrategy[Projection]
-        Examples with their exact answers.
-
-    Raises
-    ------
-    MisuseError
-        If there is no such kind, or none is given.
 
     Examples
     --------

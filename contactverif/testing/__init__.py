@@ -52,11 +52,6 @@ def parametrize_with_properties(
     known : Mapping[str, str] | None
         {property id: why its failure is known}. An id that is not checked is an error, and so is one that passes.
 
-    Returns
-    -------
-    Callable[[_Test], _Test]
-        The decorator.
-
     Raises
     ------
     MisuseError
