@@ -32,7 +32,7 @@ _NEEDED_ABILITIES = "an ability that JAX has: neither batched, nor takes_complex
 
 
 def from_energy(energy: Element, *, pair: Pair, traits: Traits | None = None) -> Callable[..., JaxFormulation]:
-    """Make a formulation from the energy of one contact element.
+    """Make a formulation from the energy of one contact element: the factory that an entry point names.
 
     The residual is the gradient of the energy, and the tangent its second derivative. JAX computes both in double
     precision, on one thread.
@@ -51,11 +51,6 @@ def from_energy(energy: Element, *, pair: Pair, traits: Traits | None = None) ->
     traits : Traits | None
         The promises of the formulation; None promises nothing.
 
-    Returns
-    -------
-    Callable
-        The factory ``make(*, penalty)`` that an entry point names.
-
     Raises
     ------
     MisuseError
@@ -70,7 +65,7 @@ def from_energy(energy: Element, *, pair: Pair, traits: Traits | None = None) ->
 
 
 def from_residual(residual: Element, *, pair: Pair, traits: Traits | None = None) -> Callable[..., JaxFormulation]:
-    """Make a formulation from the forces of one contact element.
+    """Make a formulation from the forces of one contact element: the factory that an entry point names.
 
     The tangent is the Jacobian of the forces. JAX computes both in double precision, on one thread.
 
@@ -82,11 +77,6 @@ def from_residual(residual: Element, *, pair: Pair, traits: Traits | None = None
         `from_energy` describes.
     pair, traits : Callable, Traits | None
         As for `from_energy`.
-
-    Returns
-    -------
-    Callable
-        The factory ``make(*, penalty)`` that an entry point names.
 
     See Also
     --------

@@ -269,12 +269,9 @@ class Cases:
     def random(cls, make: Callable[..., Any]) -> Cases:
         """Return random cases, of one kind of situation or of several with the same share.
 
-        Parameters
-        ----------
-        make : Callable[..., Any]
-            Takes None, an interface or a scene, and returns a hypothesis strategy of `Case`, {kind: strategy}, or None.
-            Properties for which the same function makes the cases are judged on the same ones, if it has a name
-            (`random_source`).
+        `make` takes None, an interface or a scene, and returns a hypothesis strategy of `Case`, {kind: strategy}, or
+        None. Properties for which the same function makes the cases are judged on the same ones, if it has a name
+        (`random_source`).
         """
         return cls(make, needs=needs_of_place(make))
 

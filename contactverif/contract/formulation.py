@@ -244,11 +244,6 @@ class ContactPoints:
         In space, the shape functions of the corners of the slave face at the point, and of those of the master face at
         its foot. In the plane there are none, shape (n_points, 0).
 
-    Raises
-    ------
-    MisuseError
-        If an array has the wrong dtype, or not n_points rows.
-
     See Also
     --------
     ContactPoints.on_faces : Make points of an interface in space.
@@ -288,12 +283,7 @@ class ContactPoints:
 
     @classmethod
     def on_faces(cls, **arrays: Any) -> ContactPoints:
-        """Return points of an interface in space.
-
-        Parameters
-        ----------
-        **arrays : Any
-            The attributes by name. `c`, `xi`, `area_from` and `area_to` may be left out.
+        """Return points of an interface in space, from the attributes by name; what is NaN there may be left out.
 
         Examples
         --------
@@ -397,20 +387,15 @@ class Formulation(ResidualOnly, Protocol):
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing | Mapping[str, NDArray[Any]]:
         """Decide who touches whom at one state z (n_unknowns,): current positions, then multipliers. Optional.
 
-        Returns
-        -------
-        Pairing | Mapping[str, NDArray]
-            Named arrays of integers and booleans. Every real number is computed from z in the other methods.
+        The answer is named arrays of integers and booleans. Every real number is computed from z in the other methods.
         """
         ...
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
         """Return the derivative of the residual at one state z (n_unknowns,), on a frozen pairing. Optional.
 
-        Returns
-        -------
-        FloatArray or scipy.sparse matrix, shape (n_unknowns, n_unknowns)
-            Row i, column j holds ∂residual_i/∂z_j; rows and columns of multipliers come last.
+        It is an array or a matrix of scipy.sparse, (n_unknowns, n_unknowns). Row i, column j holds ∂residual_i/∂z_j;
+        rows and columns of multipliers come last.
         """
         ...
 
@@ -434,23 +419,8 @@ class Formulation(ResidualOnly, Protocol):
 def evaluate_both(plugin: Any, interface: Interface, pairing: Pairing | None, z: FloatArray) -> tuple[FloatArray, Any]:
     """Return residual and tangent of a plugin at one state: in one call where it offers that, else in two.
 
-    Parameters
-    ----------
-    plugin : Any
-        A formulation with a tangent, as its factory returned it or checked.
-    interface : Interface
-        The meshes in their reference configuration.
-    pairing : Pairing | None
-        The frozen pairing; None if the plugin has none.
-    z : FloatArray, shape (n_unknowns,)
-        One state: current positions, then multipliers.
-
-    Returns
-    -------
-    residual : FloatArray, shape (n_unknowns,)
-        The nodal forces, then the constraint rows.
-    tangent : FloatArray or scipy.sparse matrix, shape (n_unknowns, n_unknowns)
-        The derivative of the residual on the pairing.
+    The plugin is a formulation with a tangent, as its factory returned it or checked. The other arguments and both
+    answers are those of `Formulation`.
 
     Examples
     --------

@@ -204,17 +204,12 @@ class Interface:
 
     @classmethod
     def from_chains(cls, slave: ArrayLike, master: ArrayLike) -> Interface:
-        """Return the interface with one open chain a side.
+        """Return the interface with one open chain a side; its nodes are numbered in walking order, slave first.
 
         Parameters
         ----------
         slave, master : ArrayLike, shape (n_points, 2)
             The points of each chain in walking order, with the body on the left; at least two.
-
-        Returns
-        -------
-        Interface
-            Its nodes are numbered in walking order, slave first.
         """
         points = _as_points({"slave": slave, "master": master}, PLANE, 2, "shape (n ≥ 2, 2), the points of a chain")
         n_slave, numbers = len(points[0]), np.arange(sum(map(len, points)))

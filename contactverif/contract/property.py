@@ -72,11 +72,6 @@ class Quantity:
         The unit of value and tolerance; "1" for a ratio.
     sense : Literal['at most', 'at least']
         The relation of value to tolerance in a pass.
-
-    Raises
-    ------
-    MisuseError
-        If the name or the unit is too long or cannot be shown.
     """
 
     name: str
@@ -135,11 +130,6 @@ class Finding:
         What the numbers are, in a word: `force` and `exact`.
     remark : str
         Anything else about the place.
-
-    Raises
-    ------
-    ValueError
-        If not as many numbers are found as are right.
     """
 
     place: str
@@ -186,11 +176,6 @@ class Measurement:
         (`PropertyInfo.least_contact`).
     finding : Finding | None
         The place of the worst number, and what is found and right there; None where nothing is known of it.
-
-    Raises
-    ------
-    ValueError
-        If a quantity is measured twice.
     """
 
     numbers: Sequence[CheckedNumber] = ()
@@ -245,54 +230,33 @@ Measure = Callable[[Case, Subject], Measurement]
 class PropertyInfo:
     """The description of a property for a reader of results: plain data, which a report stores.
 
-    Attributes
-    ----------
-    id : str
-        The dotted name on the command line, `patch.flat.transmission`.
-    family : str
-        The subject that the property belongs to, `patch`.
-    summary : str
-        The property in one line.
-    quantities : tuple[Quantity, ...]
-        The numbers that are measured and judged.
-    needs : frozenset[str]
-        The parts of the contract without which the property cannot be checked, {"pair", "tangent",
-        "contact_points"}. Who leaves out a tangent that the traits promise breaks a promise; other parts are optional.
-    series : Mapping[str, str]
-        {name: unit} of the numbers by iterate that a measurement may hold.
-    kinds : tuple[str, ...]
-        The kinds of situation (`Case.kind`) that the strategy makes, in the order of tables. A run counts the cases of
-        each, and shows a kind of which there was no case too.
-    least_contact : float
-        The least share of judged cases in which something must be in contact, 0 to 1; with clearly less the property
-        is not judged. It is 0 where contact is not the question.
-    usual_undecided : float
-        The share of undecided cases of right formulations, 0 to 1, as it was measured. A formulation with more than
-        twice that, and more than chance allows, is reported: what is undecided may hide what is wrong.
-    rank : float
-        The place of a failure among others, the lowest first: few other properties catch what such a property catches.
-        One of another author has −1 and is shown before ours, since it was installed for a purpose.
-    role : str
-        "foundation" if a failure says that no other answer can be relied on; "exact" for an exact answer, behind which
-        failures of "comparison" are shown: two answers that differ do not say which is right; "trait" if a failure that
-        breaks no promise tells what method it is, and is no mistake.
-
-    Raises
-    ------
-    MisuseError
-        If one of the shares is not between 0 and 1, or id, family or a kind is too long or cannot be shown.
+    A MisuseError says that a share is not between 0 and 1, or that id, family or a kind is too long or cannot be shown.
     """
 
-    id: str
-    family: str
-    summary: str
-    quantities: tuple[Quantity, ...]
+    id: str  # The dotted name on the command line, `patch.flat.transmission`.
+    family: str  # The subject that the property belongs to, `patch`.
+    summary: str  # The property in one line.
+    quantities: tuple[Quantity, ...]  # The numbers that are measured and judged.
+    # The parts of the contract without which the property cannot be checked, {"pair", "tangent", "contact_points"}. Who
+    # leaves out a tangent that the traits promise breaks a promise; other parts are optional.
     needs: frozenset[str] = field(default=frozenset(), kw_only=True)
+    # {name: unit} of the numbers by iterate that a measurement may hold.
     series: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    # The kinds of situation (`Case.kind`) that the strategy makes, in the order of tables. A run counts the cases of
+    # each, and shows a kind of which there was no case too.
     kinds: tuple[str, ...] = field(default=(), kw_only=True)
+    # The least share of judged cases in which something must be in contact, 0 to 1; with clearly less the property is
+    # not judged. It is 0 where contact is not the question.
     least_contact: float = field(default=LEAST_CONTACT, kw_only=True)
+    # The share of undecided cases of right formulations, 0 to 1, as it was measured. A formulation with more than twice
+    # that, and more than chance allows, is reported: what is undecided may hide what is wrong.
     usual_undecided: float = field(default=NONE_UNDECIDED, kw_only=True)
+    # The place of a failure among others, the lowest first: few other properties catch what such a property catches.
+    # One of another author has −1 and is shown before ours, since it was installed for a purpose.
     rank: float = field(default=-1.0, kw_only=True)
+    # "foundation" if a failure says that no other answer can be relied on; "exact" for an exact answer, behind which
+    # failures of "comparison" are shown: two answers that differ do not say which is right; "trait" if a failure that
+    # breaks no promise tells what method it is, and is no mistake.
     role: Role = field(default="", kw_only=True)
 
     def __post_init__(self) -> None:

@@ -106,8 +106,6 @@ class Subject:
 
     Attributes
     ----------
-    name : str
-        The name as on the command line, with options.
     traits : Traits
         The promises of the formulation.
     provides : frozenset[str]

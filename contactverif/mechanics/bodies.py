@@ -81,7 +81,7 @@ def block(
 ) -> Body:
     """Return a rectangular body that may touch another one at its bottom or its top, and is loaded on the other side.
 
-    Both vertical sides stand on rollers unless they are free.
+    Both vertical sides stand on rollers unless they are free. Nodes are numbered row by row, from bottom to top.
 
     Parameters
     ----------
@@ -109,11 +109,6 @@ def block(
         Rotation, shift and scale; lengths of all other arguments are those before the scale.
     name : str
         The name of the body in messages and drawings.
-
-    Returns
-    -------
-    Body
-        The block; its nodes are numbered row by row, from bottom to top.
 
     Examples
     --------
@@ -239,6 +234,8 @@ def body_from_mesh(
 ) -> Body:
     """Return a body from a scikit-fem mesh of first-order triangles or quadrilaterals with named boundaries.
 
+    It has the nodes and cells of the mesh; its axes are x and y.
+
     Parameters
     ----------
     mesh : skfem.MeshTri or skfem.MeshQuad
@@ -257,11 +254,6 @@ def body_from_mesh(
         The pressure on each loaded boundary, force per length, positive towards the body.
     name : str
         The name of the body in messages and drawings.
-
-    Returns
-    -------
-    Body
-        The body on the nodes and cells of the mesh; its axes are x and y.
 
     Raises
     ------

@@ -212,11 +212,6 @@ def shrink_fit(
     Scene
         The rings, the slave first. The penalty is 1; a study chooses its own. The facts are the attributes of the
         problem and "outer_slave", 1 or 0; `RingStudy.from_case` reads them.
-
-    Raises
-    ------
-    MisuseError
-        If there is no such ring.
     """
     if slave not in SEGMENTS:
         raise MisuseError("slave", repr(slave), "'inner' or 'outer'")

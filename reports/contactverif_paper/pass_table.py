@@ -19,20 +19,7 @@ from contactverif_paper.patch_tests import FAILURE, PASSES, PRINTED_COLUMN, SILE
 from contactverif_reports.html.pages import number
 
 FAILS = 1e-2  # A stress error above this share of the pressure is a failure.
-FORMULATIONS = (
-    paper.NTS,
-    paper.NTS_AR,
-    paper.TWO_PASS,
-    paper.VTS_G,
-    paper.VTS_ME,
-    paper.BASIC,
-    paper.VTS_PPT,
-    paper.BALANCED,
-    paper.CHEN_HISADA,
-    paper.STS,
-    paper.MORTAR,
-    paper.DUAL,
-)
+FORMULATIONS = paper.ALL
 SCENES: Mapping[str, str] = {  # {scene: head of its column}
     "a1": "A1",
     "a2-uniform": "A2, uniform mesh",
