@@ -15,8 +15,8 @@ gains for a displacement of that node along x and along y.
 
 Rules for the next editor:
 
-1. `pair` makes all decisions and returns integers and booleans. `residual` decides nothing.
-2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
+1. `pair` makes all decisions and returns integers and booleans. `add_residual` decides nothing.
+2. `add_residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
 3. A kernel gets plain tuples and unpacks them in its first lines: numba reads them in half the time of named ones.
    `surfaces` are the reference positions (n_nodes, 2), slave and master segments (n, 2), and the master's neighbours
    (n, 2), −1 at a free end. `points` are the fields of `Points`. `options` are places c on a slave segment and shares
@@ -27,12 +27,14 @@ Rules for the next editor:
 Source: Zavarise & De Lorenzis (2009), Eqs. 6, A1–A12.
 """
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from contactverif.compiler import compile_inline, compile_kernel, compile_maker, compile_part
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
+from contactverif.contract.interface import Interface, join_rows, split_states
 from contactverif.geometry.block_rows import Csr, Fields, NumberArray, add_block, add_column, add_entry, add_row
 from contactverif.geometry.projection import (
     NO_PLACE,
@@ -131,20 +133,22 @@ def is_pressed(g: float, multipliers: FloatArray, i: int, penalty: float) -> boo
     return bool(multipliers[i] - penalty * g >= 0)
 
 
-def residual(x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields) -> tuple[Array, Array]:
-    """Compute forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers) at real or complex x.
-
-    `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
-    """
+def residual_of(add: Callable[..., None], interface: Interface, z: Array, arguments: Sequence[Fields]) -> Array:
+    """Return the forces and, behind them, the constraint rows that a kernel adds at the states z (..., n_unknowns)."""
+    x, multipliers = split_states(interface, z)
     forces, rows = np.zeros(x.shape, x.dtype), np.zeros(multipliers.shape, x.dtype)
-    _add_residual(forces, rows, x, multipliers, surfaces, points, options)
-    return forces, rows
+    add(forces, rows, x, multipliers, *arguments)
+    return join_rows(forces, rows, z)
 
 
 @compile_kernel
-def _add_residual(
+def add_residual(
     forces: Array, rows: Array, x: Array, multipliers: Array, surfaces: Fields, points: Fields, options: Fields
 ) -> None:
+    """Add the forces (n_states, n_nodes, 2) and the constraint rows (n_states, n_multipliers) at real or complex x.
+
+    `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
+    """
     reference, slave, master, _ = surfaces
     segment, other, slot, partner, active = points
     places, weights, area_from, penalty = options

@@ -26,13 +26,13 @@ import scipy
 from contactverif.compiler import match_precision
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, check_tau, choose
-from contactverif.contract.interface import Interface, join_rows, split_state, split_states
+from contactverif.contract.interface import Interface, split_state
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import NO_NODE, Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree
 from contactverif.geometry.threads import run_in_threads, share_couplings, split_range
 from contactverif_nts import vts_ppt_force, vts_ppt_tangent, walk
-from contactverif_nts.nts_force import AREAS, CURRENT
+from contactverif_nts.nts_force import AREAS, CURRENT, residual_of
 from contactverif_nts.point_contact import POINT_TRAITS, add_locking, place_points, surfaces_of, with_multipliers
 from contactverif_nts.walk import FREE_ENDS, Areas
 
@@ -97,9 +97,7 @@ class PatchTestPassing:
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns) of Box 3 and, behind them, the constraints of multipliers."""
-        x, multipliers = split_states(interface, z)
-        forces, rows = vts_ppt_force.residual(x, multipliers, *self._arguments(interface, pairing, z))
-        return join_rows(forces, rows, z)
+        return residual_of(vts_ppt_force.add_residual, interface, z, self._arguments(interface, pairing, z))
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> scipy.sparse.csr_array:
         """Compute the derivative of the residual; that of Eq. 6 alone where the preset is not consistent."""

@@ -38,7 +38,7 @@ from numpy.typing import ArrayLike
 from contactverif.compiler import TAKES_LONGDOUBLE, match_precision
 from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
 from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, check_tau, choose
-from contactverif.contract.interface import Interface, join_rows, split_state, split_states
+from contactverif.contract.interface import Interface, split_state
 from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
 from contactverif.geometry.block_rows import Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree
@@ -141,9 +141,7 @@ class PointContact:
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns) of Eq. 6 and, behind them, the constraints of multipliers."""
-        x, multipliers = split_states(interface, z)
-        forces, rows = nts_force.residual(x, multipliers, *self._arguments(interface, pairing, z))
-        return join_rows(forces, rows, z)
+        return nts_force.residual_of(nts_force.add_residual, interface, z, self._arguments(interface, pairing, z))
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> scipy.sparse.csr_array:
         """Compute the derivative of the residual, sparse."""

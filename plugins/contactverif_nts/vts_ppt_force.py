@@ -16,7 +16,7 @@ columns mean a penalty.
 Rules for the next editor:
 
 1. All decisions are in the pairing (`walk.Areas`). Nothing here compares real numbers.
-2. `residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
+2. `add_residual` takes float64 and complex128, so a number that starts as a constant gets the type of x first.
 3. A kernel gets plain tuples and unpacks them first; `nts_force` says why, and what `surfaces` are. `areas` are the
    fields of `walk.Areas`. `options` are n, the number of virtual slave nodes on a slave segment, PRINTED or BALANCED,
    whether lengths are measured in the current configuration, and the penalty.
@@ -26,8 +26,6 @@ Source: Zavarise & De Lorenzis (2009), Box 3, Eqs. 6, 8, 9.
 """
 
 from typing import NamedTuple
-
-import numpy as np
 
 from contactverif.compiler import compile_kernel, compile_part
 from contactverif.contract.arrays import Array, IntArray
@@ -69,20 +67,11 @@ class VirtualSlaveNode(NamedTuple):
     g: float  # the gap, negative in penetration
 
 
-def residual(x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields) -> tuple[Array, Array]:
-    """Compute forces (n_states, n_nodes, 2) and constraint rows (n_states, n_multipliers) at real or complex x.
-
-    `multipliers` (n_states, n_multipliers) have the type of x (n_states, n_nodes, 2), and no columns for a penalty.
-    """
-    forces, rows = np.zeros(x.shape, x.dtype), np.zeros(multipliers.shape, x.dtype)
-    _add_residual(forces, rows, x, multipliers, surfaces, areas, options)
-    return forces, rows
-
-
 @compile_kernel
-def _add_residual(
+def add_residual(
     forces: Array, rows: Array, x: Array, multipliers: Array, surfaces: Fields, areas: Fields, options: Fields
 ) -> None:
+    """Add forces and constraint rows, in the shapes of `nts_force.add_residual`."""
     reference, slave, master, neighbours = surfaces
     partner, first, last, cutting, cut_p, cut_q, clip_p, clip_q, active = areas
     n, transmission, current_area, penalty = options

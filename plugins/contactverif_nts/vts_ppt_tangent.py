@@ -1,4 +1,4 @@
-"""The exact tangent of VTS-PPT: the derivative of `vts_ppt_force.residual`, as Appendix A of the paper derives it.
+"""The exact tangent of VTS-PPT: the derivative of `vts_ppt_force.add_residual`, as Appendix A of the paper derives it.
 
 A coupling is the work that is done at once: all virtual slave nodes of a slave segment with all their master segments.
 Where this has too many nodes for a small dense matrix, a coupling is one virtual slave node, and if that still has too
@@ -16,7 +16,7 @@ node and one direction; Δω, Δg and many more are zero along t. What is frozen
 Ends of areas that master nodes cut are moved by further nodes. By the chain rule a force F then gains ∂F/∂c Δc, too,
 and ∂F/∂c is the variation in one more direction: c grows, and no node moves.
 
-The same sweep makes the forces, those of `vts_ppt_force.residual` up to roundoff.
+The same sweep makes the forces, those of `vts_ppt_force.add_residual` up to roundoff.
 
 Rules for the next editor:
 
