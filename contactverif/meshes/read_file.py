@@ -1,5 +1,6 @@
 """A mesh file is read in a child process: by a reader of our own, or by meshlane."""
 
+import gc
 import gzip
 import re
 from contextlib import redirect_stderr, redirect_stdout
@@ -33,6 +34,7 @@ _LONGEST_WARNING = 2000  # Characters of what a reader prints.
 
 def pack_mesh(path: str) -> bytes:
     """Return a mesh file as bytes, in a child process; one that cannot be read is a ValueError."""
+    gc.disable()  # This process ends with the file, and a deck makes millions of lists.
     with TemporaryDirectory() as folder:
         mesh = _read(_clean(Path(path), Path(folder)))
     return msgspec.msgpack.encode(
