@@ -238,7 +238,7 @@ class Driver:
         for subject in self._subjects:
             # A library is compiled, and its first call may be an endless loop.
             phase: Phase = "first call" if files_within(subject.name) else "first call (compiles)"
-            before = Progress(subject.name, "", phase, 0, 1, remark=_describe_no_traits(subject))
+            before = Progress(subject.name, "", phase, 0, 1, remark=_describe_no_traits(subject, self._stop))
             self._report(before)
             yield Job(judge.call_first, (subject, needs & subject.provides), partial(self._note_first, before, subject))
 
@@ -592,13 +592,14 @@ def _always_crashes(row: OpenRow) -> bool:
     return len(row.outcomes) > 1 and row.row.judged == n_crashed > 0 and bool(row.row.unexpected)
 
 
-def _describe_no_traits(subject: Subject) -> str:
+def _describe_no_traits(subject: Subject, stop: Stop) -> str:
     if isinstance(subject, EngineSubject) or subject.traits != Traits():
         return ""
     looked = ""
     if files := files_within(subject.name):
         looked = f" (looked for {files[0].stem}.toml and [tool.contactverif.traits.{files[0].stem}] in pyproject.toml)"
-    words = f"no traits found{looked}: nothing but the basic laws is held against it, and -x stops at nothing else"
+    words = f"no traits found{looked}: nothing but the basic laws is held against it"
+    words += ", and -x stops at nothing else" if stop == "failure" else ""
     return f'{subject.name}: {words}. To begin: tangent = "exact" and penalty = "nodal" or "distributed"'
 
 

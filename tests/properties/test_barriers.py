@@ -11,6 +11,7 @@ from zoo.at_points import LogBarrier
 from contactverif import Case, Interface, Rules, Subject, Traits, Verdict, judge_case, named_case
 from contactverif.contract.case import ACTIVATION, LEAST_GAP
 from contactverif.contract.property import CLOSED_CHAIN, Property
+from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.plugins.registry import property_ids
 from contactverif.problems.open_states import LARGEST, LEAST, fit_to_traits, least_distance
 from contactverif.run.judge import FirstCall, call_first
@@ -209,5 +210,5 @@ def test_a_barrier_that_states_no_activation_distance_is_not_called_for_the_firs
     assert call_first(Subject("silent", Silent), {"tangent"}) == FirstCall()
     called = call_first(Subject("barrier", LogBarrier), {"tangent"})
     assert called.answers is not None
-    assert not called.opposite_sign
-    assert call_first(Subject("pulls", PULLS), {"tangent"}).opposite_sign
+    assert not called.mistake
+    assert call_first(Subject("pulls", PULLS), {"tangent"}).mistake == OPPOSITE_SIGN
