@@ -353,6 +353,8 @@ def show_end(
         if advice:
             show(advice)
     show(f"Not complete: {end.missing}." if end.missing else last_line)
+    if isinstance(job.place, Interface):
+        typer.echo("Asked on the interface alone; no bodies were solved.")
     if not screen.quiet:
         print_isolation(result.provenance)
     if not end.complete:

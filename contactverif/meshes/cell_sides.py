@@ -63,7 +63,8 @@ class CellSides:
         if points.shape[1] == 2:
             for corners in plane_cells(cells).values():
                 x, y = np.moveaxis(points[corners] - points[corners[:, :1]], -1, 0)  # (n_cells, n_corners) each
-                twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+                with np.errstate(over="ignore", invalid="ignore"):  # Damaged coordinates are refused later.
+                    twice_area = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
                 turned = np.where(twice_area[:, None] < 0, corners[:, ::-1], corners)[twice_area != 0]
                 edges = np.stack([turned, np.roll(turned, -1, axis=1)], axis=-1).reshape(-1, 2)
                 sides.setdefault(SEGMENT, []).append(edges)

@@ -243,6 +243,7 @@ def test_a_mesh_of_which_no_scene_can_be_made_is_an_interface_and_the_reason_is_
     on_one_body = f"--mesh {path} --slave lid --master bottom"  # Both look away from the other body.
     answer = ask(f"verify vts-ppt {on_one_body} --flip -p units -p newton.units {FEW}")
     assert "contactverif: the interface alone is asked, no bodies are solved: " in answer.err
+    assert "Asked on the interface alone; no bodies were solved.\n" in answer.out
     assert "  elastic bodies: newton.units\n" in answer.out
 
 
