@@ -43,7 +43,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def run(project: Path) -> Run:
     """Return a run with a broken promise and a plugin that does not load."""
     result = verify([load_formulation("nts")], load_properties(["patch.flat.single"]), examples=2, seed=1)
-    rows = tuple(replace(row, promise=True) for row in result.rows)
+    rows = tuple(replace(row, promise=True, promised_by="single=True") for row in result.rows)
     return replace(result, rows=rows, not_loaded=(NotLoaded("gone", "50% of it, and: nothing"),))
 
 
