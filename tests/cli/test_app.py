@@ -75,7 +75,7 @@ def test_the_examples_of_the_help_parse(ask: Ask, line: str, tmp_path: Path, mon
     _, command, *words = shlex.split(line)
     answer = ask(command, *words, *(["--examples", "1", "-p", "purity"] if command == "verify" else []))
     assert "--help" not in answer.err
-    assert answer.status == 0 or re.search(r"(ppt.nc|punch.msh|'mine')", answer.err)
+    assert answer.status == 0 or re.search(r"(ppt.nc|punch.msh|deck.inp|'mine')", answer.err)
 
 
 def test_without_arguments_there_is_help(ask: Ask) -> None:
