@@ -23,7 +23,7 @@ MEGABYTE = 1 << 20
 
 def write(data):
     """Write to the line to the judge, which is the only socket here."""
-    for number in range(3, 50):
+    for number in range(3, 1000):
         with contextlib.suppress(OSError):
             if os.readlink(f"/proc/self/fd/{number}").startswith("socket"):
                 os.write(number, data)
@@ -58,7 +58,7 @@ class Dribbles(Springs):
     def residual(self, interface, pairing, z):
         write(struct.pack("<Q", 1000))
         for count in range(1000):
-            for number in range(3, 50):
+            for number in range(3, 1000):
                 with contextlib.suppress(OSError):  # The file of the progress is one of them.
                     os.pwrite(number, bytes([count % 256]), 0)
             write(b"\x91")

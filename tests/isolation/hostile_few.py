@@ -183,14 +183,14 @@ class LoadsLibrary(Springs):
 
 def write_everywhere(data):
     """Write to every open file of the process, so also to the line to the judge."""
-    for number in range(3, 50):
+    for number in range(3, 1000):
         with contextlib.suppress(OSError):
             os.write(number, data)
 
 
 def cut_everywhere():
     """Cut and fill every open file of the process, so also the one that tells how far it is."""
-    for number in range(3, 50):
+    for number in range(3, 1000):
         with contextlib.suppress(OSError):
             os.pwrite(number, b"\xff" * 100, 0)
             os.ftruncate(number, 0)

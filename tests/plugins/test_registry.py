@@ -212,7 +212,6 @@ def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
         ("number", "the entry point gives a int; needed a factory"),
         ("needing", "options of 'needing': found no order; needed order=VALUE"),
         ("twice", "formulation: found 'twice'; needed a formulation that twice wraps: twice/NAME"),
-        ("loads", "options of 'loads': found no file; needed file=VALUE"),
         ("twice/raising", "raising: make: RuntimeError: no licence"),
         ("twice/number", "number: the entry point gives a int"),
     ],
@@ -220,6 +219,12 @@ def test_a_wrapper_gets_a_factory_of_what_it_wraps() -> None:
 @pytest.mark.usefixtures("entries")
 def test_what_the_plugin_does_wrong_is_a_row(text: str, reason: str) -> None:
     assert reason in reason_of(load_formulation(text), text)
+
+
+@pytest.mark.usefixtures("entries")
+def test_a_loader_without_its_file_is_a_mistake_of_who_types_it() -> None:
+    with pytest.raises(MisuseError, match="options of 'loads': found no file; needed file=PATH"):
+        load_formulation("loads")
 
 
 @pytest.mark.parametrize("error", [ImportError("no module named x"), SystemExit(3), AttributeError("make")])

@@ -22,7 +22,9 @@ def run() -> Run:
     """Return a run with rows of all kinds: kept, stated to fail, failed without a promise, broken, not loaded."""
     result = verify([load_formulation("nts"), load_formulation("vts-ppt")], load_properties(IDS), examples=3, seed=1)
     rows = result.row_of
-    rows["nts", "patch.flat.single"] = replace(rows["nts", "patch.flat.single"], promise=True)
+    rows["nts", "patch.flat.single"] = replace(
+        rows["nts", "patch.flat.single"], promise=True, promised_by="patch.flat.single=True"
+    )
     absent = NotLoaded("gone", "no \x1b[31mmodule")
     return replace(result, rows=tuple(rows.values()), not_loaded=(absent,), opposite_signs=("vts-ppt",))
 
