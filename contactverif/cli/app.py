@@ -192,7 +192,7 @@ def _words_of_usage_error(error: Exception) -> str:
     words = format_message()
     if match := _BAD_VALUE.match(getattr(error, "message", "")):
         value = match[1] or repr(getattr(error.__cause__, "errors", list)()[0]["input"])
-        name = error.param.opts[0]  # type: ignore[attr-defined]
+        name = error.param.opts[0]  # type: ignore[attr-defined]  # A value that is wrong has a parameter.
         return str(MisuseError(name, value, match[2].replace("'", "").rstrip(".")))
     command_path = getattr(getattr(error, "ctx", None), "command_path", "contactverif")
     return f"{words} (see {command_path} --help)" if words else ""  # Without arguments typer has shown the help.

@@ -227,7 +227,8 @@ def read_place(options: RunOptions) -> Interface | Case | None:
         from contactverif.problems.catalogue import load_scene
 
         return load_scene(options.scene).case()
-    if options.mesh is None and (options.slave is None or options.master is None):
+    files = [name for name in (options.slave, options.master) if name is not None and Path(name).is_file()]
+    if options.mesh is None and len(files) < 2:
         for option in ("slave", "master", "pair", "flip", "material", "support"):
             if getattr(options, option):
                 raise MisuseError("--mesh", f"none, but --{option}", "--mesh FILE, which the groups belong to")

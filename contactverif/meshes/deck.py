@@ -365,6 +365,8 @@ def read_deck(path: str) -> PlainMesh:
             groups[keys[kind, label]] = group
         else:
             deck.warnings.append(f"{kind} {label} has no members that are read.")
+    if (unused := len(deck.points) - len({node for *_, nodes in deck.elements for node in nodes})) > 0:
+        deck.warnings.append(f"{unused} nodes belong to no element.")  # Of a deck that was cut, say.
     owners = Counter(name for _, name in {*deck.names.values()})
     for key, full_name in keys.items():
         if owners[deck.names[key][1]] == 1:

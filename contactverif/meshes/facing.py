@@ -22,8 +22,7 @@ def check_facing(interface: Interface) -> None:
         side, cells, elements, turn = "seen from outside its body", "volume", "faces", ""
     needed = (
         f"surfaces that face each other, each {side}. Keep the {cells} cells in the file, they tell the side{turn}; or "
-        f"give --flip where only one surface has cells beside it (it turns the {elements} without cells, and both "
-        "surfaces where neither or each has cells)"
+        f"give --flip where only one surface has cells beside it: it turns all {elements} without cells"
     )
     actual = f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other"
     raise MisuseError("--mesh", actual, needed)

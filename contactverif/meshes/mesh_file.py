@@ -42,7 +42,7 @@ def read_interface(
     pair : int
         The number of the contact pair, counted from 1; 0 for the only one.
     flip : bool
-        True reverses the chains, or the faces, without cells beside them, or all if every one has cells.
+        True reverses the chains, or the faces, without cells beside them.
 
     Returns
     -------
@@ -90,14 +90,14 @@ def read_sides(
     for option, name in names.items():
         if name not in mesh.groups:
             raise unknown_group_error(mesh, option, name, (*kinds, "vertex"))
-    if slave == master:
-        raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
     groups = {option: mesh.groups[str(name)] for option, name in names.items()}
     if points.shape[1] == 3 and any("line" in group for group in groups.values()):
         widths = " × ".join(f"{width:g}" for width in np.ptp(points[_find_used(mesh)], axis=0))
         raise MisuseError("--mesh", f"lines of a mesh of {widths}", "lines in a plane of two axes, or faces in space")
     cells = CellSides.collect(mesh.cells, points)
     sides = {option: _members(option, str(names[option]), group, cells) for option, group in groups.items()}
+    if np.array_equal(sides["--slave"], sides["--master"]):  # Under one name, or under a name and its number.
+        raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
     shared = np.intersect1d(sides["--slave"], sides["--master"])
     if len(shared):
         actual = f"a node of the slave surface too, at {describe(points[shared[0]])}"
@@ -107,11 +107,10 @@ def read_sides(
         neighbours = _neighbours(option, points, side)
         words += _chain_words(option, points, side, neighbours)
         oriented.append(_run_one_way(option, points, side, neighbours, cells.signs(option, side)))
-    # `flip` turns what has no cells beside it, or all if everything has some.
-    every = all(by_cells.all() for _, by_cells in oriented)
-    first, second = (
-        np.where((flip & (every | ~by_cells))[:, None], side[:, ::-1], side) for side, by_cells in oriented
-    )
+    if flip and all(by_cells.all() for _, by_cells in oriented):
+        needed = "no --flip: they say on which side each body lies"
+        raise MisuseError("--flip", "cells beside both surfaces", needed)
+    first, second = (np.where((flip & ~by_cells)[:, None], side[:, ::-1], side) for side, by_cells in oriented)
     interface = _interface(points, first, second)
     if places := back_to_back(points, first, second, cells.around(first, second)):
         if any(by_cells.any() for _, by_cells in oriented):

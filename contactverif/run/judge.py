@@ -182,12 +182,8 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
             mistake = ""
             if push < 0 and all(_push(subject, name) < 0 for name in others):
                 mistake = OPPOSITE_SIGN
-            elif (
-                push == 0
-                and subject.traits.rules.enforcement == "penalty"
-                and abs(_push(subject, name, apart=True)) > 0
-            ):
-                mistake = ACTS_APART
+            elif push == 0 and subject.traits.rules.enforcement == "penalty":
+                mistake = ACTS_APART if abs(_push(subject, name, apart=True)) > 0 else ""
             if "contact_points" in parts:  # Their kernels are compiled, too.
                 with suppress(ContractError):
                     formulation, case = subject.for_case(first.case), first.case
@@ -209,9 +205,8 @@ def _push(subject: Subject, state: str, *, apart: bool = False) -> float:
         pressure = case.penalty * case.parameter("penetration")  # Multipliers, if any, press.
         state_z = case.with_multipliers(np.full(formulation.n_multipliers(interface), pressure)).z.copy()
         x, y = case.parameters.get("direction", (0.0, 0.0))
-        normal = (
-            np.array([-y, x]) if interface.dim == PLANE else case.parameters["normal"]
-        )  # It points out of the master.
+        # It points out of the master.
+        normal = np.array([-y, x]) if interface.dim == PLANE else case.parameters["normal"]
         slave = slice(interface.n_slave_nodes * interface.dim)
         if apart:
             state_z[slave] += np.tile(2 * case.parameter("penetration") * normal, interface.n_slave_nodes)

@@ -150,7 +150,7 @@ class RunOptions:
     ] = None
     master: Annotated[str | None, Option("Master: as the slave.", "GROUP", group=PLACE)] = None
     pair: Annotated[int, Option("Number of the contact pair of the mesh, if it has several.", "N", group=PLACE)] = 0
-    flip: Annotated[bool, Option("Exchange inside and outside of the mesh's lines.", group=PLACE)] = False
+    flip: Annotated[bool, Option("Exchange inside and outside of sides without cells.", group=PLACE)] = False
     material: Annotated[
         tuple[str, ...],
         Option("Material of the body of a group of the mesh. (default: 1,0.3) Repeatable.", "GROUP=E,ν", group=PLACE),

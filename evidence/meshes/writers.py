@@ -145,7 +145,8 @@ def by_kratos(scene: Scene, name: str) -> None:
         sub, end = part.CreateSubModelPart(group), f"{scene.dim}D{nodes.shape[1]}N"
         sub.AddNodes((np.unique(nodes) + 1).tolist())
         condition = ("Line" if kind == "line" else "Surface") + "Condition" + end
-        for count, row in enumerate((nodes + 1).tolist(), count + 1):  # noqa: B020
+        for row in (nodes + 1).tolist():
+            count += 1
             create = sub.CreateNewCondition if group in NAMES else sub.CreateNewElement
             create(condition if group in NAMES else f"Element{end}", count, row, part.GetProperties()[1])
     Kratos.ModelPartIO(str(FOLDER / f"kratos-{name}"), Kratos.IO.WRITE).WriteModelPart(part)

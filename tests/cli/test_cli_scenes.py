@@ -239,9 +239,11 @@ def test_a_mesh_with_cells_is_a_scene_and_the_screen_says_what_is_not_asked(ask:
 
 
 def test_a_mesh_of_which_no_scene_can_be_made_is_an_interface_and_the_reason_is_said(ask: Ask, tmp_path: Path) -> None:
-    path = write_curved_bodies(tmp_path / "curved.msh")
-    on_one_body = f"--mesh {path} --slave lid --master bottom"  # Both look away from the other body.
-    answer = ask(f"verify vts-ppt {on_one_body} --flip -p units -p newton.units {FEW}")
+    points = np.array([[0, 0.1, 0], [1, 0.1, 0], [2, 0, 0], [1, 0, 0], [-1, 0, 0]])
+    lines = meshlane.Mesh(points, [("line", [[0, 1], [2, 3], [3, 4]])], cell_data={"side": [np.array([1, 2, 2])]})
+    lines.write(tmp_path / "lines.vtu")  # Without cells.
+    on_lines = f"--mesh {tmp_path / 'lines.vtu'} --slave side=1 --master side=2"
+    answer = ask(f"verify vts-ppt {on_lines} -p units -p newton.units {FEW}")
     assert "contactverif: the interface alone is asked, no bodies are solved: " in answer.err
     assert "Asked on the interface alone; no bodies were solved.\n" in answer.out
     assert "  elastic bodies: newton.units\n" in answer.out

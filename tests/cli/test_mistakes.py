@@ -47,6 +47,7 @@ MISTAKES = {  # {command line: argument, found, needed}
     f"verify nts --mesh {PUNCH} --slave punch --master punch": r"--master: found 'punch', which is the slave too; .*",
     "verify nts --slave punch": r"--mesh: found none, but --slave; needed --mesh FILE, .*",
     "verify nts --master base": r"--mesh: found none, but --master; needed --mesh FILE, .*",
+    "verify nts --slave punch --master base": r"--mesh: found none, but --slave; needed --mesh FILE, .*",
     "verify nts --flip": r"--mesh: found none, but --flip; needed --mesh FILE, .*",
     "verify nts --material base=1,0.3": r"--mesh: found none, but --material; needed --mesh FILE, .*",
     "verify nts --support lid=0,0": r"--mesh: found none, but --support; needed --mesh FILE, .*",
