@@ -56,6 +56,7 @@ class Interrupts:
                 pass
 
 sys.meta_path.insert(0, Interrupts())
+signal.signal({number}, signal.SIG_DFL)  # What a shell starts in its background ignores Ctrl-C.
 from contactverif.cli import main
 main()
 """
