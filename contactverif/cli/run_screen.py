@@ -125,7 +125,7 @@ def summary(run: Run, *, quiet: bool = False, status: int | None = None) -> Text
                 reason = next(row.reason for row in run.rows if row.omitted)
                 named = "" if sentences else f": {reason.removeprefix(results.OMITTED).partition(': ')[0]}"
             sentences.append(f"{len(names)} {words[len(names) > 1]}{named}.")
-    return Text(" ".join(sentences) or "Nothing was checked.", style="red")
+    return Text(" ".join(sentences) or results.NOTHING_JUDGED, style="red")
 
 
 def _list(names: Sequence[str], most: int = _MOST_NAMES) -> str:

@@ -234,7 +234,7 @@ class CaseSummary:
 
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-OWN_MESHES = "own meshes with a known answer"
+MADE_MESHES = "meshes with a known answer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +262,7 @@ class Cases:
     make: Callable[..., Any]
     is_list: bool = False
     on_place: Callable[[Any], Any] | None = None
-    needs: str = OWN_MESHES
+    needs: str = MADE_MESHES
     faces: tuple[int, ...] = ()
 
     @classmethod
@@ -277,7 +277,10 @@ class Cases:
 
     @classmethod
     def from_list(
-        cls, make: Callable[[], tuple[Case, ...]], on_place: Callable[[Any], Any] | None = None, needs: str = OWN_MESHES
+        cls,
+        make: Callable[[], tuple[Case, ...]],
+        on_place: Callable[[Any], Any] | None = None,
+        needs: str = MADE_MESHES,
     ) -> Cases:
         """Return a list of cases, each with a name of its own; tables and reports call it by that name.
 
@@ -330,4 +333,4 @@ def name_of_source(function: Callable[..., Any]) -> str:
 
 def needs_of_place(function: Callable[..., Any]) -> str:
     """Return the stored words about what a function that makes cases needs of an interface or a scene."""
-    return str(getattr(function, "needs", "") or OWN_MESHES)
+    return str(getattr(function, "needs", "") or MADE_MESHES)

@@ -44,6 +44,7 @@ WRONG_TRAITS = "wrong traits"
 NOT_HERE = "needs "  # The beginning of the reason of a row without cases on the place of the run.
 OF_TRAITS = "traits: "  # The beginning of the reason of a row whose traits name no witness that can be judged.
 OF_TANGENT = "; and of the tangent: "  # Between the diagnosis of the forces and that of the tangent.
+NOTHING_JUDGED = "Nothing was judged: no property applies."
 OPPOSITE_SIGN = (
     "your forces have the opposite sign: contact must push the slave along the master's outward normal; "
     "see docs/concepts/signs.md"
@@ -510,8 +511,9 @@ class Run:
 
     @property
     def promises_kept(self) -> bool:
-        """Return whether every promise is kept, every property judged, every plugin loaded, and every sign right."""
-        return bool(self.rows) and not (self.not_loaded or self.unexpected or self.opposite_signs)
+        """Return whether all promises are kept, properties judged, at least one, plugins loaded, and signs right."""
+        asked = any(row.verdict not in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED) for row in self.rows)
+        return asked and not (self.not_loaded or self.unexpected or self.opposite_signs)
 
     def count(self, *results: Result) -> int:
         """Return the number of rows with one of these results."""
@@ -542,8 +544,9 @@ class Run:
 
     @property
     def promises(self) -> str:
-        """The numbers of rows by promise, in a sentence; a property that makes no sense for a formulation is none."""
-        counts = Counter(row.promise for row in self.rows if row.verdict is not Verdict.NOT_APPLICABLE)
+        """The numbers of rows by promise, in a sentence; traits of the method, and what does not apply, are none."""
+        rows = (row for row in self.rows if row.verdict is not Verdict.NOT_APPLICABLE and not row.is_trait)
+        counts = Counter(row.promise for row in rows)
         return f"Properties promised to pass: {counts[True]}, to fail: {counts[False]}, neither: {counts[None]}."
 
     def only(self, property_ids: Collection[str]) -> Run:

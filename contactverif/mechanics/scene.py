@@ -22,7 +22,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import BODIES, Case
 from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import Interface, Surface, ways_to_master
 from contactverif.mechanics.bulk import (
     CACHE_SIZE,
     DENSE_LIMIT,
@@ -182,8 +182,8 @@ class Scene:
         for body in self.bodies:
             if loose := loose_modes(body):
                 needed = "fixed components that prevent it (contact without friction does not)"
-                supports = "no supports" if not body.fixed.any() else "supports"
-                raise MisuseError(f"supports of {body.name}", f"{supports}: it can {' and '.join(loose)}", needed)
+                found = "too few" if body.fixed.any() else "none"
+                raise MisuseError(f"supports of {body.name}", f"{found}: it can {' and '.join(loose)}", needed)
 
     @cached_property
     def bodies_in_reach(self) -> tuple[int, ...]:
@@ -402,18 +402,41 @@ class Scene:
         """Return the scene as plain arrays, which any contact code can read, see `pose`."""
         return self.pose(upright=upright, lowered=lowered).arrays
 
+    def gap_at_rest(self) -> float:
+        """Return the least way between a node of one side and the other side, where bodies move and nothing presses.
+
+        It is a length: −infinity where the supports alone do not hold all bodies, infinity where no node sees the other
+        side.
+        """
+        free = [_move_freely(body, 1.0) for body in self.condensed_bodies]
+        if any(part is None for part in free):
+            return -np.inf
+        positions = self.positions(np.concatenate([np.zeros(0), *(part for part in free if part is not None)]))
+        there = replace(self.interface, nodes=positions.reshape(-1, 2))
+        return float(min(ways_to_master(each)[0].min() for each in (there, there.swap_roles())))
+
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""
         unknowns = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
         condensed = tuple(map(condense, self.bodies))
         for number, body in enumerate(condensed):
             if number not in unknowns and len(body.unknowns):
-                stiffnesses, modes = linalg.eigh(body.stiffness)
-                if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
+                if (free := _move_freely(body, factor)) is None:
                     actual = "not enough to hold a body that can touch nothing"
                     raise MisuseError(f"supports of {body.body.name}", actual, "supports against every motion")
-                unknowns[number] = modes @ (modes.T @ (factor * body.load) / stiffnesses)
+                unknowns[number] = free
         return [(body, unknowns.get(number, np.zeros(0))) for number, body in enumerate(condensed)]
+
+
+def _move_freely(body: CondensedBody, factor: float) -> FloatArray | None:
+    """Return the unknowns of a body that touches nothing, for a share of its loads; None if its supports are loose."""
+    if not len(body.unknowns):
+        return np.zeros(0)
+    stiffnesses, modes = linalg.eigh(body.stiffness)
+    if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
+        return None
+    unknowns: FloatArray = modes @ (modes.T @ (factor * body.load) / stiffnesses)
+    return unknowns
 
 
 def has_bodies(case: Case) -> bool:

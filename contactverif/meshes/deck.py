@@ -38,7 +38,11 @@ _SETS = {"SURFACE": "NAME", "ELSET": "ELSET", "NSET": "NSET"}  # {card: the para
 _LEVELS = {"PART", "INSTANCE", "ASSEMBLY", "ENDPART", "ENDINSTANCE", "ENDASSEMBLY"}
 _MESH_CARDS = {"NODE", "ELEMENT", *_SETS, *_LEVELS}
 _PARAMETERS = {"NAME", "TYPE", "PART", "INPUT", "SYSTEM", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", *_SETS}
-_OTHER_CARDS = {"CONTACTPAIR", "MATERIAL", "ELASTIC", "SOLIDSECTION"}  # No parameter of these moves a surface.
+_PAIRS = {"CONTACTPAIR", "CONTACTINCLUSIONS", "TIE"}  # The others count where there is no *CONTACT PAIR.
+_OTHER_CARDS = {*_PAIRS, "MATERIAL", "ELASTIC", "SOLIDSECTION"}  # No parameter of these moves a surface.
+# What is not told: output, steps, and laws of the contact, for which the formulation is.
+_QUIET = re.compile(r"HEADING|PREPRINT|RESTART|.*(PRINT|FILE|OUTPUT)|(END)?STEP|STATIC|SURFACE(INTERACTION|BEHAVIOR)")
+_LOADS = {"BOUNDARY", "CLOAD", "DLOAD", "DSLOAD"}
 _REFUSED = "NCOPY NGEN NFILL NMAP ELGEN ELCOPY SYSTEM IMPERFECTION ADJUST PARAMETER IMPORT REFINEMESH INCLUDE"
 _DEEPEST, _MOST_FILES, _LONGEST = 20, 1000, 10**7  # Sets in sets and files in files; files; a range of numbers.
 # A keyword line goes on behind a comma if there are parameters; data may follow such a comma too.
@@ -115,7 +119,8 @@ def _expand(path: str, files: list[str], depth: int = 0) -> str:
 
 def _read_cards(text: str, warnings: list[str]) -> tuple[list[_Card], dict[str, _Card]]:
     """Return the cards that are read, those of a part once for each instance; and the instances by name."""
-    cards, parts, instances, skipped = list[_Card](), dict[str, list[_Card]](), dict[str, _Card](), list[str]()
+    cards, parts, instances = list[_Card](), dict[str, list[_Card]](), dict[str, _Card]()
+    skipped, loads = list[str](), list[str]()
     before, *blocks = _KEYWORD.split(text)
     current, name, line = cards, "", 1 + before.count("\n")
     _Card("", {}, "", 1).need(not before.strip(), "text before the first keyword; needed a deck, such as *NODE first")
@@ -144,12 +149,16 @@ def _read_cards(text: str, warnings: list[str]) -> tuple[list[_Card], dict[str, 
             cards += [replace(each, instance=name, prefix=_label(name)) for each in parts[part]]
         elif keyword in _MESH_CARDS | _OTHER_CARDS:
             current.append(card)
-        else:
-            skipped.append(f"*{keyword}")
+        elif keyword in _LOADS:
+            loads.append(f"*{keyword}")
+        elif not _QUIET.fullmatch(keyword):
+            skipped.append(f"*{' '.join(title.upper().split())}")
         if keyword in _MESH_CARDS:
             skipped += [f"{key} of *{keyword}" for key in parameters if key not in _PARAMETERS]
     skipped += [f"the part {part}" for part in parts.keys() - {card.label("PART") for card in instances.values()}]
     warnings += [f"Not read: {', '.join(dict.fromkeys(skipped))}."] if skipped else []
+    if loads:
+        warnings.append(f"Supports and loads are not those of the deck ({', '.join(dict.fromkeys(loads))}).")
     return cards, instances
 
 
@@ -186,7 +195,11 @@ class _Deck:
                 if card.keyword == keyword == "NODE":
                     self._add(card, "NSET", self._read_nodes(card))
                 elif card.keyword == keyword == "ELEMENT":
-                    self._add(card, "ELSET", self._read_elements(card))
+                    elements = self._read_elements(card)
+                    self._add(card, "ELSET", elements)
+                    if card.instance:  # It is a group, too.
+                        of_all = replace(card, parameters={"ELSET": card.instance[:-1]}, prefix="", instance="")
+                        self._add(of_all, "ELSET", elements)
                 elif card.keyword == keyword:
                     card.label(_SETS[keyword])
                     self._add(card, keyword, card)
@@ -371,17 +384,20 @@ def read_deck(path: str) -> PlainMesh:
     for key, full_name in keys.items():
         if owners[deck.names[key][1]] == 1:
             groups.setdefault(deck.names[key][1], groups[full_name])
-    pairs, laws, sections, material = list[tuple[str, str]](), dict[str, tuple[float, float]](), dict[str, str](), ""
+    pairs, others = list[tuple[str, str]](), list[tuple[str, str]]()
+    laws, sections, material = dict[str, tuple[float, float]](), dict[str, str](), ""
     for card in deck.cards:
         rows = card.rows() if card.keyword in _OTHER_CARDS else []
-        if card.keyword == "CONTACTPAIR":
+        if card.keyword in _PAIRS:
             for line, fields in rows:
                 if len(fields) == 1:
                     deck.warnings.append(f"Not read: the contact of {fields[0]} with itself.")
                     continue
                 names = [keys.get(("SURFACE", card.prefix + _label(text)), "") for text in fields[:2]]
-                card.need(all(names), f"{', '.join(fields)}; needed two surfaces, the slave first", line)
-                pairs.append((names[0], names[1]))
+                is_pair = card.keyword == "CONTACTPAIR"
+                card.need(all(names) or not is_pair, f"{', '.join(fields)}; needed two surfaces, the slave first", line)
+                if all(names):
+                    (pairs if is_pair else others).append((names[0], names[1]))
             deck.warnings += ["*CONTACT PAIR: ADJUST is not read; no node is moved."] * ("ADJUST" in card.parameters)
         elif card.keyword == "MATERIAL":
             material = card.label("NAME")
@@ -395,7 +411,7 @@ def read_deck(path: str) -> PlainMesh:
         points=deck.places if deck.places[:, 2].any() else deck.places[:, :2],
         cells=deck.cells(range(len(deck.elements))),
         groups=groups,
-        pairs=tuple(pairs),
+        pairs=tuple(pairs or others),
         materials={name: laws[law] for name, law in sections.items() if law in laws},
         warnings="".join(f"{text}\n" for text in dict.fromkeys(deck.warnings)),
     )

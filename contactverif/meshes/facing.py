@@ -11,24 +11,19 @@ _RAYS = 50  # So many elements of a surface look behind them.
 
 def check_facing(interface: Interface) -> None:
     """Refuse two surfaces whose mean normals, weighted by length or area, do not oppose each other."""
-    slave, master = (_mean_normal(surface, interface.nodes) for surface in (interface.slave, interface.master))
+    slave, master = (mean_direction(surface, interface.nodes) for surface in (interface.slave, interface.master))
     if slave is None or master is None or slave @ master < 0:
         return
     words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in (slave, master)]
-    if interface.dim == 2:
-        side, cells, elements = "with its body on the left of its lines", "2-D", "lines"
-        turn = "; or turn the lines of one group in the mesher (Gmsh: a minus sign before its curves)"
-    else:
-        side, cells, elements, turn = "seen from outside its body", "volume", "faces", ""
     needed = (
-        f"surfaces that face each other, each {side}. Keep the {cells} cells in the file, they tell the side{turn}; or "
-        f"give --flip where only one surface has cells beside it: it turns all {elements} without cells"
+        "surfaces that face each other. The cells beside a side tell where its body is: keep them, or turn a side "
+        "that has none with --flip slave or --flip master"
     )
     actual = f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other"
     raise MisuseError("--mesh", actual, needed)
 
 
-def _mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray | None:
+def mean_direction(surface: Surface, nodes: FloatArray) -> FloatArray | None:
     """Return the mean normal (dim,) out of the body; None where the surface is closed, or nearly so in space."""
     if nodes.shape[1] == 3:
         turns = turns_of(nodes[surface.faces]).sum(axis=1)

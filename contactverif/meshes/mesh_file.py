@@ -8,6 +8,7 @@ command line.
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -15,15 +16,21 @@ from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SEGMENT, Interface, Surface
 from contactverif.meshes.cell_sides import CellSides
-from contactverif.meshes.facing import back_to_back, check_facing, describe
-from contactverif.meshes.plain_mesh import CORNERS, Group, PlainMesh, read_mesh, unknown_group_error
+from contactverif.meshes.facing import back_to_back, check_facing, describe, mean_direction
+from contactverif.meshes.plain_mesh import CORNERS, PlainMesh, find_group, read_mesh
 
+Flip = Literal["slave", "master", "both"]
 FLAT = 1e-9  # A mesh is plane if z varies by at most this share of its size: nine digits or more are exact enough.
 _FACE_KINDS = ("triangle", "quad")
 
 
 def read_interface(
-    path: str | Path | None, *, slave: str | None = None, master: str | None = None, pair: int = 0, flip: bool = False
+    path: str | Path | None,
+    *,
+    slave: str | None = None,
+    master: str | None = None,
+    pair: int = 0,
+    flip: Flip | None = None,
 ) -> Interface:
     """Read the interface between two groups of 2-node lines, or of faces in space, from a mesh file.
 
@@ -41,8 +48,8 @@ def read_interface(
         of a contact pair of the file.
     pair : int
         The number of the contact pair, counted from 1; 0 for the only one.
-    flip : bool
-        True reverses the chains, or the faces, without cells beside them.
+    flip : {"slave", "master", "both"} | None
+        The side whose chains, or faces, are reversed, if no cells are beside them.
 
     Returns
     -------
@@ -78,7 +85,7 @@ class MeshSides:
 
 
 def read_sides(
-    path: str | Path | None, *, slave: str | None, master: str | None, pair: int = 0, flip: bool = False
+    path: str | Path | None, *, slave: str | None, master: str | None, pair: int = 0, flip: Flip | None = None
 ) -> MeshSides:
     """Read the lines or faces of two groups, oriented; arguments and errors are those of `read_interface`."""
     mesh = read_mesh(path) if path is not None else _two_files(slave, master)
@@ -86,38 +93,58 @@ def read_sides(
         slave, master = _pair(mesh, pair)
     points, remark = find_plane(mesh)
     kinds = ("line",) if points.shape[1] == 2 else _FACE_KINDS
-    names = {"--slave": slave, "--master": master}
-    for option, name in names.items():
-        if name not in mesh.groups:
-            raise unknown_group_error(mesh, option, name, (*kinds, "vertex"))
-    groups = {option: mesh.groups[str(name)] for option, name in names.items()}
+    typed = {"--slave": slave, "--master": master}
+    names = {option: find_group(mesh, option, name, (*kinds, "vertex")) for option, name in typed.items()}
+    groups = {option: mesh.groups[name] for option, name in names.items()}
     if points.shape[1] == 3 and any("line" in group for group in groups.values()):
         widths = " × ".join(f"{width:g}" for width in np.ptp(points[_find_used(mesh)], axis=0))
         raise MisuseError("--mesh", f"lines of a mesh of {widths}", "lines in a plane of two axes, or faces in space")
     cells = CellSides.collect(mesh.cells, points)
-    sides = {option: _members(option, str(names[option]), group, cells) for option, group in groups.items()}
+    sides = {option: _members(option, name, mesh, cells) for option, name in names.items()}
     if np.array_equal(sides["--slave"], sides["--master"]):  # Under one name, or under a name and its number.
         raise MisuseError("--master", f"{master!r}, which is the slave too", "another group than --slave")
     shared = np.intersect1d(sides["--slave"], sides["--master"])
     if len(shared):
         actual = f"a node of the slave surface too, at {describe(points[shared[0]])}"
         raise MisuseError("--master", actual, "surfaces without a common node: two nodes where the bodies touch")
-    oriented, words = [], mesh.warnings + remark
-    for option, side in sides.items():
-        neighbours = _neighbours(option, points, side)
-        words += _chain_words(option, points, side, neighbours)
-        oriented.append(_run_one_way(option, points, side, neighbours, cells.signs(option, side)))
-    if flip and all(by_cells.all() for _, by_cells in oriented):
-        needed = "no --flip: they say on which side each body lies"
-        raise MisuseError("--flip", "cells beside both surfaces", needed)
-    first, second = (np.where((flip & ~by_cells)[:, None], side[:, ::-1], side) for side, by_cells in oriented)
+    (first, slave_is_known, of_slave), (second, master_is_known, of_master) = (
+        _orient(option, points, side, cells, flip) for option, side in sides.items()
+    )
     interface = _interface(points, first, second)
+    words = mesh.warnings + remark + of_slave + of_master
+    surfaces = (interface.slave, slave_is_known), (interface.master, master_is_known)
+    for option, (surface, is_known) in zip(sides, surfaces, strict=True):
+        if not is_known.all():
+            normal = mean_direction(surface, interface.nodes)
+            place = "on the left of its lines" if normal is None else f"towards {describe(0.0 - normal.round(3))}"
+            words += f"{option}: no cells beside it; its body is taken to lie {place} (--flip {option[2:]} turns it)\n"
     if places := back_to_back(points, first, second, cells.around(first, second)):
-        if any(by_cells.any() for _, by_cells in oriented):
+        if slave_is_known.any() or master_is_known.any():
             needed = "two surfaces of which each is before the other"
             raise MisuseError("--mesh", f"{places}, with their bodies between them", needed)
         words += f"{places} turn their backs to each other, or overlap by more than a line's length\n"
     return MeshSides(mesh, points, first, second, interface, words)
+
+
+def _orient(
+    option: str, points: FloatArray, side: IntArray, cells: CellSides, flip: Flip | None
+) -> tuple[IntArray, BoolArray, str]:
+    """Return lines or faces with the body behind each, for which of them a cell shows it, and what is to be told."""
+    neighbours = _neighbours(option, points, side)
+    words = _chain_words(option, points, side, neighbours)
+    one_way, by_cells = _run_one_way(option, points, side, neighbours, cells.signs(option, side))
+    if n_turned := int((one_way[~by_cells] != side[~by_cells]).any(axis=1).sum()):
+        words += f"{option}: {n_turned} of its {len(side)} {_word(side)} are turned to run as the first one\n"
+    if flip in (option[2:], "both"):
+        if by_cells.all():
+            needed = "a side without cells: they say on which side a body lies"
+            raise MisuseError("--flip", f"{flip}, and cells beside all {_word(side)} of the {option[2:]}", needed)
+        one_way = np.where(by_cells[:, None], one_way, one_way[:, ::-1])
+    return one_way, by_cells, words
+
+
+def _word(elements: IntArray) -> str:
+    return "lines" if elements.shape[1] == SEGMENT else "faces"
 
 
 def _interface(points: FloatArray, slave: IntArray, master: IntArray) -> Interface:
@@ -189,8 +216,9 @@ def _find_used(mesh: PlainMesh) -> IntArray:
     return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *numbers]))  # Others may lie outside the plane.
 
 
-def _members(option: str, name: str, group: Group, cells: CellSides) -> IntArray:
+def _members(option: str, name: str, mesh: PlainMesh, cells: CellSides) -> IntArray:
     """Return the nodes of the lines of a group, in space of its faces (n, n_corners), in the order of the file."""
+    group = mesh.groups[name]
     kinds = ("line",) if cells.points.shape[1] == 2 else _FACE_KINDS
     elements = [group[kind] for kind in kinds if len(group.get(kind, ()))]
     listed = f"{name!r} with elements {', '.join(sorted(group)) or 'none'}"
@@ -206,9 +234,15 @@ def _members(option: str, name: str, group: Group, cells: CellSides) -> IntArray
         raise MisuseError(option, listed, f"{needed} (Gmsh: recombine a whole surface, or none)")
     if not elements:
         more = " (by its number, where a group of cells has the same name)" if len(kinds) == 1 else ""
-        raise MisuseError(option, listed, f"a group of {needed}{more}, or of nodes on the boundary of cells")
+        nodes = np.concatenate([np.empty(0, dtype=np.int64), *(data.reshape(-1) for data in group.values())])
+        sides = {each: [other[kind] for kind in kinds if kind in other] for each, other in mesh.groups.items()}
+        near = [
+            repr(each) for each, parts in sides.items() if parts and all(np.isin(part, nodes).all() for part in parts)
+        ]
+        more += f": {' or '.join(near)}" if near else ", or of nodes on the boundary of cells"
+        raise MisuseError(option, listed, f"a group of {needed}{more}")
     if len(np.unique(np.sort(elements[0]), axis=0)) < len(elements[0]):
-        word = "line" if len(kinds) == 1 else "face"
+        word = _word(elements[0])[:-1]
         raise MisuseError(option, f"the same {word} twice", f"each {word} once")
     return elements[0]
 

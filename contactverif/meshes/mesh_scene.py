@@ -21,8 +21,8 @@ from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
 from contactverif.meshes.cell_sides import label_bodies, plane_cells
 from contactverif.meshes.facing import describe
-from contactverif.meshes.mesh_file import MeshSides, read_sides
-from contactverif.meshes.plain_mesh import unknown_group_error
+from contactverif.meshes.mesh_file import Flip, MeshSides, read_sides
+from contactverif.meshes.plain_mesh import find_group
 
 YOUNG, POISSON = 1.0, 0.3  # The material of a body that the user says nothing about.
 STIFFNESS = 1.0  # The distributed stiffness ε̂ h / E of a scene, soft enough for Newton's method on bent surfaces.
@@ -41,7 +41,7 @@ def read_scene(
     slave: str | None = None,
     master: str | None = None,
     pair: int = 0,
-    flip: bool = False,
+    flip: Flip | None = None,
     materials: Mapping[str, Material] | None = None,
     supports: Mapping[str, Support] | None = None,
 ) -> Scene:
@@ -58,7 +58,7 @@ def read_scene(
         As in `read_interface`.
     pair : int
         As in `read_interface`.
-    flip : bool
+    flip : {"slave", "master", "both"} | None
         As in `read_interface`.
     materials : Mapping[str, tuple[float, float]] | None
         {group: (Young's modulus, Poisson's ratio)}. The bodies to which members of the group belong have this
@@ -103,6 +103,11 @@ def scene_of(sides: MeshSides, materials: Mapping[str, Material], supports: Mapp
     if not any(part.imposed.any() for part in parts):
         _push_slaves(parts, scene)
         scene = _scene(parts)
+    if any(part.has_supports for part in parts) and (gap := scene.gap_at_rest()) >= 0:
+        actual = (
+            f"supports that leave the bodies {abs(gap):.3g} apart" if np.isfinite(gap) else "supports past the contact"
+        )
+        raise MisuseError("--support", actual, "supports that move slave and master onto each other")
     return scene
 
 
@@ -179,9 +184,8 @@ def _one_shape(blocks: list[IntArray]) -> IntArray:
 
 def _points_of_group(sides: MeshSides, option: str, name: str) -> IntArray:
     """Return the points of all members of a group."""
-    if name not in sides.mesh.groups:
-        raise unknown_group_error(sides.mesh, option, name)
-    return np.unique(np.concatenate([data.reshape(-1) for data in sides.mesh.groups[name].values()]))
+    group = sides.mesh.groups[find_group(sides.mesh, option, name)]
+    return np.unique(np.concatenate([data.reshape(-1) for data in group.values()]))
 
 
 def _set_materials(sides: MeshSides, parts: list[_Part], materials: Mapping[str, Material], *, given: bool) -> None:

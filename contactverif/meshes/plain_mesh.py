@@ -50,7 +50,8 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
         packed = read_in_child("contactverif.meshes.read_file:pack_mesh", os.path.abspath(name), limits_for(size))
         return _unpack(msgspec.msgpack.decode(packed, type=PackedMesh))
     except ReadError as error:
-        raise MisuseError("--mesh", f"{name!r}, which cannot be read ({error})", _KNOWN_FILES) from error
+        found, _, needed = str(error).partition("; needed ")  # Our own readers say what is needed.
+        raise MisuseError("--mesh", f"{name!r}, which cannot be read ({found})", needed or _KNOWN_FILES) from error
     except (msgspec.DecodeError, ValueError) as error:
         raise MisuseError("--mesh", f"{name!r} with {error}", "a mesh whose parts fit each other") from error
 
@@ -96,10 +97,14 @@ def _whole(kind: str, packed: PackedArray, n_points: int) -> IntArray:
     return data.astype(np.int64)
 
 
-def unknown_group_error(
-    mesh: PlainMesh, option: str, name: str | None, kinds: Collection[str] = CORNERS
-) -> MisuseError:
-    """Return the error for a group that the file does not have; it names near groups, and those of some kinds."""
+def find_group(mesh: PlainMesh, option: str, name: str | None, kinds: Collection[str] = CORNERS) -> str:
+    """Return the name of a group as the file has it, if need be in other capitals.
+
+    The error for a group that the file does not have names near groups, and those with elements of some kinds.
+    """
+    alike = [each for each in mesh.groups if each.casefold() == (name or "").casefold()]
+    if name in alike or len(alike) == 1:
+        return name if name in alike else alike[0]
     able = {each: group for each, group in mesh.groups.items() if not group.keys().isdisjoint(kinds)}
     by_case = {each.casefold(): each for each in able}
     near = [repr(by_case[each]) for each in get_close_matches((name or "").casefold(), by_case)]
@@ -113,4 +118,4 @@ def unknown_group_error(
     needed = f"{' or '.join(near)}? The groups are {listed}" if near else f"one of {listed}" if able else listed
     remark = f" ({one_line(mesh.warnings, _LONGEST_REASON)})" if mesh.warnings else ""
     actual = "nothing" if name is None else f"{name!r}, which is no group of the file"
-    return MisuseError(option, actual, needed + remark)
+    raise MisuseError(option, actual, needed + remark)

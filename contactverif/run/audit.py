@@ -16,7 +16,7 @@ from contactverif.contract.subject import Subject
 from contactverif.plugins.provenance import CODE, code_digests, collect_versions, machine
 from contactverif.plugins.registry import files_within
 from contactverif.run.recheck import Sample, choose_share, judge_again, judge_samples
-from contactverif.run.rows import OpenRow, find_missing_cases, find_missing_row, open_row, verdict_of_row
+from contactverif.run.rows import OpenRow, find_missing_cases, find_missing_row, judge_row, open_row
 from contactverif.run.run import Driver
 from contactverif.run.scheduler import Scheduler
 from contactverif.run.store import WITNESS, Store
@@ -62,7 +62,7 @@ def audit(
         stopped = row.reason.removeprefix(OMITTED) if row.omitted else ""
         opened = open_row(subject, question, source_of(question), row.known, sampling, stopped)
         rows.append(opened)
-        derived.append(_derive(row, opened, on_scene=sampling.scene is not None))
+        derived.append(_derive(row, opened, sampling))
         if isinstance(opened, OpenRow):
             numbers = choose_share(range(len(row.outcomes)), share)
             outcomes = {number: derived[-1].outcomes[number] for number in numbers}
@@ -135,15 +135,13 @@ class DerivedOutcomes(Outcomes):
         return judge_stored(self._info, self._outcomes[number])
 
 
-def _derive(row: Row, opened: OpenRow | Row, *, on_scene: bool) -> Row:
+def _derive(row: Row, opened: OpenRow | Row, sampling: Sampling) -> Row:
     if isinstance(opened, Row):
         return replace(opened, info=row.info, seconds=row.seconds)
     outcomes = DerivedOutcomes(row.info, row.outcomes)
     witness, shrunk, first = (each and judge_stored(row.info, each) for each in (row.witness, row.shrunk, row.first))
     derived = replace(row, promise=opened.row.promise, outcomes=outcomes, planned=len(outcomes))
-    derived = replace(derived, witness=witness, shrunk=shrunk, first=first)
-    verdict, reason = verdict_of_row(derived, opened, on_scene=on_scene)
-    return replace(derived, verdict=verdict, reason=reason)
+    return judge_row(replace(derived, witness=witness, shrunk=shrunk, first=first), opened, sampling)
 
 
 def _other_property(row: Row, opened: OpenRow | Row, other_version: bool) -> str:

@@ -167,13 +167,11 @@ class OpenRow:
         """Return whether all cases and the witness are judged."""
         return self._all_drawn and not self._expected and self.witnessed
 
-    def judge(self, *, on_scene: bool) -> None:
-        """Make the row of the outcomes; `on_scene` if the run is about one scene alone."""
+    def judge(self, sampling: Sampling) -> None:
+        """Make the row of the outcomes."""
         place = self._place_of_witness
         witness = self._witness_outcome if place is None else self.outcomes[place]
-        row = self._row_of(self.outcomes, self.planned, witness)
-        verdict, reason = verdict_of_row(row, self, on_scene=on_scene)
-        self.row = replace(row, verdict=verdict, reason=reason)
+        self.row = judge_row(self._row_of(self.outcomes, self.planned, witness), self, sampling)
 
     def stop(self, examples: int, early: OpenRow | None) -> None:
         """Make the row of a run, with so many random cases, that was stopped before all cases were judged.
@@ -211,18 +209,20 @@ class OpenRow:
         return Shrinking(next(number for number, bad in enumerate(badnesses) if bad >= least), least)
 
 
-def verdict_of_row(row: Row, opened: OpenRow, *, on_scene: bool) -> tuple[Verdict, str]:
-    """Return verdict and reason of a row of which all cases are judged; `on_scene` as in `OpenRow.judge`."""
+def judge_row(row: Row, opened: OpenRow, sampling: Sampling) -> Row:
+    """Return a row of which all cases are judged with its verdict and its reason."""
     verdict, reason = judge.verdict_over_all(row)
-    if verdict is not Verdict.NOT_JUDGED or reason.startswith(judge.RAISED) or not opened.question.bodies:
-        return verdict, reason
+    if verdict is Verdict.PASS and row.promise is False and sampling.interface is not None:
+        row = replace(row, promise=None)  # It states that it fails somewhere, not that it does so here.
     # No formulation promises that the one scene of a user can be decided, nor each scene of a list about which it
     # states nothing: they may have no solution.
-    if on_scene:
-        undecided = len(row.outcomes) > 0 and not row.judged
-        return (Verdict.UNDECIDED, row.outcomes[0].reason or reason) if undecided else (verdict, reason)
-    undecided = row.promise is None and row.undecided > 0 and opened.listed is not None
-    return (Verdict.UNDECIDED if undecided else verdict), reason
+    if verdict is Verdict.NOT_JUDGED and not reason.startswith(judge.RAISED) and opened.question.bodies:
+        if sampling.scene is None:
+            is_left = row.promise is None and row.undecided > 0 and opened.listed is not None
+        elif is_left := len(row.outcomes) > 0 and not row.judged:
+            reason = row.outcomes[0].reason or reason
+        verdict = Verdict.UNDECIDED if is_left else verdict
+    return replace(row, verdict=verdict, reason=reason)
 
 
 def open_row(
@@ -250,13 +250,13 @@ def open_row(
     if source is None:
         needs = "elastic bodies" if question.bodies and sampling.scene is None else needs_of_place(question.cases)
         return replace(row, verdict=Verdict.NOT_APPLICABLE, reason=f"{NOT_HERE}{needs}")
-    # The formulation fails on some scene, not on every one, and where it reports what shows it.
-    on_scene = question.bodies and sampling.scene is not None
-    if promise is False and (on_scene or question.shown_by - subject.provides):
+    if promise is False and question.shown_by - subject.provides:  # It fails where it reports what shows it.
         row = replace(row, promise=None)
     opened = OpenRow(row, subject, question, source if isinstance(source, tuple) else None)
     try:
-        opened.witness = find_witness(subject, question, opened.listed or ()) if row.promise is False else None
+        # On the user's mesh or scene every number is of that.
+        if row.promise is False and sampling.interface is None:
+            opened.witness = find_witness(subject, question, opened.listed or ())
     except MisuseError as error:
         return replace(row, verdict=Verdict.CRASHED, reason=f"{OF_TRAITS}{error}")
     return replace(row, verdict=Verdict.NOT_JUDGED, reason=f"{OMITTED}{stopped}") if stopped else opened
@@ -266,8 +266,7 @@ def lacks_witness(subject: Subject, question: Property, sampling: Sampling) -> b
     """Return whether a formulation states that it fails, and names no case that shows so, where it is asked for one."""
     if question.refusal_of(subject) or (question.needs | question.shown_by) - subject.provides:
         return False
-    on_scene = question.bodies and sampling.scene is not None  # It is asked on the scene of the run alone.
-    stated = question.promise(subject.traits) is False and not on_scene
+    stated = question.promise(subject.traits) is False and sampling.interface is None
     return stated and subject.traits.witness(question.id) is None
 
 
@@ -406,7 +405,7 @@ def find_missing_cases(row: Row, listed: Sequence[Case] | None, question: Proper
         block = draw_planned(sampling, question, number)
         planned = number * draw.BLOCK + len(block.cases) if block.last else sampling.examples
     missing = "" if count == planned > 0 else f"outcomes of {count} of {planned} cases"
-    if not missing and row.promise is False and row.witness is None:
+    if not missing and row.promise is False and row.witness is None and sampling.interface is None:
         missing = "no outcome of its witness"
     return f"{row.formulation} {row.property_id}: {missing}" if missing else ""
 

@@ -300,7 +300,7 @@ class Driver:
         self._meter.measure(row.question.id, outcomes)
         self._first[key] = row
         row.add(0, outcomes)
-        row.judge(on_scene=False)
+        row.judge(self._sampling)
         if row.row.verdict in (Verdict.FAIL, Verdict.CRASHED) and row.row.result is not Result.FAILS_AS_STATED:
             self._first_wrong[key] = row.row
             self._report(replace(before, count=before.planned, row=row.row))
@@ -517,7 +517,7 @@ class Driver:
         """Make the row if it is complete, and return the job to shrink what failed, if that is wanted."""
         if not row.complete:
             return ()
-        row.judge(on_scene=self._sampling.scene is not None)
+        row.judge(self._sampling)
         self._report(replace(self._judging(row), row=row.row))
         shrinks = self._shrink == "all" or (self._shrink == "new" and row.row.result is not Result.FAILS_AS_STATED)
         return self._shrink_row(row, shrinks=shrinks)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hints
 
 from contactverif.contract.errors import MisuseError
 from contactverif.run.profiles import FIRST_CASES, Profile, Shrink, profile_named
@@ -150,7 +150,10 @@ class RunOptions:
     ] = None
     master: Annotated[str | None, Option("Master: as the slave.", "GROUP", group=PLACE)] = None
     pair: Annotated[int, Option("Number of the contact pair of the mesh, if it has several.", "N", group=PLACE)] = 0
-    flip: Annotated[bool, Option("Exchange inside and outside of sides without cells.", group=PLACE)] = False
+    flip: Annotated[
+        Literal["slave", "master", "both"] | None,
+        Option("Exchange inside and outside of a side without cells.", "SIDE", group=PLACE),
+    ] = None
     material: Annotated[
         tuple[str, ...],
         Option("Material of the body of a group of the mesh. (default: 1,0.3) Repeatable.", "GROUP=E,ν", group=PLACE),

@@ -171,7 +171,8 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     iterations = float(max(arrived[0] - begin, 0)) if _is_solved(trace) else inf
     details["finite"] = float(iterations <= 1)
     ends = trace.residuals[begin], trace.floors[-1]
-    rho, rho_end = (max(residual / trace.residuals[0], np.finfo(float).tiny) for residual in ends)
+    tiny = float(np.finfo(float).tiny)  # Where nothing touches, and nothing loads a body, the first residual is 0.
+    rho, rho_end = (max(residual / max(trace.residuals[0], tiny), tiny) for residual in ends)
     allowed = ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
     number = FINAL_ITERATIONS.check(iterations, float(allowed))
     return Measurement([number], details=details, series=series, idle=is_untouched(trace))

@@ -221,13 +221,13 @@ SLIDES = f"it can move along its first axis{PREVENTION}"
         ((SLAVE, MASTER), (0, 1), (), "bodies: found no master; needed at least one of both"),
         ((SLAVE, MASTER), (), (0, 1), "bodies: found no slave; needed at least one of both"),
         ((), (), (), "bodies: found no slave; needed at least one of both"),
-        ((LOOSE, MASTER), (0,), (1,), f"supports of slave: found no supports: {SLIDES}"),
-        ((ONE_SUPPORT, MASTER), (0,), (1,), f"supports of punch: found supports: {SLIDES}"),
+        ((LOOSE, MASTER), (0,), (1,), f"supports of slave: found none: {SLIDES}"),
+        ((ONE_SUPPORT, MASTER), (0,), (1,), f"supports of punch: found too few: {SLIDES}"),
         (
             (SLAVE, replace(MASTER, fixed=MASTER.fixed & [False, True])),
             (0,),
             (1,),
-            f"supports of master: found supports: {SLIDES}",
+            f"supports of master: found too few: {SLIDES}",
         ),
     ],
 )

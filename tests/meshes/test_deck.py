@@ -114,6 +114,10 @@ def test_pairs_materials_sets_and_names_are_those_of_the_deck(tmp_path: Path) ->
         "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE, ADJUST=0.1\nBOTTOM, top\np, TOP\nTop\n*TIE\nx, y\n"
         "*ELSET, ELSET=GEN, GENERATE\n1, 3\n*SURFACE, NAME=TWICE\nLOW, S3\n1, S3\n*NSET, NSET=EMPTY\n"
     )
+    ties = "*HEADING\nblocks\n*TIE, NAME=GLUE\nTop, BOTTOM\n*Solid  Print\n*Fluid Law\n*Step\n*Boundary\n1, 1\n*CLOAD\n"
+    tied = read(tmp_path, SQUARES + SURFACES + ties)
+    assert tied.pairs == (("Top", "Bottom"),)
+    assert tied.warnings == "Not read: *FLUID LAW.\nSupports and loads are not those of the deck (*BOUNDARY, *CLOAD).\n"
     mesh = read(tmp_path, SQUARES + SURFACES + extra)
     assert mesh.pairs == (("Bottom", "Top"), ("P", "Top"))
     assert mesh.materials == {"LOW": (2.1e5, 0.3)}
@@ -121,7 +125,7 @@ def test_pairs_materials_sets_and_names_are_those_of_the_deck(tmp_path: Path) ->
     assert mesh.groups["P"]["vertex"].tolist() == [[0], [3], [4], [5]]
     assert mesh.groups["TOP"]["quad"].tolist() == [[4, 5, 6, 7]]
     assert mesh.warnings == (
-        "Not read: *TIE.\nThe surface TWICE has 1 of its sides twice.\nELSET GEN: 2 of 3 numbers are in the deck.\n"
+        "The surface TWICE has 1 of its sides twice.\nELSET GEN: 2 of 3 numbers are in the deck.\n"
         "NSET EMPTY has no members that are read.\n"
         "Not read: the contact of Top with itself.\n*CONTACT PAIR: ADJUST is not read; no node is moved.\n"
     )

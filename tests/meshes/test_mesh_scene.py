@@ -41,7 +41,7 @@ def test_every_property_is_judged_on_curved_bodies_or_says_what_it_needs(
         assert row.outcomes or row.reason, row
         assert not row.outcomes or row.tally.counts.contact_share == 1, row
     needs = {row.property_id: row.reason for row in result.rows if row.reason.startswith(NOT_HERE)}
-    assert needs["accuracy.hertz"] == f"{NOT_HERE}own meshes with a known answer"
+    assert needs["accuracy.hertz"] == f"{NOT_HERE}meshes with a known answer"
     assert needs["patch.flat.transmission"] == f"{NOT_HERE}a straight slave over a parallel master"
     assert needs["patch.flat.solve"] == f"{NOT_HERE}a known uniform pressure"
 
@@ -94,13 +94,20 @@ def test_lines_without_cells_are_a_rigid_body(tmp_path: Path) -> None:
     path = write_curved_bodies(tmp_path / "rigid.msh", with_base=False)
     with pytest.raises(MisuseError, match="do not oppose each other"):
         read_scene(path, **SIDES)
-    slave, master = read_scene(path, **SIDES, flip=True).bodies
+    slave, master = read_scene(path, **SIDES, flip="master").bodies
     assert (slave.rigid, master.rigid) == (False, True)
 
 
 def test_supports_that_do_not_hold_a_body_are_refused() -> None:
-    with pytest.raises(MisuseError, match=r"^supports of slave body: found supports: it can .*; needed fixed comp"):
+    with pytest.raises(MisuseError, match=r"^supports of slave body: found too few: it can .*; needed fixed comp"):
         read_scene(PUNCH, slave="punch", master="base", supports={"punch": (None, 0.0)})
+
+
+@pytest.mark.parametrize(("way", "gap"), [(0.03, "0.03"), (0.0, "0")])
+def test_supports_that_leave_the_bodies_apart_are_refused(way: float, gap: str) -> None:
+    supports = {"punch body": (0.0, way)}
+    with pytest.raises(MisuseError, match=f"--support: found supports that leave the bodies {gap} apart; needed"):
+        read_scene(PUNCH, slave="punch", master="base", supports=supports)
 
 
 def test_a_body_that_surrounds_its_contact_is_held_on_its_other_boundary(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def read(tmp_path: Path) -> Read:
     """Return a function that writes two groups, `punch` and `base`, and reads the interface between them."""
 
     def written_and_read(
-        *sides: object, points: object = POINTS, solids: object = (), suffix: str = ".msh", **flip: bool
+        *sides: object, points: object = POINTS, solids: object = (), suffix: str = ".msh", **flip: Any
     ) -> Interface:
         kinds = {3: "triangle", 4: "quad", 6: "triangle6"}
         parts = [(kinds[np.shape(faces)[1]], np.array(faces)) for faces in sides]
@@ -76,7 +76,7 @@ def test_faces_without_cells_run_as_the_first_of_them(read: Read) -> None:
     with pytest.raises(MisuseError, match=r"--mesh: found mean normals \(.*\) of the slave and .*, which do not"):
         read([face[::-1] for face in upper], lower)
     solids = TETRAHEDRA[2:]  # Only the master has cells.
-    assert read([face[::-1] for face in upper], lower, solids=solids, flip=True).slave.faces.tolist() == upper
+    assert read([face[::-1] for face in upper], lower, solids=solids, flip="slave").slave.faces.tolist() == upper
 
 
 @pytest.mark.parametrize(

@@ -425,7 +425,12 @@ def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, exam
     ("changes", "verdict", "reason", "unexpected"),
     [
         ({"applicable": lambda traits: "no such thing"}, Verdict.NOT_APPLICABLE, "no such thing", ""),
-        ({"cases": lambda _: None}, Verdict.NOT_APPLICABLE, "needs own meshes with a known answer", ""),
+        (
+            {"cases": lambda _: None},
+            Verdict.NOT_APPLICABLE,
+            "needs meshes with a known answer",
+            "",
+        ),
         (
             {"needs": frozenset({"tangent", "pair"})},
             Verdict.NOT_PROVIDED,
@@ -450,6 +455,21 @@ def test_the_given_interface_reaches_the_strategy() -> None:
     interface = a_case(4).interface
     question = replace(ZERO, cases=lambda argument: sizes(3) if argument is interface else None)
     assert one_row(subject(), question, place=interface).planned == 3
+
+
+@pytest.mark.usefixtures("witnesses")
+@pytest.mark.parametrize(
+    ("first", "verdict", "result", "promise"),
+    [(5, Verdict.FAIL, "fails as stated", False), (99, Verdict.PASS, "pass", None)],
+)
+def test_on_a_place_every_number_is_of_that_place(
+    first: int, verdict: Verdict, result: str, promise: bool | None
+) -> None:
+    """A formulation states that it fails on its witness, not on the mesh of the user."""
+    row = one_row(subject(from_size(first), flat=False, witnesses={"patch.zero": "C"}), place=a_case(4).interface)
+    assert (row.verdict, row.result, row.promise, row.witness) == (verdict, result, promise, None)
+    assert row.closest is not None
+    assert row.closest.case is not None
 
 
 def test_a_known_failure_is_expected_and_a_known_pass_is_not() -> None:

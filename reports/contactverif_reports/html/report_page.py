@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.property import checked_numbers
-from contactverif.contract.result import OPPOSITE_SIGN, Result, Row, Run, coverage_of, describe
+from contactverif.contract.result import NOTHING_JUDGED, OPPOSITE_SIGN, Result, Row, Run, coverage_of, describe
 from contactverif_reports.comparisons import RowNumbers, count_iterations
 from contactverif_reports.html.pages import Axis, render, strip, svg_inline, ticks
 from contactverif_reports.plot.text import as_text
@@ -67,7 +67,7 @@ def headline(run: Run) -> str:
     others = (Result.FAIL, ("failure without a promise", "failures without a promise"))
     kinds = ((counts[result], text) for result, text in [*WRONG_RESULTS.items(), others])
     words = ", ".join(f"{n} {text[n > 1]}" for n, text in [(len(run.opposite_signs), signs), *kinds] if n)
-    return f"{words}." if words else "Nothing was checked."
+    return f"{words}." if words else NOTHING_JUDGED
 
 
 def _section(
