@@ -190,6 +190,7 @@ class _Deck:
         self.names: dict[_Key, tuple[str, str]] = {}  # The instance with a dot, and the name, as in the file.
         self.sets: dict[_Key, list[_Card | list[int]]] = {}  # Cards, and indices from *NODE and *ELEMENT.
         self.known: dict[_Key, list[int]] = {}  # Indices, for the sets that are known already.
+        of_instances: dict[str, list[int]] = {}
         for keyword in ("NODE", "ELEMENT", *_SETS):
             for card in self.cards:
                 if card.keyword == keyword == "NODE":
@@ -197,12 +198,14 @@ class _Deck:
                 elif card.keyword == keyword == "ELEMENT":
                     elements = self._read_elements(card)
                     self._add(card, "ELSET", elements)
-                    if card.instance:  # It is a group, too.
-                        of_all = replace(card, parameters={"ELSET": card.instance[:-1]}, prefix="", instance="")
-                        self._add(of_all, "ELSET", elements)
+                    of_instances.setdefault(card.instance, []).extend(elements)
                 elif card.keyword == keyword:
                     card.label(_SETS[keyword])
                     self._add(card, keyword, card)
+        for name in self.instances:  # Each is a group, too, behind all others.
+            key = "ELSET", _label(name[:-1])
+            self.names.setdefault(key, ("", name[:-1].replace('"', "")))
+            self.sets.setdefault(key, []).append(of_instances.get(name, []))
         self.places = np.array(self.points).reshape(-1, 3)
 
     def _add(self, card: _Card, kind: str, part: _Card | list[int]) -> None:
@@ -344,13 +347,15 @@ class _Deck:
         return {_SIDES[n]: np.array([side for side in each if len(side) == n]) for n in sorted({*map(len, each)})}
 
 
-def read_deck(path: str) -> PlainMesh:
+def read_deck(path: str, place: str) -> PlainMesh:
     """Read an input deck of Abaqus or CalculiX.
 
     Parameters
     ----------
     path : str
-        The deck; it may include files of its folder.
+        The deck.
+    place : str
+        The same, or where it lies compressed: it may include files of this folder.
 
     Returns
     -------
@@ -363,7 +368,7 @@ def read_deck(path: str) -> PlainMesh:
     ValueError
         If the deck cannot be read. Lines are counted with included files in their places.
     """
-    deck = _Deck(_expand(path, [path]))
+    deck = _Deck(_expand(path, [place]))
     _Card("ELEMENT", {}, "", 1).need(bool(deck.elements), "no elements; needed a deck with *NODE and *ELEMENT")
     groups: dict[str, Group] = {}
     keys: dict[_Key, str] = {}  # The names of groups.

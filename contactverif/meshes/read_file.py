@@ -36,7 +36,7 @@ def pack_mesh(path: str) -> bytes:
     """Return a mesh file as bytes, in a child process; one that cannot be read is a ValueError."""
     gc.disable()  # This process ends with the file, and a deck makes millions of lists.
     with TemporaryDirectory() as folder:
-        mesh = _read(_clean(Path(path), Path(folder)))
+        mesh = _read(_clean(Path(path), Path(folder)), path)
     return msgspec.msgpack.encode(
         PackedMesh(
             PackedArray.pack(mesh.points, "points"),
@@ -80,8 +80,8 @@ def _clean(path: Path, folder: Path) -> Path:
     return copy
 
 
-def _read(path: Path) -> PlainMesh:
-    """Read a file by the reader for its kind, which its first bytes and its ending say."""
+def _read(path: Path, place: str) -> PlainMesh:
+    """Read a file, or a copy of that of a place, by the reader for its kind: its first bytes and its ending say it."""
     if path.suffix.lower() in _EXODUS:
         return read_exodus(str(path))
     if path.suffix.lower() == ".mdpa":
@@ -89,7 +89,7 @@ def _read(path: Path) -> PlainMesh:
     with path.open("rb") as stream:
         head = stream.read(100)
     if head.removeprefix(_MARK).lstrip().startswith(b"*") and path.suffix.lower() != ".f3grid":
-        return read_deck(str(path))
+        return read_deck(str(path), place)
     output, errors = StringIO(), StringIO()
     # Ansys uses the ending .msh too, and a Nastran file may begin with a remark.
     is_gmsh = head.startswith(b"$") and path.suffix.lower() == ".msh"
@@ -99,6 +99,11 @@ def _read(path: Path) -> PlainMesh:
             mesh = meshlane.read(path, file_format="gmsh" if is_gmsh else None)
     except ImportError as error:
         raise ValueError(f"its format needs the package {error.name}: pip install {error.name}") from error
+    except FileNotFoundError as error:
+        other = re.search(r"[^/\\']+\.h5\b", str(error))
+        raise ValueError(
+            f"{other[0] if other else error} is missing; needed all files of the mesh in one folder"
+        ) from error
     except (Exception, SystemExit) as error:  # meshlane prints and exits if a reader gives up.
         words = output.getvalue() + errors.getvalue() + ("" if isinstance(error, SystemExit) else repr(error))
         raise ValueError("meshlane: " + words.replace(str(path), path.name)) from error

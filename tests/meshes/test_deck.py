@@ -31,7 +31,7 @@ FACES = {
 def read(folder: Path, text: str | bytes) -> PlainMesh:
     path = folder / "deck.inp"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_deck(str(path))
+    return read_deck(str(path), str(path))
 
 
 def sides(mesh: PlainMesh, name: str) -> list[list[int]]:
