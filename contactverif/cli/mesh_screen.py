@@ -40,7 +40,7 @@ def show_mesh(path: Path) -> None:
         names.setdefault(tuple((kind, data.tobytes()) for kind, data in group.items()), []).insert(0, name)
     with_ink = (each[0] for each in names.values() if not set(kinds).isdisjoint(mesh.groups[each[0]]))
     inks = dict(zip(with_ink, _INKS, strict=False))
-    listed = Table([Column("group", wrap=True), Column("of", wrap=True), Column("body"), Column("")], str(path))
+    listed = Table([Column("group", wrap=True), Column("of", wrap=True), Column("body"), Column("drawn")], str(path))
     for name, *others in names.values():
         group = mesh.groups[name]
         of_bodies = sorted({bodies[label] for label in _labels(labels, group.values()) if label in bodies})
@@ -48,7 +48,10 @@ def show_mesh(path: Path) -> None:
         listed.add(
             " or ".join([name, *others]), _count(group), words, inks.get(name, "" if name in able else "not a side")
         )
-    show(line(f"{len(points)} nodes; {_count(mesh.cells)}; bodies: {len(bodies)}"), listed.terminal())
+    show(
+        line(f"{len(points)} nodes; {_count(mesh.cells)}; bodies (cells that hang together): {len(bodies)}"),
+        listed.terminal(),
+    )
     remarks = (mesh.warnings + remark).splitlines()
     remarks += [f"contact pair {n}: slave {slave}, master {master}" for n, (slave, master) in enumerate(mesh.pairs, 1)]
     remarks += [f"material of {name}: E = {law[0]:g}, ν = {law[1]:g}" for name, law in mesh.materials.items()]

@@ -512,8 +512,8 @@ class Run:
     @property
     def promises_kept(self) -> bool:
         """Return whether all promises are kept, properties judged, at least one, plugins loaded, and signs right."""
-        asked = any(row.verdict not in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED) for row in self.rows)
-        return asked and not (self.not_loaded or self.unexpected or self.opposite_signs)
+        is_judged = any(row.verdict not in (Verdict.NOT_APPLICABLE, Verdict.NOT_PROVIDED) for row in self.rows)
+        return is_judged and not (self.not_loaded or self.unexpected or self.opposite_signs)
 
     def count(self, *results: Result) -> int:
         """Return the number of rows with one of these results."""

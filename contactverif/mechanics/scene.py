@@ -182,8 +182,8 @@ class Scene:
         for body in self.bodies:
             if loose := loose_modes(body):
                 needed = "fixed components that prevent it (contact without friction does not)"
-                found = "too few" if body.fixed.any() else "none"
-                raise MisuseError(f"supports of {body.name}", f"{found}: it can {' and '.join(loose)}", needed)
+                actual = f"{'too few' if body.fixed.any() else 'none'}: it can {' and '.join(loose)}"
+                raise MisuseError(f"supports of {body.name}", actual, needed)
 
     @cached_property
     def bodies_in_reach(self) -> tuple[int, ...]:

@@ -204,8 +204,8 @@ class _Deck:
                     self._add(card, keyword, card)
         for name in self.instances:  # Each is a group, too, behind all others.
             key = "ELSET", _label(name[:-1])
-            self.names.setdefault(key, ("", name[:-1].replace('"', "")))
-            self.sets.setdefault(key, []).append(of_instances.get(name, []))
+            if key not in self.sets:
+                self.names[key], self.sets[key] = ("", name[:-1].replace('"', "")), [of_instances.get(name, [])]
         self.places = np.array(self.points).reshape(-1, 3)
 
     def _add(self, card: _Card, kind: str, part: _Card | list[int]) -> None:

@@ -235,10 +235,8 @@ def _members(option: str, name: str, mesh: PlainMesh, cells: CellSides) -> IntAr
     if not elements:
         more = " (by its number, where a group of cells has the same name)" if len(kinds) == 1 else ""
         nodes = np.concatenate([np.empty(0, dtype=np.int64), *(data.reshape(-1) for data in group.values())])
-        sides = {each: [other[kind] for kind in kinds if kind in other] for each, other in mesh.groups.items()}
-        near = [
-            repr(each) for each, parts in sides.items() if parts and all(np.isin(part, nodes).all() for part in parts)
-        ]
+        sides = [(repr(each), other[kind]) for each, other in mesh.groups.items() for kind in kinds if kind in other]
+        near = dict.fromkeys(each for each, lines in sides if np.isin(lines, nodes).all())
         more += f": {' or '.join(near)}" if near else ", or of nodes on the boundary of cells"
         raise MisuseError(option, listed, f"a group of {needed}{more}")
     if len(np.unique(np.sort(elements[0]), axis=0)) < len(elements[0]):
@@ -323,6 +321,4 @@ def _neighbours(argument: str, points: FloatArray, elements: IntArray) -> list[l
             (first, way), (second, other_way) = those
             neighbours[first].append((second, way == other_way))
             neighbours[second].append((first, way == other_way))
-    if of_lines and len(np.unique(np.sort(elements, axis=1), axis=0)) < len(elements):
-        raise MisuseError(argument, "the same line twice", "each line once")
     return neighbours

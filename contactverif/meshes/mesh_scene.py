@@ -52,13 +52,7 @@ def read_scene(
 
     Parameters
     ----------
-    path : str | Path | None
-        As in `read_interface`.
-    slave, master : str | None
-        As in `read_interface`.
-    pair : int
-        As in `read_interface`.
-    flip : {"slave", "master", "both"} | None
+    path, slave, master, pair, flip
         As in `read_interface`.
     materials : Mapping[str, tuple[float, float]] | None
         {group: (Young's modulus, Poisson's ratio)}. The bodies to which members of the group belong have this
@@ -104,10 +98,9 @@ def scene_of(sides: MeshSides, materials: Mapping[str, Material], supports: Mapp
         _push_slaves(parts, scene)
         scene = _scene(parts)
     if any(part.has_supports for part in parts) and (gap := scene.gap_at_rest()) >= 0:
-        actual = (
-            f"supports that leave the bodies {abs(gap):.3g} apart" if np.isfinite(gap) else "supports past the contact"
-        )
-        raise MisuseError("--support", actual, "supports that move slave and master onto each other")
+        place = f"{abs(gap):.3g} apart" if np.isfinite(gap) else "side by side"
+        needed = "supports that move slave and master onto each other"
+        raise MisuseError("--support", f"supports that leave the bodies {place}", needed)
     return scene
 
 

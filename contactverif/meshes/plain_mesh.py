@@ -50,8 +50,8 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
         packed = read_in_child("contactverif.meshes.read_file:pack_mesh", os.path.abspath(name), limits_for(size))
         return _unpack(msgspec.msgpack.decode(packed, type=PackedMesh))
     except ReadError as error:
-        found, _, needed = str(error).partition("; needed ")  # Our own readers say what is needed.
-        raise MisuseError("--mesh", f"{name!r}, which cannot be read ({found})", needed or _KNOWN_FILES) from error
+        reason, _, needed = str(error).partition("; needed ")  # Our own readers say what is needed.
+        raise MisuseError("--mesh", f"{name!r}, which cannot be read ({reason})", needed or _KNOWN_FILES) from error
     except (msgspec.DecodeError, ValueError) as error:
         raise MisuseError("--mesh", f"{name!r} with {error}", "a mesh whose parts fit each other") from error
 

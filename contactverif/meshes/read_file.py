@@ -101,9 +101,8 @@ def _read(path: Path, place: str) -> PlainMesh:
         raise ValueError(f"its format needs the package {error.name}: pip install {error.name}") from error
     except FileNotFoundError as error:
         other = re.search(r"[^/\\']+\.h5\b", str(error))
-        raise ValueError(
-            f"{other[0] if other else error} is missing; needed all files of the mesh in one folder"
-        ) from error
+        missing = other[0] if other else str(error)
+        raise ValueError(f"{missing} is missing; needed all files of the mesh in one folder") from error
     except (Exception, SystemExit) as error:  # meshlane prints and exits if a reader gives up.
         words = output.getvalue() + errors.getvalue() + ("" if isinstance(error, SystemExit) else repr(error))
         raise ValueError("meshlane: " + words.replace(str(path), path.name)) from error
