@@ -24,7 +24,8 @@ from contactverif.cli.signals import begin_work
 from contactverif.run.run_options import ISOLATION, PLACE, SAMPLING, RunOptions
 
 Isolated = Annotated[RunOptions, Takes([ISOLATION])]
-ReportPath = Annotated[Path, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")]
+_REPORT = typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")
+ReportPath = Annotated[Path, _REPORT]
 Resumed = Annotated[
     Path | None,
     typer.Option(help="Go on with what was to write FILE and was stopped.", metavar="FILE", rich_help_panel=EARLIER),
@@ -366,9 +367,7 @@ def audit(
 @done_in("replay")
 def draw(
     *,
-    report: Annotated[
-        Path | None, typer.Argument(help="A report that verify --out FILE.nc wrote.", metavar="REPORT")
-    ] = None,
+    report: Annotated[Path | None, _REPORT] = None,
     case: CaseId = None,
     scene: Annotated[
         str | None,
@@ -426,8 +425,7 @@ def bench(
         ),
     ],
     scene: Annotated[
-        list[str] | None,
-        typer.Option(help="Only this scene, a problem such as wavy. Repeatable.", metavar="NAME"),
+        list[str] | None, typer.Option(help="Only this scene, a problem such as wavy. Repeatable.", metavar="NAME")
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Take the two coarsest meshes, five instances, two processes.")
@@ -436,8 +434,7 @@ def bench(
         int | None, typer.Option(help="Instances of each mesh, 15 by default.", metavar="N", show_default=False)
     ] = None,
     processes: Annotated[
-        int | None,
-        typer.Option(help="Processes of each formulation, 5 by default.", metavar="N", show_default=False),
+        int | None, typer.Option(help="Processes of each formulation, 5 by default.", metavar="N", show_default=False)
     ] = None,
     against: Annotated[
         Path | None, typer.Option(help="Say what changed since this file of a bench.", metavar="OLD.nc")

@@ -387,9 +387,5 @@ def _pose(across: int, stiffness: float, traits: Traits, variation: Variation) -
 
 
 HERTZ = Problem(
-    label="Hertz' contact in boxes",
-    meshes=(20, 40, 80),
-    targets=(2e-2, 1e-2, 5e-3, 1e-3),
-    pose=_pose,
-    rank=2,
+    label="Hertz' contact in boxes", meshes=(20, 40, 80), targets=(2e-2, 1e-2, 5e-3, 1e-3), pose=_pose, rank=2
 )

@@ -108,10 +108,9 @@ def assemble(scene: SceneArrays) -> sparse.csr_array:
     total = sparse.csr_array((size, size))
     triangles = scene.cells[:, 3] < 0
     for index in np.unique(scene.body_of_cell):
-        for kind in (triangles, ~triangles):
-            cells = scene.cells[kind & (scene.body_of_cell == index)]
+        for kind, n_corners in ((triangles, 3), (~triangles, 4)):
+            cells = scene.cells[kind & (scene.body_of_cell == index), :n_corners]
             if len(cells):
-                cells = cells[:, :3] if (cells[:, 3] < 0).all() else cells
                 total = total + _one_body(scene, cells, scene.young[index], scene.poisson[index])
     frames = sparse.block_diag(list(scene.frames()), format="csr")
     return sparse.csr_array(frames.T @ total @ frames)

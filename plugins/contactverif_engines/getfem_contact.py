@@ -21,6 +21,7 @@ _ROUNDED = 1e-9  # A step below this share that does not shrink any more is roun
 _REGION = 1000  # The number of the contact faces; bodies have the numbers from 1.
 # The corners of a cell in the order of GetFEM, which numbers those of a quadrilateral along lines.
 _ORDERS = {3: [0, 1, 2], 4: [0, 1, 3, 2]}
+_FACES = {3: [{1, 2}, {0, 2}, {0, 1}], 4: [{1, 3}, {0, 2}, {2, 3}, {0, 1}]}  # The corners of each face of a cell.
 _SHAPES = {3: ("GT_PK(2,1)", "FEM_PK(2,1)", "IM_TRIANGLE"), 4: ("GT_QK(2,1)", "FEM_QK(2,1)", "IM_GAUSS_PARALLELEPIPED")}
 
 
@@ -123,11 +124,7 @@ class _Side:
     def _set_regions(self, faces: list[tuple[int, set[int]]]) -> None:
         for body, numbers in self.bodies.items():
             self.mesh.set_region(body + 1, np.array([numbers, [-1] * len(numbers)]))
-        of_shape = {3: _corners_of_faces("GT_PK(2,1)"), 4: _corners_of_faces("GT_QK(2,1)")}
-        pairs = []
-        for number, ends in faces:
-            shape = of_shape[3] if number in self.cells_of[3] else of_shape[4]
-            pairs.append([number, shape.index(ends)])
+        pairs = [(number, _FACES[3 if number in self.cells_of[3] else 4].index(ends)) for number, ends in faces]
         self.mesh.set_region(_REGION, np.array(pairs).reshape(-1, 2).T)
 
     def add_to(self, model: Any, name: str, order: int) -> None:
@@ -174,10 +171,6 @@ def _augmentation(scene: SceneArrays) -> float:
     near |= ~near.any()
     bodies = np.unique(scene.body_of_node[np.concatenate([scene.slave[near, 0], masters[ways[near].argmin(axis=1)]])])
     return float(scene.young[bodies[~scene.rigid[bodies]]].max() / lengths[near].sum())
-
-
-def _corners_of_faces(shape: str) -> list[set[int]]:
-    return [{1, 2}, {0, 2}, {0, 1}] if "PK" in shape else [{1, 3}, {0, 2}, {2, 3}, {0, 1}]
 
 
 def _solve(model: Any) -> int:

@@ -323,7 +323,7 @@ def c(
     check_penalty(penalty)
     path = shared_library.find_file(file)
     make = LibraryElements if tangent else LibraryForces
-    numbers = shared_library.parse_numbers("option props", props)
+    numbers = shared_library.parse_props(props)
     return make(_read_traits(path, traits), float(penalty), _load_functions(path), elements, numbers, order)
 
 

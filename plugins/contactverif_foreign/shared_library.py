@@ -72,21 +72,15 @@ def fortran_names(name: str) -> tuple[str, ...]:
     return f"{name}_", name, name.upper()
 
 
-def parse_numbers(option: str, value: float | str) -> tuple[float, ...]:
-    """Return the numbers of an option, such as 0.3:2 or 0.3; none for an empty text.
-
-    Examples
-    --------
-    >>> parse_numbers("props", "0.3:2")
-    (0.3, 2.0)
-    """
+def parse_props(value: float | str) -> tuple[float, ...]:
+    """Return the numbers of the option `props`, such as 0.3:2 or 0.3; none for an empty text."""
     parts = value.split(":") if isinstance(value, str) else [value]
     try:
         numbers = tuple(float(part) for part in parts if part != "")
     except ValueError:
         numbers = (float("nan"),)
     if isinstance(value, bool) or not all(map(isfinite, numbers)):
-        raise MisuseError(option, repr(value), "finite numbers with ':' between them, such as 0.3:2")
+        raise MisuseError("option props", repr(value), "finite numbers with ':' between them, such as 0.3:2")
     return numbers
 
 
@@ -108,13 +102,7 @@ def traits_beside(library: Path, file: str = "") -> Traits:
 
 
 def parse_traits_text(text: str, place: str) -> Traits:
-    """Return the traits of a text of TOML; those that it does not name promise nothing.
-
-    Examples
-    --------
-    >>> parse_traits_text("symmetric = true", "a text").promises.symmetric
-    True
-    """
+    """Return the traits of a text of TOML; those that it does not name promise nothing."""
     return _to_traits(_parse(text, place), place)
 
 

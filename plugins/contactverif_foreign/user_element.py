@@ -182,7 +182,7 @@ def _load_element(
         raise MisuseError("option nodes", repr(nodes), f"one of {', '.join(map(str, RULES))}")
     path = shared_library.find_file(file)
     routine = _load_routine(convention, path, shared_library.fortran_names(name), svars)
-    properties = shared_library.parse_numbers("option props", props)
+    properties = shared_library.parse_props(props)
     return UserElement(_read_traits(path, traits), float(penalty), routine, nodes, properties, tau)
 
 

@@ -36,10 +36,7 @@ WORK = Quantity(
 
 
 _define = partial(
-    Property.define,
-    cases=Cases.random(any_cases),
-    cases_in_space=Cases.random(surface_cases),
-    asks=WITH_BARRIER,
+    Property.define, cases=Cases.random(any_cases), cases_in_space=Cases.random(surface_cases), asks=WITH_BARRIER
 )
 
 

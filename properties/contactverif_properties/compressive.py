@@ -222,13 +222,7 @@ _define = partial(
 )
 
 
-@_define(
-    id="unilateral",
-    rank=60,
-    turn=5,
-    quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH),
-    asks=WITH_BARRIER,
-)
+@_define(id="unilateral", rank=60, turn=5, quantities=(OPEN, DISTANT, PULL_OF_POINT, GROWTH), asks=WITH_BARRIER)
 def unilateral(case: Case, subject: Subject) -> Measurement:
     """Contact pushes where surfaces penetrate; no force acts across an open gap or far from the contact zone.
 

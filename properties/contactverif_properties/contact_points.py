@@ -143,10 +143,7 @@ def _largest(values: FloatArray) -> float:
 
 
 define_projection = partial(
-    Property.define,
-    cases=Cases.random(projected_cases),
-    kinds=PROJECTED_KINDS,
-    needs=frozenset({"contact_points"}),
+    Property.define, cases=Cases.random(projected_cases), kinds=PROJECTED_KINDS, needs=frozenset({"contact_points"})
 )
 
 FLAT, TILTED = "flat faces", "tilted and warped faces"

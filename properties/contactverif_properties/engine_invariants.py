@@ -31,11 +31,7 @@ IMAGE = np.diag([-1.0, 1.0])
 # Blocks that are pressed together and tilted, all of the interface in contact; or a scene that is given.
 _tilted_scenes = random_source("contactverif_properties.engine_scenes.scenes")(lambda scene=None: closed_cases(scene))
 _define_for_codes = partial(
-    Property.define,
-    quantities=(CHANGE,),
-    cases=Cases.random(_tilted_scenes),
-    needs=frozenset({SOLVE}),
-    bodies=True,
+    Property.define, quantities=(CHANGE,), cases=Cases.random(_tilted_scenes), needs=frozenset({SOLVE}), bodies=True
 )
 
 

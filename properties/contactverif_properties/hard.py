@@ -68,10 +68,8 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     tangents = case.parameters["direction" if in_plane else "directions"]
     along = float(np.hypot.reduce(np.abs(np.atleast_1d((slave @ tangents.T).sum(axis=0)))))
     numbers = [ALONG.check(ratio(along, float(np.abs(slave).sum())), tolerance)]
-    push, whole = (
-        float((slave @ exact_forces.normal_of(case)).sum()),
-        float(np.linalg.norm(exact[: len(slave)].sum(axis=0))),
-    )
+    push = float((slave @ exact_forces.normal_of(case)).sum())
+    whole = float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken, finding = "" if push > 0 else "nothing pushes the slave out of the master", None
     if knows_total(traits):
         numbers.append(FLAT_TOTAL.check(abs(push / whole - 1), tolerance))

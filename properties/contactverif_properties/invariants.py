@@ -112,14 +112,7 @@ def _judge_changes(
 
 
 def _compare(
-    question: Property,
-    subject: Subject,
-    case: Case,
-    other: Case,
-    carry: Carry,
-    action: str,
-    *,
-    explain: bool = True,
+    question: Property, subject: Subject, case: Case, other: Case, carry: Carry, action: str, *, explain: bool = True
 ) -> Measurement:
     """Compare the answers in two states: the largest change of a force over Σ|R| of a side, of an entry over max|K|.
 
@@ -471,9 +464,8 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
 
 
 POWERS_OF_TWO = "Powers of two scale the four operations and square roots exactly. A power or an angle is rounded anew."
-SCALED_TOLERANCE = "u(8Z/min(g, ℓ) + 4N)"
-SCALED_FORCES = Quantity("error of the forces in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
-SCALED_TANGENT = Quantity("error of the tangent in another unit", SCALED_TOLERANCE, POWERS_OF_TWO)
+SCALED_FORCES = Quantity("error of the forces in another unit", TOLERANCE, POWERS_OF_TWO)
+SCALED_TANGENT = Quantity("error of the tangent in another unit", TOLERANCE, POWERS_OF_TWO)
 LARGEST_EXPONENT = 60
 TURNED_FORCES = Quantity("error of the forces after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
 TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)

@@ -41,9 +41,7 @@ _TERMS = "a (1 + M U/(ℓ p)) + 1e-12 κ + 64 u X ε̂/p"
 _REASON = "It is that of the forces that the bodies need, and a stiff spring turns rounded positions X into a force"
 REPORTED_FORCES = Quantity("error of a contact force that the code reports", _TERMS, f"{_REASON}.")
 REPORTED_PRESSURES = Quantity(
-    "error of a contact pressure that the code reports",
-    f"({_TERMS}) L/m",
-    f"{_REASON}, on the length m of a node.",
+    "error of a contact pressure that the code reports", f"({_TERMS}) L/m", f"{_REASON}, on the length m of a node."
 )
 
 

@@ -276,8 +276,7 @@ def _chains(nodes: FloatArray, edges: IntArray) -> list[list[int]]:
 
 
 @PaperFigure.define(
-    "fig38",
-    "Example 2: (a) contact pressure; (b) close-up of its middle. Pressures are negative, as in the paper.",
+    "fig38", "Example 2: (a) contact pressure; (b) close-up of its middle. Pressures are negative, as in the paper."
 )
 def _plot_pressures(example: _Example2) -> Figure:
     figure, panels = new_panels(3.9, 2)

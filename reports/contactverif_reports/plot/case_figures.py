@@ -55,21 +55,11 @@ def plot_case(
     forces: FloatArray | None = None,
     exact: FloatArray | None = None,
 ) -> None:
-    """Draw the current state of a case to a .png or .svg file.
+    """Draw the current state of a case to a .png or .svg file, below a title that is wrapped.
 
-    A penetration that is small against the interface is magnified, and the figure says by which factor.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    path : str | os.PathLike[str]
-        The file to write; an older one is replaced.
-    title : str
-        The title above the picture; it is wrapped.
-    forces, exact : FloatArray (n_nodes, dim) or (n_unknowns,) | None
-        Nodal forces of the formulation and exact ones, as they act on the nodes (minus the residual). They are drawn
-        as arrows of one scale; in space faces are shaded by their difference.
+    A penetration that is small against the interface is magnified, and the figure says by which factor. Nodal forces of
+    the formulation and exact ones, (n_nodes, dim) or (n_unknowns,), act on the nodes (minus the residual). They are
+    drawn as arrows of one scale; in space faces are shaded by their difference.
     """
     target = checked_name(path, SUFFIXES)
     save(make_case_figure(case, title=title, forces=forces, exact=exact), target)

@@ -34,16 +34,8 @@ def as_text(case: Case, width: int = 72, worst: object = "") -> str:
 
     A flat interface is two lines with their nodes to scale and the lengths between them. Any other is a small picture
     and, up to eight nodes a side, a table of current positions. In space there are tables of nodes and faces.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    width : int
-        The largest number of columns, at least 60.
-    worst : object
-        The finding that names the worst node, if one does. It is listed with its faces where a side in space has too
-        many nodes for a table.
+    The text has at most `width` columns, which are 60 or more. The worst node, which the finding `worst` may name, is
+    listed with its faces where a side in space has too many nodes for a table.
     """
     width = max(width, 60)
     if case.interface.dim != PLANE:
