@@ -6,14 +6,19 @@ that runs. A promise that no property checks is withdrawn. No two traits have th
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from math import inf
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from contactverif.contract.errors import ContractError
+
+_FARTHEST = 1e9  # The largest activation distance, in segments or lengths: a barrier acts near contact.
+_HIGHEST = 8.0  # The largest power of the penalty.
+_LONGEST_TEXT = 10_000  # Characters of forces. A number with an exponent such as 1e10000000 has as many digits.
+_LONG_EXPONENT = re.compile(r"[eE][-+]?[\d_]{3}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,10 +163,10 @@ class Rules:
 
     def __post_init__(self) -> None:
         _check_values(self, "rules")
-        for name, least in (("activation", 0.0), ("penalty_power", -inf)):
+        for name, least, largest in (("activation", 0.0, _FARTHEST), ("penalty_power", -_HIGHEST, _HIGHEST)):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, int | float) and least < value < inf):
-                needed = "None or a number" + (" above 0" if name == "activation" else "")
+            if value is not None and not (isinstance(value, int | float) and least < value <= largest):
+                needed = f"None or a number above {least:g} and up to {largest:g}"
                 raise ContractError(f"Traits.rules.{name}: found {value!r}; needed {needed}")
 
 
@@ -331,8 +336,9 @@ def parse_forces(text: str) -> tuple[Fractions, Fractions]:
     True
     """
     try:
-        slave, master = (tuple(map(Fraction, row.split())) for row in text.split(";"))
-    except (AttributeError, ValueError, ZeroDivisionError):
+        is_endless = _LONG_EXPONENT.search(text) or len(text) > _LONGEST_TEXT
+        slave, master = ((), ()) if is_endless else (tuple(map(Fraction, row.split())) for row in text.split(";"))
+    except (AttributeError, TypeError, ValueError, ZeroDivisionError):
         slave = master = ()
     if not slave or not master:
         needed = 'fractions on the slave nodes; fractions on the master nodes, such as "1 2 1; 2 2"'

@@ -54,14 +54,14 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         Verdict, reason and numbers. Where the property raises an exception, the case is undecided.
     """
     start = perf_counter()
-    case, refused = fit_to_traits(case, subject.traits)
 
     def outcome(verdict: Verdict, reason: str, *, breach: bool = False) -> Outcome:
         return Outcome(case, verdict, reason, seconds=perf_counter() - start, breach=breach)
 
-    if refused:
-        return outcome(Verdict.UNDECIDED, refused)
     try:
+        case, refused = fit_to_traits(case, subject.traits)
+        if refused:
+            return outcome(Verdict.UNDECIDED, refused)
         with one_thread(), np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
             measurement = question.measure(case, subject)
             verdict, reason = judge(question, measurement)
@@ -116,7 +116,9 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
         fewest = min(fewest, max(planned - 1, 1))
     if row.judged < fewest:
         cause = next((f"most often because {reason}" for reason in row.tally.reasons), "no more cases could be made")
-        return Verdict.NOT_JUDGED, f"{row.judged} of {row.planned} cases judged; {cause}"
+        # Of what nobody promises, nothing can be kept or broken.
+        verdict = Verdict.UNDECIDED if row.promise is None and row.undecided and not row.known else Verdict.NOT_JUDGED
+        return verdict, f"{row.judged} of {row.planned} cases judged; {cause}"
     counts, least = row.tally.counts, row.info.least_contact
     if counts.idle and counts.idle == counts.judged and least:
         return Verdict.NOT_JUDGED, "nothing was in contact in any case: nothing was judged"

@@ -214,14 +214,10 @@ def judge_row(row: Row, opened: OpenRow, sampling: Sampling) -> Row:
     verdict, reason = judge.verdict_over_all(row)
     if verdict is Verdict.PASS and row.promise is False and sampling.interface is not None:
         row = replace(row, promise=None)  # It states that it fails somewhere, not that it does so here.
-    # No formulation promises that the one scene of a user can be decided, nor each scene of a list about which it
-    # states nothing: they may have no solution.
-    if verdict is Verdict.NOT_JUDGED and not reason.startswith(judge.RAISED) and opened.question.bodies:
-        if sampling.scene is None:
-            is_left = row.promise is None and row.undecided > 0 and opened.listed is not None
-        elif is_left := len(row.outcomes) > 0 and not row.judged:
-            reason = row.outcomes[0].reason or reason
-        verdict = Verdict.UNDECIDED if is_left else verdict
+    is_open = verdict is Verdict.NOT_JUDGED and not reason.startswith(judge.RAISED) and not row.judged
+    if is_open and opened.question.bodies and sampling.scene is not None and len(row.outcomes) > 0:
+        # No formulation promises that the one scene of a user can be decided: it may have no solution.
+        verdict, reason = Verdict.UNDECIDED, row.outcomes[0].reason or reason
     return replace(row, verdict=verdict, reason=reason)
 
 

@@ -216,10 +216,20 @@ def test_text_becomes_fractions_and_text_again() -> None:
     assert format_forces(slave, master) == "1 2 1; 5/3 7/3"
 
 
-@pytest.mark.parametrize("text", ["", "1 2 1", "1 2 1;", "1; 2; 3", "one; two", "1/0; 1", None, 3])
+@pytest.mark.parametrize(
+    "text", ["", "1 2 1", "1 2 1;", "1; 2; 3", "one; two", "1/0; 1", "1e10000000; 1", "1e400; 1", None, 3]
+)
 def test_other_texts_break_the_contract(text: object) -> None:
     with pytest.raises(ContractError, match=r"published_forces: found .*; needed fractions on the slave nodes"):
         Traits(evidence=Evidence(published_forces={"a1": text}))  # type: ignore[dict-item]
+
+
+def test_a_trait_holds_no_number_that_ends_the_judge() -> None:
+    for name in ("activation", "penalty_power"):
+        with pytest.raises(
+            ContractError, match=rf"Traits.rules.{name}: found 1.7e\+308; needed None or a number above"
+        ):
+            Rules(**{name: 1.7e308})  # type: ignore[arg-type]
 
 
 def test_forces_belong_to_names() -> None:

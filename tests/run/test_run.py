@@ -414,7 +414,10 @@ def test_a_property_is_judged_with_nine_tenths_of_its_cases(undecided: int, exam
         cases=lambda _: st.integers(1, examples).map(lambda seed: replace(a_case(1), seed=seed)),
         measure=sometimes,
     )
-    row = one_row(subject(), question, examples=examples)
+    if verdict is Verdict.NOT_JUDGED:  # Where nothing is promised, nothing can be kept or broken.
+        stranger = one_row(subject(), question, examples=examples)
+        assert (stranger.verdict, stranger.unexpected) == (Verdict.UNDECIDED, "")
+    row = one_row(subject(flat=True), question, examples=examples)
     assert (row.planned, row.judged, row.verdict) == (examples, examples - undecided, verdict)
     assert row.unexpected == ("not judged" if verdict is Verdict.NOT_JUDGED else "")
     if verdict is Verdict.NOT_JUDGED:
