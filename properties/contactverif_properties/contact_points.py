@@ -675,7 +675,8 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** These identities hold for right formulations whether they pass the patch test or not:
 
-    - A point with a pressure has a normal of length 1 (8u). A pressure is a number ≥ 0. An idle point carries nothing.
+    - A point with a pressure has a normal of length 1 (8u). A pressure is a number ≥ 0, or negative by the rounding of
+      its gap. An idle point carries nothing.
     - A nodal force has the weight 1. A weighted node lies at a node, not inside a segment.
     - −Σ pressure × weight × normal is the residual of the slave. So it is for weighted nodes on a straight slave, up to
       the difference Δn of its normals by rounding, and to 8u over the covered share w/ℓ of a segment. Points of a
@@ -708,7 +709,10 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
         active = points.select(points.active)
         sizes = penalty * (np.abs(active.gap) + reported.distant)
         values[LAW] = _largest(np.abs(active.pressure + penalty * active.gap) / sizes)
-    return Measurement(check_all(values, tolerances), broken=_breach(points, subject.traits), idle=reported.idle)
+    # Whether a point is active may be decided by a gap that is rounded otherwise.
+    rounding = 8 * UNIT_ROUNDOFF * subject.penalty(state) * reported.distant if rules.enforcement == "penalty" else 0.0
+    broken = _breach(points, subject.traits, rounding)
+    return Measurement(check_all(values, tolerances), broken=broken, idle=reported.idle)
 
 
 def _compare_forces(reported: _Reported) -> tuple[float, float] | None:
@@ -737,13 +741,13 @@ def _compare_forces(reported: _Reported) -> tuple[float, float] | None:
     return difference / size, tolerance + bend + 8 * UNIT_ROUNDOFF * _thinness(reported)
 
 
-def _breach(points: ContactPoints, traits: Traits) -> str:
+def _breach(points: ContactPoints, traits: Traits, rounding: float) -> str:
     inside = (points.slave_shape < 1).all(axis=1) if points.slave_shape.shape[1] else np.abs(points.c) < 1
     if (points.weighted & inside).any():
         return "a weighted node lies inside a segment"
     if traits.rules.penalty == "nodal" and (points.weight[points.active] != 1).any():
         return "a nodal force has a weight other than 1"
-    if not (points.pressure[points.active] >= 0).all():
+    if not (points.pressure[points.active] >= -rounding).all():
         return "a pressure at an active point is negative or NaN"
     if np.nan_to_num(points.pressure[~points.active]).any():
         return "an idle point carries a pressure"

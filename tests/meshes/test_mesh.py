@@ -72,17 +72,6 @@ def test_a_number_is_as_good_as_a_name() -> None:
     assert np.array_equal(by_name.slave.segments, by_number.slave.segments)
 
 
-@pytest.mark.parametrize("binary", [False, True], ids=["ascii", "binary"])
-@pytest.mark.parametrize("version", ["gmsh22", "gmsh"])
-def test_gmsh_formats(version: str, binary: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mesh = meshlane.read(PUNCH, file_format="gmsh")
-    meshlane.write(tmp_path / "punch.msh", mesh, file_format=version, binary=binary)
-    capsys.readouterr()
-    interface = read_interface(tmp_path / "punch.msh", slave="1", master="base")
-    assert points_of(interface) == points_of(read_interface(PUNCH, slave="punch", master="base"))
-    assert capsys.readouterr().out == ""
-
-
 @pytest.mark.parametrize("upper", [[[5, 6]], [[6, 5]]])
 @pytest.mark.parametrize("lower", [[[4, 3], [3, 2]], [[2, 3], [3, 4]], [[4, 3], [2, 3]], [[3, 2], [4, 3]]])
 def test_cells_tell_the_side_whatever_the_order_of_the_lines(
@@ -150,16 +139,6 @@ def test_abaqus_sets_may_hold_cells_beside_the_lines(tmp_path: Path) -> None:
     assert points_of(read_interface(tmp_path / "mesh.inp", slave="PUNCH", master="base")) == points_of(interface)
     with pytest.raises(MisuseError, match=r"--slave: found 'punsh', which is no group of the file; needed 'Punch'\?"):
         read_interface(tmp_path / "mesh.inp", slave="punsh", master="Base")
-
-
-@pytest.mark.parametrize("name", ["mesh.vtu", "mesh.vtk", "mesh.mesh"])
-def test_formats_that_number_their_groups(name: str, tmp_path: Path) -> None:
-    mesh = blocks(cells=[[0, 1, 2, 3], [8, 7, 6, 5]])
-    if name == "mesh.mesh":
-        mesh.cell_data = {"medit:ref": mesh.cell_data["gmsh:physical"]}
-    mesh.field_data = {}
-    meshlane.write(tmp_path / name, mesh)
-    assert points_of(read_interface(tmp_path / name, slave="1", master="2")) == RIGHT
 
 
 def test_second_order_cells_tell_the_side_by_their_corners(read: Callable[..., Interface]) -> None:
