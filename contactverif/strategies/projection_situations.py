@@ -25,17 +25,9 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.oracle.projection_kinds import TAU, kind_of
+from contactverif.strategies import samples
 from contactverif.strategies.given_interface import touches
-from contactverif.strategies.samples import (
-    FURTHEST,
-    PENALTIES,
-    SEEDS,
-    SHUFFLES,
-    Chain,
-    assemble_chains,
-    exact_turns,
-    motions,
-)
+from contactverif.strategies.samples import Chain
 
 Point = tuple[float, float]
 Steps = tuple[list[Point], int]  # Vectors of slave segments from left to right, and which of them carries the point.
@@ -71,7 +63,7 @@ _GAPS = st.builds(_gap, *_SIZES, st.sampled_from([-1, 1, -1, 1, -1, 0]))
 _NONZERO_GAPS = st.builds(_gap, *_SIZES, st.sampled_from([-1, 1]))
 
 
-_ANY_MOTIONS = st.one_of(exact_turns(), motions(), motions(furthest=FURTHEST))
+_ANY_MOTIONS = st.one_of(samples.exact_turns(), samples.motions(), samples.motions(furthest=samples.FURTHEST))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +102,9 @@ def _cases_of_kind(draw: DrawFn, kind: str, sketches: SearchStrategy[Sketch]) ->
     sketch = draw(sketches)
     if sketch.mirrored and draw(st.booleans()):
         sketch = sketch.mirror()
-    motion = draw(exact_turns() if sketch.exact else _ANY_MOTIONS)
-    penalty, seed = draw(PENALTIES), draw(SEEDS)
-    stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(SHUFFLES)
+    motion = draw(samples.exact_turns() if sketch.exact else _ANY_MOTIONS)
+    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
+    stretch, shuffle = draw(_STRETCHES), 0 if sketch.ordered else draw(samples.SHUFFLES)
     reference = replace(sketch.slave, points=sketch.slave.points * stretch)
     slaves, masters, references = [sketch.slave], list(sketch.masters), [reference]
     if draw(_COMPANY):  # Drawn last, so that it goes first.
@@ -124,7 +116,7 @@ def _cases_of_kind(draw: DrawFn, kind: str, sketches: SearchStrategy[Sketch]) ->
         slave = Chain(np.array([[x + 1.5, y + 0.125], [x + 0.5, y + 0.125]]))
         master = Chain(np.array([[x, y], [x + 2.0, y]]))
         slaves, masters, references = [*slaves, slave], [*masters, master], [*references, slave]
-    interface, order = assemble_chains(slaves, masters, references, motion.scale, shuffle)
+    interface, order = samples.assemble_chains(slaves, masters, references, motion.scale, shuffle)
     current = np.vstack([chain.points for chain in (*slaves, *masters)])[order]
     (segment,) = np.flatnonzero(order[interface.slave.segments[:, 0]] == sketch.segment)
     parameters = {"probe_segment": np.array(float(segment)), "probe_c": np.array(sketch.c)}
@@ -411,7 +403,7 @@ def projection_states(draw: DrawFn, interface: Interface) -> Case:
     c, xi, gap, degrees = draw(_ROUND_C), draw(_FEET), draw(_GAPS), draw(_DEGREES)
     if draw(st.booleans()):
         xi = 1 - xi
-    penalty, seed = draw(PENALTIES), draw(SEEDS)
+    penalty, seed = draw(samples.PENALTIES), draw(samples.SEEDS)
     positions = _set_point(interface, (slave_segment, c), (home, xi), gap, degrees)
     if not touches(interface, positions):
         c = -1.0

@@ -27,14 +27,8 @@ from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lie
 from contactverif.strategies import general_cases, tie_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
+from contactverif_properties import roundoff
 from contactverif_properties.applicability import refuse_unstated
-from contactverif_properties.roundoff import (
-    WEIGHT_REASON,
-    WEIGHT_ROUNDINGS,
-    normal_rounding,
-    rounding_distance,
-    sum_slave_forces,
-)
 from contactverif_properties.states import Pass, any_cases, freeze_state, split_passes
 
 LARGER_MESHES = ("larger random mesh", "larger mesh, exact ties")
@@ -81,7 +75,7 @@ class _Reported:
     @property
     def distant(self) -> float:
         """The length Z at which a point may be rounded."""
-        return rounding_distance(self.state, self.traits)
+        return roundoff.rounding_distance(self.state, self.traits)
 
     @property
     def idle(self) -> bool:
@@ -142,10 +136,6 @@ def _largest(values: FloatArray) -> float:
     return float(np.max(values, initial=0.0))
 
 
-define_projection = partial(
-    Property.define, cases=Cases.random(projected_cases), kinds=PROJECTED_KINDS, needs=frozenset({"contact_points"})
-)
-
 FLAT, TILTED = "flat faces", "tilted and warped faces"
 
 
@@ -158,7 +148,13 @@ def _projected_faces(interface: Interface | None = None) -> dict[str, SearchStra
     return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
 
 
-ON_FACES = Cases.random(_projected_faces)
+_define = partial(
+    Property.define,
+    cases=Cases.random(projected_cases),
+    cases_in_space=Cases.random(_projected_faces),
+    kinds=PROJECTED_KINDS,
+    needs=frozenset({"contact_points"}),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,9 +248,7 @@ FARTHER = Quantity(
 )
 
 
-@define_projection(
-    id="projection.segment", rank=320, quantities=(FARTHER,), cases_in_space=ON_FACES, applicable=_refuse_without_rule
-)
+@_define(id="projection.segment", rank=320, quantities=(FARTHER,), applicable=_refuse_without_rule)
 def projection_segment(case: Case, subject: Subject) -> Measurement:
     """Each contact point is measured against the master segment that the stated rule names.
 
@@ -324,13 +318,7 @@ POSITION = Quantity("error of the position", "4u", "Two products and their sum a
 _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 
-@define_projection(
-    id="projection.place",
-    rank=70,
-    quantities=(GAP, XI, NORMAL, POSITION),
-    cases_in_space=ON_FACES,
-    applicable=_refuse_without_rule,
-)
+@_define(id="projection.place", rank=70, quantities=(GAP, XI, NORMAL, POSITION), applicable=_refuse_without_rule)
 def projection_place(case: Case, subject: Subject) -> Measurement:
     """Position, ξ, normal and gap of each contact point are those of its place.
 
@@ -415,9 +403,7 @@ def _refuse_other_decisions(traits: Traits) -> str:
     return _refuse_without_rule(traits)
 
 
-@define_projection(
-    id="projection.activity", rank=50, quantities=(WRONG,), cases_in_space=ON_FACES, applicable=_refuse_other_decisions
-)
+@_define(id="projection.activity", rank=50, quantities=(WRONG,), applicable=_refuse_other_decisions)
 def projection_activity(case: Case, subject: Subject) -> Measurement:
     """A contact point is active exactly where its gap is closed and its foot is on the master.
 
@@ -495,16 +481,12 @@ def _decide_on_faces(each: Pass, reported: _Reported) -> tuple[BoolArray, BoolAr
 ENDS_REASON = "An end that a master node cuts is a quotient of differences; X is added unless points keep their digits."
 WEIGHT = Quantity("weight against the area's ends", "16u", ENDS_REASON)
 ENDS = Quantity("area outside its segment, its point or its neighbour", "16u", ENDS_REASON)
-SUM = Quantity("error of the sum of weights", "192u", f"{WEIGHT_REASON} Nodes that are covered by less are left out.")
-
-
-@define_projection(
-    id="projection.area",
-    rank=210,
-    quantities=(WEIGHT, ENDS, SUM),
-    cases_in_space=ON_FACES,
-    applicable=_refuse_unknown_areas,
+SUM = Quantity(
+    "error of the sum of weights", "192u", f"{roundoff.WEIGHT_REASON} Nodes that are covered by less are left out."
 )
+
+
+@_define(id="projection.area", rank=210, quantities=(WEIGHT, ENDS, SUM), applicable=_refuse_unknown_areas)
 def projection_area(case: Case, subject: Subject) -> Measurement:
     """Areas of competence and weights add up to the slave's length, or to what of it is covered.
 
@@ -538,7 +520,7 @@ def projection_area(case: Case, subject: Subject) -> Measurement:
         trials = [find_errors(each, reported, length) for length in _lengths(each, subject.traits)]
         best = min(trials, key=lambda trial: max(trial.values()))
         values = {name: max(value, best[name]) for name, value in values.items()}
-    tolerances = {name: {SUM: 64 + WEIGHT_ROUNDINGS}.get(name, 16) * UNIT_ROUNDOFF for name in values}
+    tolerances = {name: {SUM: 64 + roundoff.WEIGHT_ROUNDINGS}.get(name, 16) * UNIT_ROUNDOFF for name in values}
     broken = _area_breach(reported, fits=values[SUM] <= tolerances[SUM])
     return Measurement(check_all(values, tolerances), broken=broken, idle=reported.idle)
 
@@ -663,7 +645,7 @@ FOOT = Quantity(
 LAW = Quantity("pressure against −ε̂ × gap", "8u", "The gap may be formed anew for the pressure.")
 
 
-@define_projection(id="projection.forces", rank=40, quantities=(UNIT, FORCES, FOOT, LAW), cases_in_space=ON_FACES)
+@_define(id="projection.forces", rank=40, quantities=(UNIT, FORCES, FOOT, LAW))
 def projection_forces(case: Case, subject: Subject) -> Measurement:
     """The pressures at the contact points are the forces on the slave, and their gaps are what the places show.
 
@@ -722,7 +704,7 @@ def _compare_forces(reported: _Reported) -> tuple[float, float] | None:
     give a pressure in one place and none in the other. So Σ|R| counts for no less than a penetration of u D gives.
     """
     points, state, distant = reported.points, reported.state, reported.distant
-    size, bend = sum_slave_forces(state, reported.forces), _bend(reported)
+    size, bend = roundoff.sum_slave_forces(state, reported.forces), _bend(reported)
     balanced = np.abs(reported.forces.sum(axis=0)).max() <= UNIT_ROUNDOFF * 64 * state.n_segments * size
     if bend > STRAIGHT or (points.on_master.any() and not balanced):  # `balance.force` asks for that.
         return None
@@ -737,7 +719,7 @@ def _compare_forces(reported: _Reported) -> tuple[float, float] | None:
     stiffness = state.penalty * state.slave_measure  # Force per length of penetration.
     size = max(size, UNIT_ROUNDOFF * distant * stiffness)
     reach = min(size / stiffness, state.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * (distant + normal_rounding(state)) / reach + 4 * state.n_segments)
+    tolerance = UNIT_ROUNDOFF * (8 * (distant + roundoff.normal_rounding(state)) / reach + 4 * state.n_segments)
     return difference / size, tolerance + bend + 8 * UNIT_ROUNDOFF * _thinness(reported)
 
 

@@ -13,6 +13,7 @@ At a kink two right formulations may give different forces. What they have in co
   and none at a kink, since it may smooth the master there.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -22,7 +23,7 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
-from contactverif.contract.property import CheckedNumber, Measurement, Property, Quantity, check_all
+from contactverif.contract.property import CheckedNumber, Measure, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import solve_by_engine
@@ -33,22 +34,13 @@ from contactverif.mechanics.system import System
 from contactverif.problems import block_scenes, flat_states, hard_corner_states
 from contactverif.problems.blocks import pressure_of
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
-from contactverif_properties import exact_forces, patch_solved
+from contactverif_properties import exact_forces, patch_solved, roundoff
 from contactverif_properties.applicability import knows_total, may_act_twice, refuse_dependent_multipliers
 from contactverif_properties.newton_method import end_details
-from contactverif_properties.roundoff import (
-    SEGMENT_REASON,
-    WEIGHT_REASON,
-    WEIGHT_ROUNDINGS,
-    gap_tolerance,
-    ratio,
-    rounding_distance,
-    stated_gap_quantity,
-)
 from contactverif_properties.states import FrozenState
 
-FLAT_TOTAL = stated_gap_quantity("error of the total force")
-FLAT_NODAL = stated_gap_quantity("error of a nodal force")
+FLAT_TOTAL = roundoff.stated_gap_quantity("error of the total force")
+FLAT_NODAL = roundoff.stated_gap_quantity("error of a nodal force")
 ALONG = replace(
     FLAT_TOTAL, name="force along the surface", reason=f"{FLAT_TOTAL.reason} A flat surface pushes across itself alone."
 )
@@ -59,7 +51,7 @@ VACUOUS = "the gap is smaller than the rounding of positions that far from the o
 def measure_flat(case: Case, subject: Subject) -> Measurement:
     """Compare the forces of a uniform penetration with what is known about them."""
     penetration, traits, in_plane = case.parameter("penetration"), subject.traits, case.interface.dim == PLANE
-    tolerance = gap_tolerance(case, penetration, rounding_distance(case, traits))
+    tolerance = roundoff.gap_tolerance(case, penetration, roundoff.rounding_distance(case, traits))
     if tolerance >= 1:
         return Measurement(undecided=VACUOUS)
     exact = flat_forces(case)
@@ -67,7 +59,7 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     # In space the force along the surface has two components.
     tangents = case.parameters["direction" if in_plane else "directions"]
     along = float(np.hypot.reduce(np.abs(np.atleast_1d((slave @ tangents.T).sum(axis=0)))))
-    numbers = [ALONG.check(ratio(along, float(np.abs(slave).sum())), tolerance)]
+    numbers = [ALONG.check(roundoff.ratio(along, float(np.abs(slave).sum())), tolerance)]
     push = float((slave @ exact_forces.normal_of(case)).sum())
     whole = float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     broken, finding = "" if push > 0 else "nothing pushes the slave out of the master", None
@@ -88,22 +80,24 @@ def flat_forces(case: Case) -> FloatArray:
     return exact_forces.push_apart(case, case.parameters["weights"], case.penalty * case.parameter("penetration"))
 
 
-_define_flat = partial(
-    Property.define,
-    quantities=FLAT_QUANTITIES,
-    role="exact",
-    # What is asked is promised with the patch test, or where that is denied, with the total.
-    promise=lambda traits: {True: True, False: knows_total(traits) or None, None: None}[traits.promises.patch.flat],
-    exact=flat_forces,
-)
+_States = Callable[[], tuple[Case, ...]]
 
 
-@_define_flat(
-    id="hard.offset",
-    rank=420,
-    cases=Cases.from_list(flat_states.offset_states),
-    cases_in_space=Cases.from_list(flat_states.offset_face_states),
-)
+def _define_flat(*, id: str, rank: int, plane: _States, space: _States) -> Callable[[Measure], Property]:
+    return Property.define(
+        id=id,
+        rank=rank,
+        quantities=FLAT_QUANTITIES,
+        role="exact",
+        cases=Cases.from_list(plane),
+        cases_in_space=Cases.from_list(space),
+        # What is asked is promised with the patch test, or where that is denied, with the total.
+        promise=lambda traits: {True: True, False: knows_total(traits) or None, None: None}[traits.promises.patch.flat],
+        exact=flat_forces,
+    )
+
+
+@_define_flat(id="hard.offset", rank=420, plane=flat_states.offset_states, space=flat_states.offset_face_states)
 def hard_offset(case: Case, subject: Subject) -> Measurement:
     """Far from the origin, with gaps of 1e-6 to 1e-9, forces are those of the stored positions.
 
@@ -127,12 +121,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define_flat(
-    id="hard.deep",
-    rank=380,
-    cases=Cases.from_list(flat_states.deep_states),
-    cases_in_space=Cases.from_list(flat_states.deep_face_states),
-)
+@_define_flat(id="hard.deep", rank=380, plane=flat_states.deep_states, space=flat_states.deep_face_states)
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
 
@@ -150,12 +139,7 @@ def hard_deep(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define_flat(
-    id="hard.node-hit",
-    rank=410,
-    cases=Cases.from_list(flat_states.node_hit_states),
-    cases_in_space=Cases.from_list(flat_states.node_hit_face_states),
-)
+@_define_flat(id="hard.node-hit", rank=410, plane=flat_states.node_hit_states, space=flat_states.node_hit_face_states)
 def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
 
@@ -174,12 +158,7 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define_flat(
-    id="hard.search",
-    rank=390,
-    cases=Cases.from_list(flat_states.search_states),
-    cases_in_space=Cases.from_list(flat_states.search_face_states),
-)
+@_define_flat(id="hard.search", rank=390, plane=flat_states.search_states, space=flat_states.search_face_states)
 def hard_search(case: Case, subject: Subject) -> Measurement:
     """Other surfaces nearby, sharp wedges and the seam of a closed chain do not mislead the search.
 
@@ -201,7 +180,7 @@ def hard_search(case: Case, subject: Subject) -> Measurement:
 
 
 _TOLERANCE = "u(8X/min(|g|, ℓ) + 4N + 128)"
-_REASON = f"{SEGMENT_REASON} {WEIGHT_REASON}"
+_REASON = f"{roundoff.SEGMENT_REASON} {roundoff.WEIGHT_REASON}"
 DIRECTION = Quantity("part outside the normals", _TOLERANCE, _REASON)
 TOTAL = Quantity("total force outside its bounds", _TOLERANCE, _REASON)
 TWO_PASSES = "springs act in two passes at most, on n + 1 nodes for n segments."
@@ -218,16 +197,16 @@ def _measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measur
     largest = case.penalty * case.diameter * case.slave_length
     numbers, broken = [SIZE.check(size / largest, 4.0)], ""
     reach = min(case.parameter("penetration"), case.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments + WEIGHT_ROUNDINGS)
+    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments + roundoff.WEIGHT_ROUNDINGS)
     if bounds[1] == 0:
         broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
     else:
         outside = max(0.0, _outside(total, edges) - aside)
-        numbers.append(DIRECTION.check(ratio(outside, size), tolerance))
+        numbers.append(DIRECTION.check(roundoff.ratio(outside, size), tolerance))
         # A master that is smoothed through its nodes bulges at a kink, and who states no rule for gaps may do that.
         if knows_total(traits) and ((edges[0] == edges[1]).all() or traits.rules.gap is not None):
             numbers.append(TOTAL.check(max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1]), tolerance))
-    details = {"share of the upper bound": ratio(along, float(bounds[1]))}
+    details = {"share of the upper bound": roundoff.ratio(along, float(bounds[1]))}
     # Where the lower bound is 0, no force is as good an answer as any.
     return Measurement(numbers, broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
 
@@ -416,9 +395,9 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
         tangent, (ways, across) = state.tangent[:n, :n], _motions(case)
         resistance = float(across @ tangent @ across) / (case.penalty * case.slave_measure)
         values |= {PRESSING: resistance, PULLING: -resistance}
-        roundoff = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
+        rounding = (64 * UNIT_ROUNDOFF * size + 4 * gap) / case.shortest_segment
         accuracy = 30 * (UNIT_ROUNDOFF * size / case.shortest_segment) ** (2 / 3)
-        tolerances |= {PRESSING: _all_springs(case, subject.traits) * (1 + accuracy), PULLING: roundoff}
+        tolerances |= {PRESSING: _all_springs(case, subject.traits) * (1 + accuracy), PULLING: rounding}
         if gap:
             depth = DEPTH * UNIT_ROUNDOFF * size
             z = state.case.z.copy()
@@ -426,7 +405,7 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
             tangent = FrozenState.at(state.formulation, replace(state.case, z=z)).tangent[:n, :n]
             sliding = max(float(np.abs(tangent @ way).max()) for way in ways)
             values[SLIDING] = sliding / (case.penalty * around)
-            tolerances[SLIDING] = roundoff + 4 * depth / case.shortest_segment
+            tolerances[SLIDING] = rounding + 4 * depth / case.shortest_segment
     return Measurement(check_all(values, tolerances)).after("pressed in by 64 u X", SLIDING)
 
 

@@ -196,17 +196,16 @@ def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> 
     return replace(case, interface=renumbered, z=case.positions[old].reshape(-1)), Carry(nodes, np.eye(interface.dim))
 
 
-_define = partial(Property.define, family="invariants", asks=WITH_BARRIER)
-
-
-@_define(
-    id="mirror",
-    rank=120,
-    role="comparison",
-    quantities=_same_answer("in the mirror image"),
+_define = partial(
+    Property.define,
+    family="invariants",
     cases=Cases.random(smooth_cases),
     cases_in_space=Cases.random(smooth_surface_cases),
+    asks=WITH_BARRIER,
 )
+
+
+@_define(id="mirror", rank=120, role="comparison", quantities=_same_answer("in the mirror image"))
 def mirror(case: Case, subject: Subject) -> Measurement:
     """The mirror image of a state has the mirror image of its forces and of its tangent.
 
@@ -237,8 +236,6 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     rank=400,
     role="trait",
     quantities=_same_answer("with roles exchanged"),
-    cases=Cases.random(smooth_cases),
-    cases_in_space=Cases.random(smooth_surface_cases),
     promise=lambda traits: traits.promises.unbiased,
 )
 def swap(case: Case, subject: Subject) -> Measurement:
@@ -278,7 +275,6 @@ def renumbering_cases(
     role="comparison",
     quantities=_same_answer("in other numbers"),
     cases=Cases.random(renumbering_cases),
-    cases_in_space=Cases.random(smooth_surface_cases),
     kinds=(ANY, CLOSED),
 )
 def renumbering(case: Case, subject: Subject) -> Measurement:
@@ -555,8 +551,6 @@ def _turn_state(case: Case) -> tuple[Case, FloatArray]:
     role="comparison",
     turn=7,
     quantities=(TURNED_FORCES, TURNED_TANGENT),
-    cases=Cases.random(smooth_cases),
-    cases_in_space=Cases.random(smooth_surface_cases),
     applicable=lambda traits: (
         "normals are those of the reference configuration" if traits.abilities.motions == "small" else ""
     ),

@@ -179,15 +179,8 @@ def find_kink(state: FrozenState, reach: float, direction: FloatArray | None = N
     case = state.case
     if state.has_points and case.interface.dim == PLANE:
         margin = min(
-            kink_margin(
-                each.interface,
-                each.z,
-                each.points.slave_segment,
-                each.points.c,
-                each.points.area_from,
-                each.points.area_to,
-            )
-            for each in state.passes
+            kink_margin(each.interface, each.z, at.slave_segment, at.c, at.area_from, at.area_to)
+            for each, at in ((each, each.points) for each in state.passes)
         )
         if margin <= np.sqrt(2) * reach:  # The reach is of a coordinate, the margin of a node.
             return f"a kink: a decision hangs on {margin:.2g}, no more than nodes may move"

@@ -1,5 +1,6 @@
 """Multipliers: their sign, their scale, whether they are unique, and whether the bodies resist all of them."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,10 @@ REDUNDANT = Quantity(
 )
 
 
-@Property.define(
+_define = partial(Property.define, asks=frozenset({"multiplier"}), bodies=True)
+
+
+@_define(
     id="complementarity",
     rank=450,
     family="multipliers",
@@ -51,9 +55,7 @@ REDUNDANT = Quantity(
     promise=lambda traits: (
         True if traits.rules.enforcement == "multiplier" and not refuse_dependent_multipliers(traits) else None
     ),
-    asks=frozenset({"multiplier"}),
     applicable=refuse_dependent_multipliers,
-    bodies=True,
 )
 def complementarity(case: Case, subject: Subject) -> Measurement:
     """All multipliers of a solution press, and the scale of the contact decision does not change the solution.
@@ -102,15 +104,13 @@ def covered_and_overhanging_cases(scene: Case | None = None) -> dict[str, Search
     return {kind: cases for kind, cases in kinds.items() if cases is not None}
 
 
-@Property.define(
+@_define(
     id="multipliers.rank",
     rank=480,
     quantities=(REDUNDANT,),
     cases=Cases.random(covered_and_overhanging_cases),
     kinds=(COVERED, OVERHANG),
     promise=lambda traits: traits.promises.independent_multipliers,
-    asks=frozenset({"multiplier"}),
-    bodies=True,
 )
 def multiplier_rank(case: Case, subject: Subject) -> Measurement:
     """The constraints are independent, so that the multipliers are unique.
@@ -164,16 +164,14 @@ SLOPE = Quantity(
 )
 
 
-@Property.define(
+@_define(
     id="stability.inf-sup",
     rank=490,
     quantities=(ZEROS, SLOPE),
     series={CONSTANT: "1", SEGMENT: "length", ZERO_COUNT: "1", MULTIPLIER_COUNT: "1"},
     cases=Cases.from_list(refinement_cases),
     promise=lambda traits: traits.promises.inf_sup,
-    asks=frozenset({"multiplier"}),
     applicable=lambda traits: refuse_unstated(traits, "penalty"),
-    bodies=True,
 )
 def inf_sup(case: Case, subject: Subject) -> Measurement:
     """The bodies resist every pressure of the multipliers, as much on a fine mesh as on a coarse one.

@@ -1,7 +1,7 @@
 """The patch test where the interface is a circle, as of two rings that are shrunk on each other, or a broken line."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import product
 from math import inf, pi
 from typing import Literal
@@ -259,13 +259,18 @@ def _kinked_cases() -> tuple[Case, ...]:
     )
 
 
-@Property.define(
-    id="patch.kinked",
-    rank=500,
-    quantities=(STRESS, SLAVE, MASTER, PRESSURE, APPROACH, CUT, FALL),
+_define_kinked = partial(
+    Property.define,
     cases=Cases.from_list(_kinked_cases),
     promise=lambda traits: traits.promises.patch.kinked,
     bodies=True,
+)
+
+
+@_define_kinked(
+    id="patch.kinked",
+    rank=500,
+    quantities=(STRESS, SLAVE, MASTER, PRESSURE, APPROACH, CUT, FALL),
     exact=lambda case: uniform_forces(case.interface, patch_of(case)[0].pressure),
 )
 def patch_kinked(case: Case, subject: Subject) -> Measurement:
@@ -415,14 +420,7 @@ KINK_STRESS = Quantity("stress error", KINK_TERMS, KINK_REASON)
 KINK_FORCES = Quantity("error of a nodal force", KINK_TERMS, KINK_REASON)
 
 
-@Property.define(
-    id="engine.kinked",
-    needs=frozenset({SOLVE}),
-    bodies=True,
-    quantities=(KINK_STRESS, KINK_FORCES),
-    cases=Cases.from_list(_kinked_cases),
-    promise=lambda traits: traits.promises.patch.kinked,
-)
+@_define_kinked(id="engine.kinked", needs=frozenset({SOLVE}), quantities=(KINK_STRESS, KINK_FORCES))
 def engine_kinked(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays exact on an interface with a kink.
 

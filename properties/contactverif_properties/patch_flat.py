@@ -45,20 +45,23 @@ _MOVED = 16.0  # A moved end node bends shares by 128uX over a segment, which th
 
 # The share for NTS-AR without a tolerance past free ends: the slave ends where the master ends in every ninth case.
 WITHOUT_TOLERANCE = 0.11
+_define_uniform = partial(
+    Property.define,
+    role="exact",
+    exact=exact_forces.forces_of_penetration,
+    usual_undecided=WITHOUT_TOLERANCE,
+    asks=WITH_BARRIER,
+)
 
 
-@Property.define(
+@_define_uniform(
     id="patch.flat.transmission",
     rank=240,
-    role="exact",
     turn=2,
     quantities=(FORCE,),
     cases=Cases.random(flat_cases),
     cases_in_space=Cases.random(surfaces.flat_surface_cases),
     promise=lambda traits: traits.promises.patch.flat,
-    exact=exact_forces.forces_of_penetration,
-    usual_undecided=WITHOUT_TOLERANCE,
-    asks=WITH_BARRIER,
 )
 def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     """A uniform penetration of a flat interface gives the exact nodal forces on both sides.
@@ -121,9 +124,8 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     """
     stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
     interface, penetration = case.interface.at(case.interface.nodes * stretch), case.parameter("penetration")
-    formulation = subject.for_case(case)
     stretched = replace(case, interface=interface)
-    state = FrozenState.with_multiplier(formulation, stretched, case.penalty * penetration)
+    state = FrozenState.with_multiplier(subject.for_case(case), stretched, case.penalty * penetration)
     exact = exact_forces.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     areas = {"current": exact, "reference": exact * stretch ** (interface.dim - 1)}
     exact = areas.pop(rule := subject.traits.rules.area or "current")
@@ -131,10 +133,8 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     total = exact_forces.pushing_forces(state)[: interface.n_slave_nodes].sum(axis=0)
     error = float(np.linalg.norm(total - exact))
     value, tolerance = error / float(np.linalg.norm(exact)), roundoff.gap_tolerance(case, penetration)
-    undecided = ""
-    if value > tolerance:
-        rounding = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
-        undecided = explain_by_kink(state, rounding, {"forces": error})
+    rounding = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
+    undecided = explain_by_kink(state, rounding, {"forces": error}) if value > tolerance else ""
     finding, action = exact_forces.total_force(total, exact), f"on a reference {stretch:g} times as long"
     if np.linalg.norm(total - other) <= tolerance * np.linalg.norm(other):
         finding = replace(finding, remark=f"the force follows the {follows} area, and area={rule!r} is promised")
@@ -196,20 +196,13 @@ def _move_ends_inwards(case: Case) -> Case | None:
     return replace(case, z=positions.reshape(-1), parameters={**case.parameters, "along": along}) if moved else None
 
 
-_define_class = partial(
-    Property.define,
-    quantities=(FORCE, GAP, PRESSURE),
-    exact=exact_forces.forces_of_penetration,
-    usual_undecided=WITHOUT_TOLERANCE,
-    asks=WITH_BARRIER,
-)
+_define_class = partial(_define_uniform, quantities=(FORCE, GAP, PRESSURE))
 
 
 @_define_class(
     id="patch.flat.normal",
     rank=160,
     turn=3,
-    role="exact",
     cases=Cases.random(normal_cases),
     cases_in_space=Cases.random(surfaces.matched_surface_cases),
     promise=promise_normal,
@@ -241,7 +234,7 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     return _measure_class(case, subject)
 
 
-@_define_class(id="patch.flat.single", rank=200, role="exact", cases=Cases.random(single_cases), promise=promise_single)
+@_define_class(id="patch.flat.single", rank=200, cases=Cases.random(single_cases), promise=promise_single)
 def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     """They are exact too where inner master nodes lie in the middle of slave segments.
 

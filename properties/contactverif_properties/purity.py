@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import fields
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -197,17 +198,17 @@ FIRST_TANGENT = Quantity(
 )
 
 
-@Property.define(
+_define = partial(Property.define, role="foundation", family="invariants", asks=WITH_BARRIER)
+
+
+@_define(
     id="purity",
     rank=10,
-    role="foundation",
     turn=8,
     restarts=True,
-    family="invariants",
     quantities=(REPEATED, REORDERED, TANGENT, POINTS, BATCHED, SECOND_PROCESS, IN_ONE_CALL, ONE_RESIDUAL, ONE_TANGENT),
     cases=Cases.random(any_cases),
     cases_in_space=Cases.random(surface_cases),
-    asks=WITH_BARRIER,
 )
 def purity(case: Case, subject: Subject) -> Measurement:
     """An answer depends on the question alone: repeated, reordered, interleaved, in a batch, and in one call.
@@ -325,15 +326,12 @@ def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) ->
     return np.where(moves, distant, state.z)
 
 
-@Property.define(
+@_define(
     id="purity.long",
     rank=80,
-    role="foundation",
-    family="invariants",
     quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
     cases=Cases.from_list(lambda: (named_case("offset-c"),)),
     cases_in_space=Cases.from_list(lambda: (named_case("tilted-faces"),)),
-    asks=WITH_BARRIER,
 )
 def purity_long(case: Case, subject: Subject) -> Measurement:
     """The first answers of an instance and of a process are those that a long life repeats.

@@ -455,15 +455,17 @@ def _step(system: System, matrix: FloatArray, residual: FloatArray) -> FloatArra
     return change
 
 
-@Property.define(
+_define_locking = partial(
+    Property.define, quantities=(DRIFT, ROUGHNESS), cases=Cases.from_list(refined_blocks.wave_cases), bodies=True
+)
+
+
+@_define_locking(
     id="stability.locking",
     rank=510,
-    quantities=(DRIFT, ROUGHNESS),
     needs=frozenset({"pair"}),
-    cases=Cases.from_list(refined_blocks.wave_cases),
     promise=lambda traits: None if traits.promises.locks is None else not traits.promises.locks,
     applicable=refuse_unknown_pressure,
-    bodies=True,
 )
 def locking(case: Case, subject: Subject) -> Measurement:
     """With stiff springs the interface is no stiffer and its pressure no rougher than with matching meshes.
@@ -638,14 +640,7 @@ def _solve_frozen(system: System, start: FloatArray, pairing: Pairing | None) ->
     return None
 
 
-@Property.define(
-    id="engine.locking",
-    quantities=(DRIFT, ROUGHNESS),
-    cases=Cases.from_list(refined_blocks.wave_cases),
-    promise=lambda traits: None,
-    needs=frozenset({SOLVE}),
-    bodies=True,
-)
+@_define_locking(id="engine.locking", promise=lambda traits: None, needs=frozenset({SOLVE}))
 def engine_locking(case: Case, subject: Subject) -> Measurement:
     """With stiff springs or multipliers the interface is no stiffer and its pressure no rougher than it should be.
 

@@ -335,20 +335,15 @@ def _compare_blocks(judge: BlockJudge) -> _Comparison:
 
 _define = partial(
     Property.define,
-    quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
+    cases=Cases.random(smooth_cases),
+    cases_in_space=Cases.random(smooth_surface_cases),
     promise=promise_exact_tangent,
     needs=frozenset({"tangent"}),
     asks=WITH_BARRIER,
 )
 
 
-@_define(
-    id="tangent.sparsity",
-    rank=30,
-    turn=9,
-    cases=Cases.random(smooth_cases),
-    cases_in_space=Cases.random(smooth_surface_cases),
-)
+@_define(id="tangent.sparsity", rank=30, turn=9, quantities=(BLOCK, COMPLEX_BLOCK, LACKING))
 def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent is the derivative of the residual, and the pattern lacks no entry.
 
@@ -379,7 +374,11 @@ def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
 
 
 @_define(
-    id="tangent.long", rank=20, cases=Cases.from_list(long_states), cases_in_space=Cases.from_list(long_face_states)
+    id="tangent.long",
+    rank=20,
+    quantities=(BLOCK, COMPLEX_BLOCK, LACKING),
+    cases=Cases.from_list(long_states),
+    cases_in_space=Cases.from_list(long_face_states),
 )
 def tangent_long(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent of a long interface is the derivative of the residual.
@@ -552,16 +551,7 @@ COMPLEX = Quantity(
 )
 
 
-@Property.define(
-    id="tangent.directional",
-    rank=0,
-    quantities=(CENTRAL, TAYLOR, COMPLEX),
-    cases=Cases.random(smooth_cases),
-    cases_in_space=Cases.random(smooth_surface_cases),
-    promise=promise_exact_tangent,
-    needs=frozenset({"tangent"}),
-    asks=WITH_BARRIER,
-)
+@_define(id="tangent.directional", rank=0, quantities=(CENTRAL, TAYLOR, COMPLEX))
 def tangent_directional(case: Case, subject: Subject) -> Measurement:
     """The tangent is the derivative of the residual on a frozen pairing.
 
