@@ -36,16 +36,9 @@ from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
+from contactverif.problems import hertz
 from contactverif.problems.disk import grade
 from contactverif.problems.flat_states import collect
-from contactverif.problems.hertz import (
-    LinePressure,
-    displacements,
-    hertz_contact,
-    layer_contact,
-    side_forces,
-    surface_displacements,
-)
 from contactverif.problems.problem import (
     FORCES,
     ITERATIONS,
@@ -85,16 +78,16 @@ class HertzBox:
         pairs = zip(self.young, self.poisson, strict=True)
         return 1 / sum((1 - poisson**2) / young for young, poisson in pairs)
 
-    def pressure(self, penalty: float | None) -> LinePressure:
+    def pressure(self, penalty: float | None) -> hertz.LinePressure:
         """Return the exact pressure with the distributed penalty ε̂, or that of multipliers (None)."""
         return _pressure(self, penalty)
 
 
 @cache
-def _pressure(box: HertzBox, penalty: float | None) -> LinePressure:
+def _pressure(box: HertzBox, penalty: float | None) -> hertz.LinePressure:
     if penalty is None:
-        return hertz_contact(box.half_width, box.radius, box.stiffness)
-    return layer_contact(box.half_width, box.radius, box.stiffness, penalty)
+        return hertz.hertz_contact(box.half_width, box.radius, box.stiffness)
+    return hertz.layer_contact(box.half_width, box.radius, box.stiffness, penalty)
 
 
 @cache
@@ -130,10 +123,10 @@ def hertz_body(box: HertzBox, number: int, *, penalty: float | None, across: int
     x, depth, zone = (a * box.mesh_scale * lines for lines in mesh_lines(number, across))
     grid = np.arange(len(x) * len(depth)).reshape(len(depth), len(x))
     along, down = (part.reshape(-1) for part in np.meshgrid(x, depth))
-    load = side_forces(pressure, x, depth).reshape(-1, 2)
+    load = hertz.side_forces(pressure, x, depth).reshape(-1, 2)
     axis, is_parabola = int(np.abs(x).argmin()), number == 0
     supports = [grid[-1, axis]] if is_parabola else [grid[-1, axis], grid[len(depth) // 2, axis]]
-    exact = displacements(pressure, along[supports], down[supports], box.young[number], box.poisson[number])
+    exact = hertz.displacements(pressure, along[supports], down[supports], box.young[number], box.poisson[number])
     fixed, imposed = np.zeros(load.shape, bool), np.zeros(load.shape)
     fixed[supports, 0], imposed[supports, 0] = True, exact[:, 0]
     fixed[supports[0], 1] = not is_parabola
@@ -199,16 +192,16 @@ def _exact_displacements(box: HertzBox, penalty: float | None, number: int, plac
     """Return what `exact_displacements` does; both choices of the slave and all formulations ask for the same."""
     pressure, x = box.pressure(penalty), places.x
     young, poisson = box.young[number], box.poisson[number]
-    moves = surface_displacements(pressure, x, young, poisson)
+    moves = hertz.surface_displacements(pressure, x, young, poisson)
     if number == 1:
         lines, depth, _ = mesh_lines(1, across)
         named = box.half_width * box.mesh_scale * np.array([lines[np.abs(lines).argmin()], depth[-1]])
-        moves -= [0, 1] * displacements(pressure, named[:1], named[1:], young, poisson)[0]
+        moves -= [0, 1] * hertz.displacements(pressure, named[:1], named[1:], young, poisson)[0]
         return freeze(moves * [1, -1], np.float64)
     centre = np.zeros(1)
     below = exact_displacements(box, penalty, 1, centre, across)[0, 1]
     layer = 0.0 if penalty is None else pressure.peak / penalty
-    moves[:, 1] += below - layer - surface_displacements(pressure, centre, young, poisson)[0, 1]
+    moves[:, 1] += below - layer - hertz.surface_displacements(pressure, centre, young, poisson)[0, 1]
     return freeze(moves, np.float64)
 
 
@@ -277,7 +270,7 @@ class HertzStudy:
             best=self._best(across, pressure, multipliers),
         )
 
-    def _best(self, across: int, pressure: LinePressure, multipliers: bool) -> Errors:
+    def _best(self, across: int, pressure: hertz.LinePressure, multipliers: bool) -> Errors:
         """Return what the mesh allows: linear pressures, pressures that are constant on segments, and their length.
 
         Segments of the parabola are chords, whose distances from it have the root mean square h²/(√180 · 2R). They add

@@ -181,8 +181,6 @@ Chain = list[complex]  # Walked with the body on the left.
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """A surface and a point near it."""
-
     chains: Sequence[Chain]
     point: complex
     closed: Collection[int] = ()  # The places of the chains whose last node is joined to the first.

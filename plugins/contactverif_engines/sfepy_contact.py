@@ -96,7 +96,6 @@ class _Model:
         return Equations([Equation("balance", total)])
 
     def write_supports(self) -> Any:
-        """Return the supports, and what is moved."""
         from sfepy.discrete import Function
         from sfepy.discrete.conditions import Conditions, EssentialBC
 

@@ -182,8 +182,6 @@ PRINTED: Mapping[PaperFormulation, Mapping[str, int]] = {  # 1: the paper says t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MultiplierTest:
-    """A patch test with Lagrange multipliers."""
-
     formulation: Annotated[PaperFormulation, Column("", WORDS, "formulation, as on the command line", part="name")]
     scene: Annotated[str, Column("", WORDS, "scene")]  # One of `SCENES`.
     end: Annotated[str, Column("", WORDS, "how Newton's method ended")]

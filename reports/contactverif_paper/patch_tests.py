@@ -27,17 +27,8 @@ from contactverif.mechanics.newton import End
 from contactverif.problems import catalogue
 from contactverif.problems.uniform_stress import condition_tolerance, stress_error
 from contactverif.studies import solved_scenes
+from contactverif_paper import figure_style
 from contactverif_paper import paper_formulations as paper
-from contactverif_paper.figure_style import (
-    LETTERS,
-    REFERENCE_LINE,
-    WIDTH,
-    add_legend,
-    line_style,
-    new_figure,
-    new_panels,
-    use_round_ticks,
-)
 from contactverif_paper.force_transmission import ForceTable, PrintedForces
 from contactverif_paper.paper_formulations import PaperFormulation, name_columns, subject_of
 from contactverif_paper.paper_item import (
@@ -325,22 +316,22 @@ def _plot_pressures(tests: PatchTests) -> Figure:
     """Draw one panel for each scene, or for a scene and its close-up, with the paper's axes."""
     views = [(patch, patch.setup.axis) for patch in tests.patches]
     views += [(patch, patch.setup.close_up) for patch in tests.patches if patch.setup.close_up]
-    figure, panels = new_panels(3.6 if len(views) > 1 else 3.4, len(views))
+    figure, panels = figure_style.new_panels(3.6 if len(views) > 1 else 3.4, len(views))
     for axes, (patch, limits) in zip(panels, views, strict=True):
         low, high = limits
-        axes.axhline(1.0, **REFERENCE_LINE)
+        axes.axhline(1.0, **figure_style.REFERENCE_LINE)
         for formulation, curve in patch.curves.items():
             inside = low <= curve.pressure.min() and curve.pressure.max() <= high
-            axes.plot(curve.x, curve.pressure, clip_on=not inside, **line_style(formulation, len(curve.x)))
+            axes.plot(curve.x, curve.pressure, clip_on=not inside, **figure_style.line_style(formulation, len(curve.x)))
         axes.set(xlabel="x coordinate (length)", ylabel="contact pressure / p (–)")
-        use_round_ticks(axes, 6)
+        figure_style.use_round_ticks(axes, 6)
         left, right = patch.setup.x_axis
         step = 1.0 if right - left <= _SHORT_AXIS else 2.0  # The paper's axes have a tick at every second unit.
         axes.set_xticks(np.arange(left, right + 0.5, step))
         axes.set_xlim(left, right)
         axes.set_ylim(low, high)
     remarks = {row: curve.remark for patch in tests.patches for row, curve in patch.curves.items()}
-    add_legend(figure, tests.formulations, reference="exact", remarks=remarks)
+    figure_style.add_legend(figure, tests.formulations, reference="exact", remarks=remarks)
     return figure
 
 
@@ -349,8 +340,8 @@ def _plot_penetrations(tests: PatchTests) -> Figure:
     patches, across = tests.patches, 2
     down = -(-sum(len(patch.curves) for patch in patches) // across)
     wide, high = np.ptp(patches[0].nodes, axis=0)
-    panel = min((WIDTH - 1.6) / across, _TALLEST * wide / high)
-    figure = new_figure(down * (panel * high / wide + 0.35) + 0.7)
+    panel = min((figure_style.WIDTH - 1.6) / across, _TALLEST * wide / high)
+    figure = figure_style.new_figure(down * (panel * high / wide + 0.35) + 0.7)
     grid = figure.subplots(down, across, squeeze=False)
     for axes in grid.ravel():
         axes.set_axis_off()
@@ -378,13 +369,15 @@ def _plot_penetrations(tests: PatchTests) -> Figure:
         Patch(facecolor="white", edgecolor="0.35", linewidth=0, hatch="xxxxxx", label="penetration"),
     ]
     title = "\n".join(["colour: −σₙ (force / length)", *lines])
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, title=title, title_fontsize=LETTERS)
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=3, title=title, title_fontsize=figure_style.LETTERS
+    )
     return figure
 
 
 def _plot_meshes(tests: PatchTests) -> Figure:
     """Draw the undeformed meshes of both bodies of the first patch test, and the pressure on them."""
-    figure = new_figure(3.6)
+    figure = figure_style.new_figure(3.6)
     axes = figure.subplots()
     axes.set_axis_off()
     for body in tests.patches[0].solved.bodies:
@@ -400,7 +393,7 @@ def _plot_meshes(tests: PatchTests) -> Figure:
     axes.set_aspect("equal")
     axes.margins(0.04)
     axes.autoscale_view()
-    figure.supxlabel("filled: slave nodes; open: master nodes; arrows: p = 1", fontsize=LETTERS)
+    figure.supxlabel("filled: slave nodes; open: master nodes; arrows: p = 1", fontsize=figure_style.LETTERS)
     return figure
 
 
@@ -468,8 +461,6 @@ CASE_B = patch_item(
 
 @dataclass(frozen=True, slots=True)
 class _TwoPasses:
-    """Errors of one and of two passes on case B."""
-
     departure: Annotated[tuple[float, float], Column("passes", "1", "largest |p/p_exact − 1|, Fig. 18")]
     stress_error: Annotated[tuple[float, float], Column("passes", "1", "stress error at 10 E/h")]
     limit: Annotated[float, Column("", "m-1", "penalty over E up to which two passes are no better")]
@@ -614,8 +605,6 @@ _UNEQUAL = "VTS-PPT on Example 1bis, the foundation ten times as stiff: error of
 
 @dataclass(frozen=True, slots=True)
 class _Section71:
-    """Errors on Examples 1 and 1bis."""
-
     departure: Annotated[
         tuple[tuple[float, ...], ...], Column("scene formulation", "1", "largest |p/p_exact − 1| of the figures")
     ]

@@ -301,8 +301,6 @@ _TINY = 2.0**-100  # The length of a complex step; lengths are about 1, so it ro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tangents:
-    """Properties of the tangents in the solution."""
-
     # The largest difference over the largest entry of K d, over random d.
     error: Annotated[FloatArray, Column("formulation", "1", "difference of K d from a complex step, over K d")]
     asymmetry: Annotated[FloatArray, Column("formulation", "1", "largest entry of K − Kᵀ over that of K")]
@@ -391,8 +389,6 @@ _VANISHES = 1e-12  # A coefficient below this share of the largest one is zero.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Terms:
-    """The terms of each formulation."""
-
     terms: Annotated[
         IntArray,
         Column(
@@ -418,8 +414,6 @@ class _Cost:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Section63:
-    """Terms and cost, and the tangents of Section 6.2."""
-
     terms: _Terms
     cost: _Cost
     tangents: _Tangents

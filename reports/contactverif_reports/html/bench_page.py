@@ -52,7 +52,6 @@ def bench_markdown(results: BenchResults, report: str, with_pictures: bool) -> s
 
 
 def _sections(results: BenchResults) -> list[dict[str, Any]]:
-    """Return what a page says of each scene."""
     sections = []
     for scene in results.scenes:
         reached, words = costs.split_targets(results, scene)

@@ -16,18 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from contactverif_reports.bench_costs import (
-    MOST_CURVES,
-    REFERENCE,
-    ROUNDOFF,
-    Ratio,
-    costs_at,
-    curve,
-    format_share,
-    rank,
-    ratios_at,
-    runtimes,
-)
+from contactverif_reports import bench_costs
+from contactverif_reports.bench_costs import REFERENCE
 from contactverif_reports.bench_results import BEST, DEEPEST, ERRORS, RULE, VARIANTS, BenchResults
 from contactverif_reports.plot.case_figures import save
 from contactverif_reports.tables import decimal
@@ -52,7 +42,7 @@ def plot_bench(results: BenchResults, folder: Path) -> None:
     for scene in results.scenes:
         if len(results.meshes_of(scene)) > 1:
             save(make_scene_figure(results, scene), folder / f"{scene}.svg")
-            if len(results.formulations) > MOST_CURVES:
+            if len(results.formulations) > bench_costs.MOST_CURVES:
                 save(make_each_figure(results, scene), folder / f"{scene}-each.svg")
     save(make_cost_figure(results), folder / "cost.svg")
     save(make_runtime_figure(results), folder / "runtimes.svg")
@@ -61,7 +51,7 @@ def plot_bench(results: BenchResults, folder: Path) -> None:
 
 def highlights(results: BenchResults) -> dict[str, dict[str, Any]]:
     """Return {formulation: its pen}: the reference, and those that are the most exact on the first scene."""
-    order = rank(results, results.scenes[0])
+    order = bench_costs.rank(results, results.scenes[0])
     order.sort(key=lambda name: name != REFERENCE)
     return {
         name: {"color": colour, "marker": marker}
@@ -101,10 +91,10 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
                 _plot_curve(axes, results, scene, (name, kind, number), pens.get(name, _GREY))
         row[0].set_ylabel(f"error of the {kind}")
     best = np.median(results.best_pressure[results.ladders(scene)], axis=0)
-    if REFERENCE in results.formulations and (best > ROUNDOFF).all():  # Uniform pressures have no error.
+    if REFERENCE in results.formulations and (best > bench_costs.ROUNDOFF).all():  # Uniform pressures have no error.
         # What the mesh allows pressures, at the times of the reference.
         for axes, number in zip(panels[list(ERRORS).index("pressure")], _AXES, strict=True):
-            x, _ = curve(results, REFERENCE, scene, "pressure", number)
+            x, _ = bench_costs.curve(results, REFERENCE, scene, "pressure", number)
             axes.plot(1e3 * x, best, **_DOTTED)
     for axes, label in zip(panels[-1], _AXES.values(), strict=True):
         axes.set_xlabel(label)
@@ -131,7 +121,7 @@ def _plot_curve(
 ) -> None:
     """Draw the curve of a formulation, an error and a number: at the penalty of the rule, or at the best of some."""
     name, kind, number = series
-    x, errors = curve(results, name, scene, kind, number, variants)
+    x, errors = bench_costs.curve(results, name, scene, kind, number, variants)
     finite = np.isfinite(errors) & np.isfinite(x)
     axes.plot(1e3 * x[finite], errors[finite], **{"linewidth": 1.1, "markerfacecolor": "none", **pen})
 
@@ -169,16 +159,18 @@ def make_cost_figure(results: BenchResults) -> Figure:
     """Return what two errors on the first scene cost: ratios of evaluation and factorisation, and linear systems."""
     scene = results.scenes[0]
     targets = results.targets[scene][:2]
-    order, costs = rank(results, scene)[::-1], [costs_at(results, scene, target) for target in targets]
+    order = bench_costs.rank(results, scene)[::-1]
+    costs = [bench_costs.costs_at(results, scene, target) for target in targets]
     figure, grid = _panels((5.2, 1.3 + 0.22 * len(order)), 1, 3, sharey=True)
     (evaluation, systems, factorisation), handles = grid[0], []
     for target, each, colour, marker in zip(targets, costs, _COLOURS, _MARKERS, strict=False):
         for axes, number in zip((evaluation, factorisation), _AXES, strict=True):
-            _plot_ratios(axes, ratios_at(results, scene, target, number), order, {"color": colour, "marker": marker})
+            ratios = bench_costs.ratios_at(results, scene, target, number)
+            _plot_ratios(axes, ratios, order, {"color": colour, "marker": marker})
         finite = [(count, place) for place, name in enumerate(order) if (count := each[name].middle("systems")) < inf]
         look: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "mfc": "none"}
         systems.plot(*zip(*finite, strict=True), **look)
-        handles.append(Line2D([], [], label=f"error of {format_share(target)}", **look))
+        handles.append(Line2D([], [], label=f"error of {bench_costs.format_share(target)}", **look))
     for place, name in enumerate(order):
         if not any(cost[name].is_usual for cost in costs):
             never: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7, "color": "0.45"}
@@ -194,7 +186,7 @@ def make_cost_figure(results: BenchResults) -> Figure:
     return figure
 
 
-def _plot_ratios(axes: Axes, ratios: Mapping[str, Ratio], order: list[str], pen: dict[str, Any]) -> None:
+def _plot_ratios(axes: Axes, ratios: Mapping[str, bench_costs.Ratio], order: list[str], pen: dict[str, Any]) -> None:
     axes.set_xscale("log")
     axes.axvline(1.0, color="0.35", linewidth=0.8)
     for height, name in enumerate(order):
@@ -218,7 +210,7 @@ def make_runtime_figure(results: BenchResults) -> Figure:
         for axes, number in zip(row, _AXES, strict=True):
             axes.set(xscale="log", ylim=(-0.03, 1.03))
             for name in sorted(results.formulations, key=lambda name: name in pens):
-                seconds = np.sort(1e3 * runtimes(results, name, scene, number))
+                seconds = np.sort(1e3 * bench_costs.runtimes(results, name, scene, number))
                 finite = seconds[np.isfinite(seconds)]
                 pen = {"color": pens[name]["color"], "linewidth": 1.2} if name in pens else _GREY
                 axes.step(finite, np.arange(1, len(finite) + 1) / len(seconds), where="post", **pen)
