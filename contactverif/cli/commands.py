@@ -84,9 +84,9 @@ def verify(
     run; it goes once it passes.
 
     \bExit status
-      0  every promise is kept, and every property was judged
-      1  a promise is broken, a property could not be judged, or a plugin
-         does not load
+      0  every promise is kept, and each could be judged
+      1  a promise is broken or could not be judged, nothing was judged, or
+         a plugin does not load
       2  the command line is wrong, or a file cannot be written; one line
          says what is needed
       130  stopped by Ctrl-C, or 143 by SIGTERM, after the table

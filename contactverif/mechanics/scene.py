@@ -11,7 +11,7 @@ import itertools
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -405,13 +405,11 @@ class Scene:
     def gap_at_rest(self) -> float:
         """Return the least way between a node of one side and the other side, where bodies move and nothing presses.
 
-        It is a length: −infinity where the supports alone do not hold all bodies, infinity where no node sees the other
-        side.
+        It is a length, infinite where no node sees the other side. A body that its supports do not hold stays in place.
         """
-        free = [_move_freely(body, 1.0) for body in self.condensed_bodies]
-        if any(part is None for part in free):
-            return -np.inf
-        positions = self.positions(np.concatenate([np.zeros(0), *(part for part in free if part is not None)]))
+        parts = zip(map(partial(_move_freely, factor=1.0), self.condensed_bodies), self.unknowns, strict=True)
+        free = [np.zeros(len(unknowns)) if part is None else part for part, unknowns in parts]
+        positions = self.positions(np.concatenate([np.zeros(0), *free]))
         there = replace(self.interface, nodes=positions.reshape(-1, 2))
         return float(min(ways_to_master(each)[0].min() for each in (there, there.swap_roles())))
 

@@ -400,7 +400,11 @@ def read_deck(path: str, place: str) -> PlainMesh:
                     continue
                 names = [keys.get(("SURFACE", card.prefix + _label(text)), "") for text in fields[:2]]
                 is_pair = card.keyword == "CONTACTPAIR"
-                card.need(all(names) or not is_pair, f"{', '.join(fields)}; needed two surfaces, the slave first", line)
+                unknown = ", ".join(text for text, name in zip(fields, names, strict=False) if not name)
+                needed = "needed two surfaces of the deck, the slave first"
+                card.need(
+                    not (unknown and is_pair), f"{unknown}, which is no surface of faces or nodes; {needed}", line
+                )
                 if all(names):
                     (pairs if is_pair else others).append((names[0], names[1]))
             deck.warnings += ["*CONTACT PAIR: ADJUST is not read; no node is moved."] * ("ADJUST" in card.parameters)

@@ -1,5 +1,7 @@
 """Two surfaces of a mesh can touch if their normals oppose each other, and no body lies between them."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
@@ -9,18 +11,20 @@ from contactverif.contract.interface import ONE_SIDED, Interface, Surface, turns
 _RAYS = 50  # So many elements of a surface look behind them.
 
 
-def check_facing(interface: Interface) -> None:
-    """Refuse two surfaces whose mean normals, weighted by length or area, do not oppose each other."""
-    slave, master = (mean_direction(surface, interface.nodes) for surface in (interface.slave, interface.master))
+def check_facing(interface: Interface, can_turn: Collection[str] = ("slave", "master")) -> None:
+    """Refuse two surfaces whose mean normals, weighted by length or area, do not oppose each other.
+
+    `can_turn` are those without cells beside them; the one whose body lies on the side of the other is named.
+    """
+    nodes, n_slave = interface.nodes, interface.n_slave_nodes
+    slave, master = (mean_direction(surface, nodes) for surface in (interface.slave, interface.master))
     if slave is None or master is None or slave @ master < 0:
         return
-    words = [f"({', '.join(f'{part:.3g}' for part in normal)})" for normal in (slave, master)]
-    needed = (
-        "surfaces that face each other. The cells beside a side tell where its body is: keep them, or turn a side "
-        "that has none with --flip slave or --flip master"
-    )
-    actual = f"mean normals {words[0]} of the slave and {words[1]} of the master, which do not oppose each other"
-    raise MisuseError("--mesh", actual, needed)
+    wrong = "slave" if slave @ (nodes[:n_slave].mean(axis=0) - nodes[n_slave:].mean(axis=0)) > 0 else "master"
+    needed = f"--flip {wrong} turns that one" if wrong in can_turn else "other groups"
+    places = [describe(0.0 - normal.round(3)) for normal in (slave, master)]
+    actual = f"bodies on the same side: that of the slave lies towards {places[0]}, that of the master {places[1]}"
+    raise MisuseError("--mesh", actual, f"two sides that face each other: {needed}")
 
 
 def mean_direction(surface: Surface, nodes: FloatArray) -> FloatArray | None:
@@ -52,8 +56,8 @@ def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary
     slave, master : IntArray, shape (n, n_corners)
         The elements of both surfaces, each with its body behind it.
     boundary : IntArray, shape (n, n_corners)
-        All other elements around the bodies. Where there are none, a body ends behind an element as far away as the
-        element is wide.
+        All other elements around the bodies, and the master too if both are of one body. Where there are none, a body
+        ends behind an element as far away as the element is wide.
     """
     master, boundary = _simplices(master), _simplices(boundary)
     of_master, of_boundary = _normals(points[master]), _normals(points[boundary])
@@ -67,7 +71,7 @@ def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary
         if is_back:
             ends = -_ways(origin, normal, points[boundary])[of_boundary @ normal < 0]
             width = np.ptp(points[element], axis=0).max()
-            is_back = behind > (ends[ends > 0].min(initial=np.inf) if len(boundary) else width)
+            is_back = behind >= (ends[ends > 0].min(initial=np.inf) if len(boundary) else width)
         votes += 1 if is_back else -1
         if is_back and not places:
             there = origin - behind * normal

@@ -15,7 +15,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SEGMENT, Interface, Surface
-from contactverif.meshes.cell_sides import CellSides
+from contactverif.meshes.cell_sides import CellSides, label_bodies
 from contactverif.meshes.facing import back_to_back, check_facing, describe, mean_direction
 from contactverif.meshes.plain_mesh import CORNERS, PlainMesh, find_group, read_mesh
 
@@ -111,17 +111,22 @@ def read_sides(
         _orient(option, points, side, cells, flip) for option, side in sides.items()
     )
     interface = _interface(points, first, second)
+    known = {"slave": slave_is_known, "master": master_is_known}
+    check_facing(interface, [name for name, is_known in known.items() if not is_known.all()])
     words = mesh.warnings + remark + of_slave + of_master
-    surfaces = (interface.slave, slave_is_known), (interface.master, master_is_known)
-    for option, (surface, is_known) in zip(sides, surfaces, strict=True):
-        if not is_known.all():
+    for option, surface in zip(sides, (interface.slave, interface.master), strict=True):
+        if not known[option[2:]].all():
             normal = mean_direction(surface, interface.nodes)
             place = "on the left of its lines" if normal is None else f"towards {describe(0.0 - normal.round(3))}"
             words += f"{option}: no cells beside it; its body is taken to lie {place} (--flip {option[2:]} turns it)\n"
-    if places := back_to_back(points, first, second, cells.around(first, second)):
+    labels = label_bodies(mesh.cells.values(), len(points))
+    of_one_body = np.isin(labels[first], labels[second]).any()
+    if places := back_to_back(points, first, second, cells.around(first, *(() if of_one_body else (second,)))):
         if slave_is_known.any() or master_is_known.any():
-            needed = "two surfaces of which each is before the other"
-            raise MisuseError("--mesh", f"{places}, with their bodies between them", needed)
+            needed = "two sides that face each other across a gap"
+            raise MisuseError(
+                "--mesh", f"{places}, with {'the body' if of_one_body else 'both bodies'} between", needed
+            )
         words += f"{places} turn their backs to each other, or overlap by more than a line's length\n"
     return MeshSides(mesh, points, first, second, interface, words)
 
@@ -134,7 +139,7 @@ def _orient(
     words = _chain_words(option, points, side, neighbours)
     one_way, by_cells = _run_one_way(option, points, side, neighbours, cells.signs(option, side))
     if n_turned := int((one_way[~by_cells] != side[~by_cells]).any(axis=1).sum()):
-        words += f"{option}: {n_turned} of its {len(side)} {_word(side)} are turned to run as the first one\n"
+        words += f"{option}: turned to run as the first of its {len(side)} {_word(side)}: {n_turned}\n"
     if flip in (option[2:], "both"):
         if by_cells.all():
             needed = "a side without cells: they say on which side a body lies"
@@ -159,7 +164,6 @@ def _interface(points: FloatArray, slave: IntArray, master: IntArray) -> Interfa
     except MisuseError as error:
         option = f"--{error.argument}" if error.argument in ("slave", "master") else argument
         raise MisuseError(option, error.found, error.needed) from error
-    check_facing(interface)
     return interface
 
 

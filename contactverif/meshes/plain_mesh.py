@@ -113,7 +113,7 @@ def find_group(mesh: PlainMesh, option: str, name: str | None, kinds: Collection
     if (more := len(words) - _MOST_LISTED) > 0:
         listed += f" and {more} more, which contactverif scenes lists"
     if not able:
-        others = f", which has {', '.join(map(repr, mesh.groups))} of other cells" if mesh.groups else ""
+        others = f"; those of the file are of other cells: {', '.join(map(repr, mesh.groups))}" if mesh.groups else ""
         listed = f"a group of {' or '.join(kinds)} elements, made in the mesher (a physical group, *SURFACE, …){others}"
     needed = f"{' or '.join(near)}? The groups are {listed}" if near else f"one of {listed}" if able else listed
     remark = f" ({one_line(mesh.warnings, _LONGEST_REASON)})" if mesh.warnings else ""

@@ -88,7 +88,8 @@ def _read(path: Path, place: str) -> PlainMesh:
         return read_mdpa(str(path))
     with path.open("rb") as stream:
         head = stream.read(100)
-    if head.removeprefix(_MARK).lstrip().startswith(b"*") and path.suffix.lower() != ".f3grid":
+    starts_a_deck = head.removeprefix(_MARK).lstrip().startswith(b"*") and path.suffix.lower() != ".f3grid"
+    if starts_a_deck or path.suffix.lower() == ".inp":
         return read_deck(str(path), place)
     output, errors = StringIO(), StringIO()
     # Ansys uses the ending .msh too, and a Nastran file may begin with a remark.

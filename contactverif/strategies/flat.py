@@ -27,7 +27,7 @@ from contactverif.strategies.translations import FINENESS, exact_shifts
 
 Sides = tuple[FloatArray, FloatArray]  # The ascending x of the nodes of a slave chain and of a master chain below it.
 
-FLAT = "a straight slave over a parallel master"
+FLAT = "a straight slave over a parallel master that covers it"
 OF_CLASS = "a flat mesh whose nodes meet"
 MOST_MASTER_SEGMENTS = 100  # The most master segments in one chain.
 _DEPTHS = st.integers(1, 8)  # quarters

@@ -234,7 +234,7 @@ def test_a_mesh_with_cells_is_a_scene_and_the_screen_says_what_is_not_asked(ask:
     assert "passes: balance 1 of 1, newton 1 of 1\n" in answer.out
     folded = " ".join(answer.out.split())
     assert re.search(r"not asked here, needs: meshes with a known answer: .* \d+ of hard", folded)
-    assert "a straight slave over a parallel master: patch.flat." in folded
+    assert "a straight slave over a parallel master that covers it: patch.flat." in folded
     assert all(len(line) <= 80 for line in answer.out.splitlines())
 
 

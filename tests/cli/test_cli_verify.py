@@ -415,7 +415,7 @@ def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask,
         answers = (ask(words, tmp_path / name, *flip) for flip in ((), ("--flip", "master")))
         right, wrong = sorted(answers, key=lambda answer: answer.status)
         assert right.status == 0
-        check_mistake(wrong, r"--mesh: found mean normals .* do not oppose each other; .*--flip.*")
+        check_mistake(wrong, r"--mesh: found bodies on the same side: .*: --flip master turns that one")
 
 
 def test_the_table_lines_up_at_any_width(ask: Ask, tmp_path: Path) -> None:

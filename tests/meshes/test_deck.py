@@ -170,7 +170,10 @@ def test_files_that_a_deck_includes_are_read_in_their_place(tmp_path: Path) -> N
         (SQUARES + "*NCOPY, CHANGE NUMBER=10\n", "line 14: *NCOPY: found this card, which makes or moves nodes"),
         (SQUARES + "*SURFACE, NAME=A\nLOW, S5\n", "face S5 of elements CPE4; needed S1, S2, S3, S4"),
         (SQUARES + "*ELEMENT, TYPE=MASS\n9, 1\n*SURFACE, NAME=A\n9, S1\n", "needed elements that are read"),
-        (SQUARES + SURFACES + "*CONTACT PAIR\nTop, Low\n", "found Top, Low; needed two surfaces, the slave first"),
+        (
+            SQUARES + SURFACES + "*CONTACT PAIR\nTop, Low\n",
+            "found Low, which is no surface of faces or nodes; needed two",
+        ),
         (NODES, "needed a deck with *NODE and *ELEMENT"),
         (NODES.replace("1,0,0", "1,0,x"), "line 2: *NODE: found 0, x"),
         (NODES.replace("*NODE", "*NODE, SYSTEM=C"), "needed rectangular coordinates"),
