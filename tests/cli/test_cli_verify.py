@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import meshlane
 import pytest
 from asking import Answer, Ask, check_mistake, install_formulations, run_inline
 from fresh_process import MAIN
@@ -394,28 +393,6 @@ def test_a_mesh_of_the_user_is_judged(ask: Ask) -> None:
     verdicts = {words[1] for words in rows(answer.out).values()}
     assert "pass" in verdicts
     assert verdicts <= {"pass", "not", "fails"}  # not applicable, fails as stated
-
-
-def test_a_mesh_that_does_not_face_itself_is_refused_and_flip_turns_it(ask: Ask, tmp_path: Path) -> None:
-    """Without cells nobody knows on which side the base lies; --flip says that it is the other one."""
-    mesh = meshlane.read(PUNCH)
-    number = int(mesh.field_data["base"][0])
-    indices = [index for index, block in enumerate(mesh.cells) if block.type in ("line", "triangle")]
-    tags = [mesh.cell_data["gmsh:physical"][index] for index in indices]
-    for name in ("as.msh", "turned.msh"):
-        blocks = []
-        for index, tag in zip(indices, tags, strict=True):
-            block = mesh.cells[index]
-            turns = name == "turned.msh" and block.type == "line" and (tag == number).all()
-            blocks.append((block.type, block.data[:, ::-1] if turns else block.data))
-        data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-        copy = meshlane.Mesh(mesh.points, blocks, cell_data=data, field_data=mesh.field_data)
-        meshlane.write(tmp_path / name, copy, file_format="gmsh22", binary=False)
-        words = "verify nts --slave punch --master base -p balance.force --examples 2 --seed 1 --mesh"
-        answers = (ask(words, tmp_path / name, *flip) for flip in ((), ("--flip", "master")))
-        right, wrong = sorted(answers, key=lambda answer: answer.status)
-        assert right.status == 0
-        check_mistake(wrong, r"--mesh: found bodies on the same side: .*: --flip master turns that one")
 
 
 def test_the_table_lines_up_at_any_width(ask: Ask, tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ MISTAKES = {  # {command line: argument, found, needed}
     "verify nts --slave punch": r"--mesh: found none, but --slave; needed --mesh FILE, .*",
     "verify nts --master base": r"--mesh: found none, but --master; needed --mesh FILE, .*",
     "verify nts --slave punch --master base": r"--mesh: found none, but --slave; needed --mesh FILE, .*",
+    f"verify nts --mesh {PUNCH} --slave punch --master base --flip slave": r"--flip: found slave, and cells .*",
     "verify nts --flip both": r"--mesh: found none, but --flip; needed --mesh FILE, .*",
     "verify nts --material base=1,0.3": r"--mesh: found none, but --material; needed --mesh FILE, .*",
     "verify nts --support lid=0,0": r"--mesh: found none, but --support; needed --mesh FILE, .*",

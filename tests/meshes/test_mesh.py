@@ -66,12 +66,6 @@ def test_the_punch_of_the_documentation() -> None:
     assert points_of(swapped) == (master, slave)
 
 
-def test_a_number_is_as_good_as_a_name() -> None:
-    by_name, by_number = (read_interface(PUNCH, slave=a, master=b) for a, b in (("punch", "base"), ("1", "2")))
-    assert np.array_equal(by_name.nodes, by_number.nodes)
-    assert np.array_equal(by_name.slave.segments, by_number.slave.segments)
-
-
 @pytest.mark.parametrize("upper", [[[5, 6]], [[6, 5]]])
 @pytest.mark.parametrize("lower", [[[4, 3], [3, 2]], [[2, 3], [3, 4]], [[4, 3], [2, 3]], [[3, 2], [4, 3]]])
 def test_cells_tell_the_side_whatever_the_order_of_the_lines(

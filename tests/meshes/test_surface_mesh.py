@@ -53,15 +53,6 @@ def read(tmp_path: Path) -> Read:
     return written_and_read
 
 
-@pytest.mark.parametrize("suffix", [".msh", ".vtu"])
-@pytest.mark.parametrize("faces", [TRIANGLES, QUADS], ids=["triangles", "quadrilaterals"])
-def test_two_named_surfaces_are_an_interface(read: Read, faces: tuple[object, object], suffix: str) -> None:
-    interface = read(*faces, suffix=suffix)
-    assert interface.nodes.tolist() == [*UPPER, *LOWER]
-    assert interface.slave.faces.tolist() == list(faces[0])  # type: ignore[call-overload]
-    assert interface.master.measures(interface.nodes).sum() == pytest.approx(12)
-
-
 def test_volume_cells_show_the_side_of_a_body(read: Read) -> None:
     upper, lower = TRIANGLES
     turned = [upper[0], upper[1][::-1]], [face[::-1] for face in lower]
