@@ -44,7 +44,7 @@ FOLDERS = {
 # {package: what it may weigh}
 BUDGET = {
     "contract": Weight(14, 4935, 2801),
-    "mechanics": Weight(21, 4364, 2893),
+    "mechanics": Weight(21, 4368, 2893),
     "cases": Weight(41, 9190, 5910),
     "properties": Weight(21, 9038, 5411),
     "run": Weight(20, 4221, 3016),
@@ -57,7 +57,7 @@ BUDGET = {
     "foreign": Weight(19, 2868, 1994),
     "paper": Weight(13, 3223, 2458),
 }
-SUM = Weight(265, 61254, 41080)
+SUM = Weight(265, 61258, 41080)
 TESTS = 49142  # Lines of tests and evidence.
 COMMANDS = 14
 WORDS = 40000  # Words of Markdown, without the changelog and the stored results under reports/.

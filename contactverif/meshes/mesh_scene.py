@@ -52,7 +52,11 @@ def read_scene(
 
     Parameters
     ----------
-    path, slave, master, pair, flip
+    path, slave, master : str | None
+        As in `read_interface`, where `path` may be a Path.
+    pair : int
+        As in `read_interface`.
+    flip : {"slave", "master", "both"} | None
         As in `read_interface`.
     materials : Mapping[str, tuple[float, float]] | None
         {group: (Young's modulus, Poisson's ratio)}. The bodies to which members of the group belong have this
