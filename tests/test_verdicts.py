@@ -66,7 +66,7 @@ def judge_all(property_id: str) -> Mapping[str, Row]:
     for verdict in {*verdicts.values()}:
         subjects = [load_subject(name) for name in FAILS if verdicts[name] is verdict]
         result = run(subjects, [question], examples=examples_of(question, verdict), seed=SEED)
-        assert result.promises_kept
+        assert (result.unexpected, result.not_loaded, result.opposite_signs) == ((), (), ())
         rows |= {row.formulation: row for row in result.rows}
     return rows
 
