@@ -234,7 +234,7 @@ class CaseSummary:
 
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-MADE_MESHES = "meshes with a known answer"
+ANSWERED = "meshes with a known answer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +262,7 @@ class Cases:
     make: Callable[..., Any]
     is_list: bool = False
     on_place: Callable[[Any], Any] | None = None
-    needs: str = MADE_MESHES
+    needs: str = ANSWERED
     faces: tuple[int, ...] = ()
 
     @classmethod
@@ -277,10 +277,7 @@ class Cases:
 
     @classmethod
     def from_list(
-        cls,
-        make: Callable[[], tuple[Case, ...]],
-        on_place: Callable[[Any], Any] | None = None,
-        needs: str = MADE_MESHES,
+        cls, make: Callable[[], tuple[Case, ...]], on_place: Callable[[Any], Any] | None = None, needs: str = ANSWERED
     ) -> Cases:
         """Return a list of cases, each with a name of its own; tables and reports call it by that name.
 
@@ -333,4 +330,4 @@ def name_of_source(function: Callable[..., Any]) -> str:
 
 def needs_of_place(function: Callable[..., Any]) -> str:
     """Return the stored words about what a function that makes cases needs of an interface or a scene."""
-    return str(getattr(function, "needs", "") or MADE_MESHES)
+    return str(getattr(function, "needs", "") or ANSWERED)

@@ -214,7 +214,9 @@ def judge_row(row: Row, opened: OpenRow, sampling: Sampling) -> Row:
     verdict, reason = judge.verdict_over_all(row)
     if verdict is Verdict.PASS and row.promise is False and sampling.interface is not None:
         row = replace(row, promise=None)  # It states that it fails somewhere, not that it does so here.
-    is_open = verdict is Verdict.NOT_JUDGED and not reason.startswith(judge.RAISED) and not row.judged
+    is_open = (
+        verdict in (Verdict.NOT_JUDGED, Verdict.UNDECIDED) and not reason.startswith(judge.RAISED) and not row.judged
+    )
     if is_open and opened.question.bodies and sampling.scene is not None and len(row.outcomes) > 0:
         # No formulation promises that the one scene of a user can be decided: it may have no solution.
         verdict, reason = Verdict.UNDECIDED, row.outcomes[0].reason or reason

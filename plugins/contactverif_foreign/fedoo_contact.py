@@ -100,6 +100,11 @@ def fedoo(*, penalty: float, kind: str, reach: float = inf, tol: float = 0.1) ->
         no choice for meshes of all sizes.
     tol : float
         The part of an element by which a foot may lie past its end; the default is that of fedoo.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such search, or a library is not installed.
     """
     for package in choose("kind", kind, _SEARCHES):
         if find_spec(package) is None:

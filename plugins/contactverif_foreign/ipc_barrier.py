@@ -83,6 +83,11 @@ def ipctk(*, penalty: float, kind: str, activation: float = 0.5, areas: bool = T
         The activation distance d̂ over the shortest segment in the reference configuration.
     areas : bool
         Weight nodes by half of their segments, as Li et al. (2023) do.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such collision set, or ipctk is not installed.
     """
     collision_set = choose("kind", kind, _SETS)
     if find_spec("ipctk") is None:

@@ -116,6 +116,11 @@ def ngsolve(*, penalty: float, kind: str, order: int = 5, reach: float = inf) ->
     reach : float
         The largest distance of a place from its point, over the longest master segment in the reference configuration.
         NGSolve has no default; a far body with long segments would change a finite one.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such kind, NGSolve is not installed, or the order is negative.
     """
     is_energy = choose("kind", kind, {"energy": True, "work": False})
     if find_spec("ngsolve") is None:

@@ -88,6 +88,11 @@ def opensees(*, penalty: float, kind: str) -> OpenSeesContact:
         The normal stiffness Kn of a spring, a force per length.
     kind : str
         The element: "nts" (zeroLengthContactNTS2D) or "interface" (zeroLengthInterface2D).
+
+    Raises
+    ------
+    MisuseError
+        If there is no such element, or OpenSeesPy is not installed.
     """
     element = choose("kind", kind, _ELEMENTS)
     if find_spec("openseespy") is None:

@@ -137,7 +137,7 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     undecided = explain_by_kink(state, rounding, {"forces": error}) if value > tolerance else ""
     finding, action = exact_forces.total_force(total, exact), ""
     if np.linalg.norm(total - other) <= tolerance * np.linalg.norm(other):
-        action = f"on a reference {stretch:g} times as long"  # No other mistake is one of the reference.
+        action = f"on a reference {stretch:g} times as long"  # It explains no other force.
         finding = replace(finding, remark=f"the force follows the {follows} area, and area={rule!r} is promised")
     return Measurement([TOTAL.check(value, tolerance)], undecided).after(action, finding=finding)
 
