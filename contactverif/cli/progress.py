@@ -1,7 +1,8 @@
 """The progress of a run on standard error: a line for each row, and below it a bar, or in a file a line now and then.
 
-While the bar is up, Ctrl-C or SIGTERM ends the run at the next case at the latest. Python drops an interrupt that
-arrives in a callback of the garbage collector or of compiled code; without the bar such a run would go on to its end.
+While the bar is up, Ctrl-C or SIGTERM ends the run at the next case at the latest, or at the next look at a plugin that
+does not answer. Python drops an interrupt that arrives in a callback of the garbage collector or of compiled code;
+without the bar such a run would go on to its end.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from rich.text import Text
 
 from contactverif.cli.console import QuietConsole
 from contactverif.contract.errors import one_line
+from contactverif.isolation.process import stop_signals
 from contactverif.run import scheduler
 from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
@@ -60,13 +62,13 @@ class Bar:
         )
         self._task: TaskID | None = None
         self._printed = set[str]()  # The lines of rows.
-        self._interrupted = 0  # The number of the signal that stops the run.
         self._of_run: scheduler.RunProgress | None = None
         self._last, self._since = "", monotonic()  # The last step, and when it was new.
         self._next_line = self._since + _PAUSE
         self._previous_handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Bar:
+        stop_signals.clear()
         if threading.current_thread() is threading.main_thread():  # Python allows signal handlers in no other thread.
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._previous_handlers[number] = signal.signal(number, self._interrupt)
@@ -81,7 +83,7 @@ class Bar:
             signal.signal(number, handler)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        self._interrupted = number
+        stop_signals.append(number)
         raise KeyboardInterrupt(number)
 
     def show_progress(self, step: scheduler.Progress) -> None:
@@ -123,8 +125,8 @@ class Bar:
         KeyboardInterrupt
             If the user has pressed Ctrl-C, or the system has sent SIGTERM; it has the number of the signal.
         """
-        if self._interrupted:
-            raise KeyboardInterrupt(self._interrupted)
+        if stop_signals:
+            raise KeyboardInterrupt(stop_signals[0])
         now = monotonic()
         if description != self._last:
             self._last, self._since = description, now

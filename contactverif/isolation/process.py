@@ -30,6 +30,7 @@ from contactverif.isolation.limits import Limits
 from contactverif.isolation.wire import MessageError, Reply, decode_replies
 
 MARK = "CONTACTVERIF_PLUGIN"  # The environment variable that marks the processes of plugins, and of their children.
+stop_signals: list[int] = []  # Those that are to stop this process; see `contactverif.cli.progress`.
 _run = uuid.uuid4().hex
 _adopts = False
 _PR_SET_CHILD_SUBREAPER = 36
@@ -159,6 +160,8 @@ class PluginProcess:
             try:
                 return self._child.channel.receive(step, largest)
             except TooLateError:
+                if stop_signals:
+                    raise KeyboardInterrupt(stop_signals[0]) from None
                 clock = clock or ActiveClock(self._child.pid)
                 clock.look()
         raise TooLateError(f"no answer within {seconds:g} s: an endless loop? (--time-limit)")

@@ -236,6 +236,15 @@ def test_a_question_that_was_interrupted_is_asked_again(
     assert count_ends(subject) == 0
 
 
+def test_a_wait_ends_where_python_has_dropped_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    subject = load(hostile_few.PROGRAM, "Hangs")
+    monkeypatch.setattr(process, "stop_signals", [signal.SIGTERM])
+    with pytest.raises(KeyboardInterrupt) as caught:
+        ask(subject)
+    assert caught.value.args == (signal.SIGTERM,)
+    assert not subject.host.has_process
+
+
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system holds no process on a core")
 def test_a_judge_is_held_after_some_questions_and_let_go_again(monkeypatch: pytest.MonkeyPatch) -> None:
     cores = os.sched_getaffinity(0)
