@@ -96,7 +96,9 @@ def _statements(traits: Traits, every_trait: bool) -> list[str]:
     """Return what a formulation states; all of it in the words of the code, which its author writes."""
     if not every_trait:
         by = [] if traits.rules.enforcement == "penalty" else [f"by {traits.rules.enforcement}"]
-        return [*by, *([f"{traits.promises.tangent} tangent"] if traits.promises.tangent else [])]
+        tangent = traits.promises.tangent
+        words = f"{tangent} tangent" if isinstance(tangent, str) else f"tangent to {tangent:g}" if tangent else ""
+        return [*by, *filter(None, [words])]
     silent, evidence = Traits().by_name(), traits.evidence
     values = traits.by_name().items()
     statements = [f"{name}={value!r}" for name, value in values if value != silent[name] and name not in _EVIDENCE]

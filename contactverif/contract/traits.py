@@ -17,6 +17,7 @@ from contactverif.contract.errors import ContractError
 
 _FARTHEST = 1e9  # The largest activation distance, in segments or lengths: a barrier acts near contact.
 _HIGHEST = 8.0  # The largest power of the penalty.
+_COARSEST = 1e-2  # The largest error that a tangent may promise. A coarser one is `"approximate"`.
 _LONGEST_TEXT = 10_000  # Characters of forces. A number with an exponent such as 1e10000000 has as many digits.
 _LONG_EXPONENT = re.compile(r"[eE][-+]?[\d_]{3}")
 
@@ -69,9 +70,10 @@ class Promises:
         promises that it does not, ``True`` needs a witness.
     integrates_linear_gap : bool | None
         The nodal forces of a gap that is linear along a straight, wholly active slave segment are exact integrals.
-    tangent : Literal['exact', 'approximate'] | None
+    tangent : Literal['exact', 'approximate'] | float | None
         ``"exact"``: `Formulation.tangent` is the derivative of the residual on a frozen pairing. ``"approximate"``: it
-        is not.
+        is not. A number, such as 1e-8: it is, by differences of this relative error, if coordinates are no larger than
+        segments; the error grows in proportion to them.
     symmetric : bool | None
         The tangent is symmetric.
     conserves_force, conserves_moment : bool | None
@@ -101,7 +103,7 @@ class Promises:
     inf_sup: bool | None = None
     locks: bool | None = None
     integrates_linear_gap: bool | None = None
-    tangent: Literal["exact", "approximate"] | None = None
+    tangent: Literal["exact", "approximate"] | float | None = None
     symmetric: bool | None = None
     conserves_force: bool | None = None
     conserves_moment: bool | None = None
@@ -114,6 +116,8 @@ class Promises:
 
     def __post_init__(self) -> None:
         _check_values(self, "promises")
+        if self.tangent not in ("exact", "approximate"):
+            _check_number(self, "promises", "tangent", 0.0, _COARSEST, "'exact', 'approximate', ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +167,8 @@ class Rules:
 
     def __post_init__(self) -> None:
         _check_values(self, "rules")
-        for name, least, largest in (("activation", 0.0, _FARTHEST), ("penalty_power", -_HIGHEST, _HIGHEST)):
-            value = getattr(self, name)
-            if value is not None and not (isinstance(value, int | float) and least < value <= largest):
-                needed = f"None or a number above {least:g} and up to {largest:g}"
-                raise ContractError(f"Traits.rules.{name}: found {value!r}; needed {needed}")
+        _check_number(self, "rules", "activation", 0.0, _FARTHEST)
+        _check_number(self, "rules", "penalty_power", -_HIGHEST, _HIGHEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,6 +391,13 @@ def _check_values(group: Any, path: str) -> None:
         if getattr(group, name) not in values:
             needed = ", ".join(map(repr, values))
             raise ContractError(f"Traits.{path}.{name}: found {getattr(group, name)!r}; needed one of {needed}")
+
+
+def _check_number(group: Any, path: str, name: str, least: float, largest: float, words: str = "") -> None:
+    value = getattr(group, name)
+    if value is not None and not (isinstance(value, int | float) and least < value <= largest):
+        needed = f"{words}None or a number above {least:g} and up to {largest:g}"
+        raise ContractError(f"Traits.{path}.{name}: found {value!r}; needed {needed}")
 
 
 _VALUES_OF_TYPES: dict[Any, tuple[object, ...]] = {bool: (True, False), type(None): (None,)}

@@ -17,8 +17,13 @@ def refuse_dependent_multipliers(traits: Traits) -> str:
 
 
 def promise_exact_tangent(traits: Traits) -> bool | None:
-    """Return whether the traits promise an exact tangent; None if they say nothing about it."""
-    return None if traits.promises.tangent is None else traits.promises.tangent == "exact"
+    """Return whether the traits promise a tangent that is exact, or as exact as differences; None if neither."""
+    return None if traits.promises.tangent is None else traits.promises.tangent != "approximate"
+
+
+def tangent_error(traits: Traits) -> float:
+    """Return the relative error of the tangent that the traits state for small coordinates, 0 where they state none."""
+    return traits.promises.tangent if isinstance(traits.promises.tangent, int | float) else 0.0
 
 
 def refuse_unstated(traits: Traits, *names: str) -> str:

@@ -18,6 +18,7 @@ from contactverif.strategies import smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif.strategies.translations import sliding_cases
 from contactverif_properties import roundoff
+from contactverif_properties.applicability import tangent_error
 from contactverif_properties.exact_forces import COMPONENTS
 from contactverif_properties.kinks import excuse_barrier, find_kink, measure_jump
 from contactverif_properties.roundoff import ratio, rounding_distance, segment_tolerance, sum_larger_forces
@@ -137,10 +138,11 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     its tangent symmetric by leaving out the other half loses the quadratic convergence.
 
     **How it is judged.** The first number is max|K − Kᵀ| over max|K|, rows and columns of multipliers included. The
-    tolerance is u(8Z/min(g, ℓ) + 4N). The second is the work in a closed loop over the sum of the works on its parts.
-    The loops are three circles with a radius of r = 2^-10 ℓ in random planes of all unknowns, and the trapezoidal rule
-    with 16 points is exact to roundoff there. The tolerance is 64 u Z/r: positions are rounded to uZ, and forces change
-    over r. A formulation that says that its tangent is approximate is asked for the matrix alone.
+    tolerance is u(8Z/min(g, ℓ) + 4N), and 2 δ max(X/ℓ, 1) more of a stated error δ. The second is the work in a closed
+    loop over the sum of the works on its parts. The loops are three circles with a radius of r = 2^-10 ℓ in random
+    planes of all unknowns, and the trapezoidal rule with 16 points is exact to roundoff there. The tolerance is 64 u
+    Z/r: positions are rounded to uZ, and forces change over r. A formulation that says that its tangent is approximate
+    is asked for the matrix alone.
 
     Without a pairing, a loop in which work is left and that may cross a kink is followed by one with r = 2^-15 ℓ, then
     by one with 2^-20 ℓ; those of a barrier are too, since its forces bend where they begin. Kinks are looked for at √2
@@ -155,7 +157,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     if "tangent" in subject.provides:
         tangent = state.tangent
         values[ASYMMETRY] = roundoff.ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
-        tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance)
+        stated = 2 * tangent_error(subject.traits) * max(case.largest_coordinate / case.resolution, 1.0)
+        tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance) + stated
     if subject.traits.promises.tangent != "approximate":
         values[WORK], tolerances[WORK], undecided = _find_work(state, subject, distance)
     measurement = Measurement(check_all(values, tolerances), undecided, idle=not state.forces.any())

@@ -1,7 +1,8 @@
 """Two states that have the same answer: mirrored, in other units, in other numbers, beside other bodies.
 
 Each state is one case. `Carry` says which node of the second state is which node of the first, and how vectors go over.
-Multipliers are uniform, so that their order does not matter; only the rows of positions are compared.
+Multipliers are uniform, so that their order does not matter; only the rows of positions are compared. Tangents are
+compared where the traits call them exact.
 """
 
 from collections.abc import Iterable, Sequence
@@ -70,7 +71,7 @@ def _ask(case: Case, subject: Subject, penalty: float, multiplier: float) -> tup
     if formulation.n_multipliers(case.interface):
         formulation = subject.with_penalty(1.0)
     state = FrozenState.with_multiplier(formulation, case, multiplier)
-    (forces,), tangents = ask_forces_and_tangents(state)
+    (forces,), tangents = ask_forces_and_tangents(subject, state)
     return state, forces[:n].reshape(case.positions.shape), tangents[0][:n, :n] if tangents else np.empty((0, 0))
 
 
@@ -216,8 +217,8 @@ def mirror(case: Case, subject: Subject) -> Measurement:
     otherwise than the second, or walks one way only, gives an unsymmetric answer to a symmetric part.
 
     **How it is judged.** A coordinate changes its sign, which rounds nothing. Changes of the forces count over Σ|R| of
-    the slave, those of the tangent over max|K|. The tolerance is u(8Z/min(g, ℓ) + 4N), because sums run the other way.
-    Multipliers are uniform, because their order may change.
+    the slave, those of a tangent that is called exact over max|K|. The tolerance is u(8Z/min(g, ℓ) + 4N), because sums
+    run the other way. Multipliers are uniform, because their order may change.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
@@ -248,9 +249,9 @@ def swap(case: Case, subject: Subject) -> Measurement:
     choice is natural. A formulation without that choice promises `unbiased`. All others give another answer, by as much
     as the detail says.
 
-    **How it is judged.** Changes of the forces count over Σ|R| of the slave, those of the tangent over max|K|. The
-    penalty stays the same number, also for nodal springs. The tolerance is u(8Z/min(g, ℓ) + 4N), because sums run in
-    another order. Multipliers are uniform, because their order changes.
+    **How it is judged.** Changes of the forces count over Σ|R| of the slave, those of a tangent that is called exact
+    over max|K|. The penalty stays the same number, also for nodal springs. The tolerance is u(8Z/min(g, ℓ) + 4N),
+    because sums run in another order. Multipliers are uniform, because their order changes.
 
     **Undecided.** A failing case of a formulation that promises `unbiased` is undecided where the state lies at a kink,
     or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
@@ -287,9 +288,9 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** A mesh generator numbers as it likes. A formulation that takes the next number for the next
     segment is right on one mesh and wrong on the same mesh from another program, or at the one seam of a ring.
 
-    **How it is judged.** Changes of the forces count over Σ|R| of the slave, those of the tangent over max|K|. The
-    tolerance is u(8Z/min(g, ℓ) + 4N), because sums run in another order. Multipliers are uniform, because their order
-    changes.
+    **How it is judged.** Changes of the forces count over Σ|R| of the slave, those of a tangent that is called exact
+    over max|K|. The tolerance is u(8Z/min(g, ℓ) + 4N), because sums run in another order. Multipliers are uniform,
+    because their order changes.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
@@ -361,11 +362,11 @@ def remote(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** Parts of an assembly that do not touch have nothing to do with each other. A formulation that
     scales its springs by the mean element size, or searches on the first surface that a line meets, couples them.
 
-    **How it is judged.** Changes of the forces on the old nodes count over Σ|R| of the slave, those of the tangent over
-    max|K|. The penalty stays the same number. The tolerance is u(8Z/min(g, ℓ) + 4N) with the size Z of the whole,
-    because a right formulation may subtract the mean of all nodes first. The detail counts entries that are not equal
-    bit by bit: 0 for each formulation that looks only at nodes near contact. In space half of the far pairs have the
-    first numbers of nodes and faces, and the other half the last.
+    **How it is judged.** Changes of the forces on the old nodes count over Σ|R| of the slave, those of a tangent that
+    is called exact over max|K|. The penalty stays the same number. The tolerance is u(8Z/min(g, ℓ) + 4N) with the size
+    Z of the whole, because a right formulation may subtract the mean of all nodes first. The detail counts entries that
+    are not equal bit by bit: 0 for each formulation that looks only at nodes near contact. In space half of the far
+    pairs have the first numbers of nodes and faces, and the other half the last.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
@@ -445,11 +446,11 @@ def locality_bend(case: Case, subject: Subject) -> Measurement:
     bends, by averaged normals or by an estimate of the curvature, answers for a part of the surface that carries
     nothing. On flat parts nothing shows, and at a bend every formulation may differ from every other.
 
-    **How it is judged.** The largest change of a nodal force counts over Σ|R| of the slave, that of an entry of the
-    tangent over max|K|. The slave stays away from the ends of the flat part by more than two penetrations, so no point
-    comes nearer to a bent segment than to the flat part, along any normal. The tolerance is u(8Z/min(g, ℓ) + 4N),
-    because a right formulation may subtract the mean of all nodes first. Formulations that compare nodes of facing
-    segments alone give 0. Smoothed masters do not promise `local`, and may say so.
+    **How it is judged.** The largest change of a nodal force counts over Σ|R| of the slave, that of an entry of a
+    tangent that is called exact over max|K|. The slave stays away from the ends of the flat part by more than two
+    penetrations, so no point comes nearer to a bent segment than to the flat part, along any normal. The tolerance is
+    u(8Z/min(g, ℓ) + 4N), because a right formulation may subtract the mean of all nodes first. Formulations that
+    compare nodes of facing segments alone give 0. Smoothed masters do not promise `local`, and may say so.
 
     **Undecided.** A failing case is undecided where a state lies at a kink, or where moving the nodes by 64 u X changes
     the answer by a quarter of the error or more.
@@ -494,11 +495,12 @@ def units(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** A code with an absolute tolerance hidden in it, such as 1e-6 for "touching", works in
     millimetres and fails in metres or micrometres.
 
-    **How it is judged.** Differences of the forces count over max|R|, those of the tangent over max|K|. The tolerance
-    is u(8Z/min(g, ℓ) + 4N), where Z is the diameter of a formulation that promises `translation_stable`, and the
-    largest coordinate of any other. Powers of two scale the four operations and square roots exactly, so a formulation
-    that uses nothing else gives 0; a power or an angle is rounded anew. A multiplier stays the same if it is a
-    pressure, and scales if it is a nodal force. Of a formulation with multipliers only the position rows are compared.
+    **How it is judged.** Differences of the forces count over max|R|, those of a tangent that is called exact over
+    max|K|. The tolerance is u(8Z/min(g, ℓ) + 4N), where Z is the diameter of a formulation that promises
+    `translation_stable`, and the largest coordinate of any other. Powers of two scale the four operations and square
+    roots exactly, so a formulation that uses nothing else gives 0; a power or an angle is rounded anew. A multiplier
+    stays the same if it is a pressure, and scales if it is a nodal force. Of a formulation with multipliers only the
+    position rows are compared.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
@@ -516,8 +518,8 @@ def units(case: Case, subject: Subject) -> Measurement:
     if subject.traits.rules.enforcement == "barrier":
         power = subject.traits.rules.penalty_power or 0.0
     there = FrozenState.at(subject.with_penalty(penalty * factor**power), case_there)
-    (forces,), tangents = ask_forces_and_tangents(state)
-    (forces_there,), tangents_there = ask_forces_and_tangents(there)
+    (forces,), tangents = ask_forces_and_tangents(subject, state)
+    (forces_there,), tangents_there = ask_forces_and_tangents(subject, there)
     forces, forces_there = forces[:n], forces_there[:n]
     changes = [_Change("forces", SCALED_FORCES, forces_there / factor - forces, float(np.abs(forces).max()))]
     if tangents:
@@ -566,10 +568,10 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     the assembly. In large rotations it creates energy.
 
     **How it is judged.** The forces R(Qx + c) are compared with Q R(x) over Σ|R| of a side, and the tangent K(Qx + c)
-    with Q K Qᵀ over max|K|. Nothing turns multipliers; their constraint rows are compared too. The tolerance is
-    u(8X/min(g, ℓ) + 4N): a gap is a difference of coordinates, and rounding the ends of a segment turns the segment and
-    its force by uX/ℓ. X stands here for every formulation, because the harness itself rounds the turned positions to
-    uX. Where springs act twice, in two passes, half of the penetration g needs the same forces.
+    with Q K Qᵀ over max|K|, if the traits call it exact. Nothing turns multipliers; their constraint rows are compared
+    too. The tolerance is u(8X/min(g, ℓ) + 4N): a gap is a difference of coordinates, and rounding the ends of a segment
+    turns the segment and its force by uX/ℓ. X stands here for every formulation, because the harness itself rounds the
+    turned positions to uX. Where springs act twice, in two passes, half of the penetration g needs the same forces.
 
     **Undecided.** A failing case is undecided where either state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
@@ -579,7 +581,7 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
     case_there, rotation = _turn_state(case)
     there = FrozenState.at(state.formulation, case_there)
     turn = linalg.block_diag(np.kron(np.eye(case.interface.n_nodes), rotation), np.eye(case.n_multipliers))
-    (forces, forces_there), tangents = ask_forces_and_tangents(state, there)
+    (forces, forces_there), tangents = ask_forces_and_tangents(subject, state, there)
 
     largest = max(case.largest_coordinate, case_there.largest_coordinate)
     # Where springs act twice, in two passes, half of the penetration needs the same forces.

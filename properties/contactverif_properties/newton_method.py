@@ -136,7 +136,13 @@ _define = partial(
 )
 
 
-@_define(id="newton.history", rank=560, quantities=(FINAL_ITERATIONS,), series=SERIES)
+@_define(
+    id="newton.history",
+    rank=560,
+    quantities=(FINAL_ITERATIONS,),
+    series=SERIES,
+    promise=lambda traits: None if applicability.tangent_error(traits) else applicability.promise_exact_tangent(traits),
+)
 def newton_history(case: Case, subject: Subject) -> Measurement:
     """Once the pairing has settled, Newton's method falls to roundoff in a few iterations.
 
@@ -147,9 +153,10 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     doubles the correct digits.
 
     **How it is judged.** The number of iterations must be at most ⌈log2(log ρ_end / log ρ)⌉ + 3, for a residual that
-    begins at ρ and ends at ρ_end, both over the first residual: each step doubles the digits, and 3 are to spare. The
-    whole history is kept: residuals, energy norms, changes of the pairing, conditions. A scene whose pairing does not
-    settle is solved again in 4 load steps, and in 16.
+    begins at ρ and ends at ρ_end, both over the first residual: each step doubles the digits, and 3 are to spare. A
+    tangent with a stated error δ may take log ρ_end / log δ more. The whole history is kept: residuals, energy norms,
+    changes of the pairing, conditions. A scene whose pairing does not settle is solved again in 4 load steps, and in
+    16.
 
     **Undecided.** Where the pairing changes to the last iterate, which is normal on kinked surfaces, where there is no
     pairing to tell whether a kink is in the way, and where the residual has a noise that roundoff does not explain.
@@ -174,6 +181,8 @@ def newton_history(case: Case, subject: Subject) -> Measurement:
     tiny = float(np.finfo(float).tiny)  # Where nothing touches, and nothing loads a body, the first residual is 0.
     rho, rho_end = (max(residual / max(trace.residuals[0], tiny), tiny) for residual in ends)
     allowed = ceil(log2(max(log(rho_end) / log(min(rho, NEAR)), 1.0))) + SPARE
+    if error := applicability.tangent_error(subject.traits):
+        allowed += ceil(log(rho_end) / log(error))
     number = FINAL_ITERATIONS.check(iterations, float(allowed))
     return Measurement([number], details=details, series=series, idle=is_untouched(trace))
 
@@ -223,10 +232,10 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
     often hide it.
 
     **How it is judged.** Steps start at distances of 3e-2 to 1e-5 ℓ in two random directions. The measured number is
-    the slope of log |u1 − u*| over log |u0 − u*| at the three nearest distances where |u1 − u*| is above 1e3 u cond;
-    the lower direction counts. It must be at least 1.9, since Newton's method has 2 less what is left of the third
-    power. There is no number where the step meets the solution exactly. If the slope is near 1, the rate and the
-    spectral radius of I − K⁻¹ ∂R/∂u are kept beside it.
+    the slope of log |u1 − u*| over log |u0 − u*| at the three nearest distances where |u1 − u*| is above 1e3 u cond,
+    and of a tangent with a stated error δ above δ cond |u0 − u*|; the lower direction counts. It must be at least 1.9,
+    since Newton's method has 2 less what is left of the third power. There is no number where the step meets the
+    solution exactly. If the slope is near 1, the rate and the spectral radius of I − K⁻¹ ∂R/∂u are kept beside it.
 
     **Undecided.** Where Newton's method finds no solution, where the matrix has no inverse, where too few states near
     the solution pair like it, and where the derivative by differences gives no better order.
@@ -244,16 +253,19 @@ def newton_order(case: Case, subject: Subject) -> Measurement:
     condition = system.step(matrix, np.zeros(system.size)).condition
     if condition <= system.size * UNIT_ROUNDOFF:
         return Measurement(details=details, undecided="the matrix has no inverse at the solution")
-    steps = _fit_steps(system, case, trace, matrix, condition)
+    largest = max(float(np.abs(system.state(solution)).max()) / case.shortest_segment, 1.0)
+    rate = applicability.tangent_error(subject.traits) * largest / condition
+    steps = _fit_steps(system, case, trace, matrix, condition, rate)
     details["rate"], details["steps"] = steps.rate, float(steps.n_steps)
     if np.isnan(steps.order):
-        return Measurement(details=details, undecided="a kink: too few states near the solution pair like it")
+        reason = "the stated error of the tangent hides it, or a kink" if rate else "a kink"
+        return Measurement(details=details, undecided=f"{reason}: too few states near the solution pair like it")
     undecided = ""
     if steps.order < QUADRATIC:
         by_differences = replace(system, use_tangent=False)
         exact, _ = by_differences.matrix(solution, trace.pairing)
         details["spectral radius"] = spectral_radius(matrix, exact)
-        if not _fit_steps(by_differences, case, trace, exact, condition, [steps.worst]).order >= QUADRATIC:
+        if not _fit_steps(by_differences, case, trace, exact, condition, directions=[steps.worst]).order >= QUADRATIC:
             undecided = "a kink: with the derivative by differences, Newton's order is no better"
     # One step solves a linear problem, which has no order.
     numbers = [] if steps.order == inf else [ORDER.check(steps.order, QUADRATIC)]
@@ -276,9 +288,13 @@ def _fit_steps(
     trace: Trace,
     matrix: Any,
     condition: float,
+    rate: float = 0.0,
     directions: Sequence[int] = range(N_DIRECTIONS),
 ) -> _Steps:
-    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order."""
+    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
+
+    A tangent by differences leaves a linear `rate` of convergence at the most.
+    """
     solution, pairing = trace.u[-1], trace.pairing
     units = scale_factors(matrix, system.scene.n_free)[1]
     floor = solution_floor(system.scene, solution, units, condition)
@@ -296,25 +312,25 @@ def _fit_steps(
             step = system.step(stiffness, -system.balance(u, forces)).change
             after.append(inf if step is None else float(np.abs((u + step - solution) / units).max()))
         count += len(near)
-        fits.append((*fit_order(before, np.array(after), floor), number))
+        fits.append((*fit_order(before, np.array(after), np.maximum(floor, rate * before)), number))
     decisive = [fit for fit in fits if not np.isnan(fit[0])] or [(np.nan, np.nan, 0)]
     order, _, worst = min(decisive)
     return _Steps(order, max(rate for _, rate, _ in decisive), count, worst)
 
 
-def fit_order(before: FloatArray, after: FloatArray, floor: float) -> tuple[float, float]:
-    """Fit the slope of log after over log before at the nearest distances above the floor, where roundoff decides.
+def fit_order(before: FloatArray, after: FloatArray, floors: FloatArray) -> tuple[float, float]:
+    """Fit the slope of log after over log before at the nearest distances above their floors, where roundoff decides.
 
-    Distances (n_steps,) from the solution before a step descend; those after it are infinite where the matrix had no
-    inverse. The slope is infinite where even the longest distance ends at the floor: one step is exact. It is NaN where
-    there are too few distances, or where it is below 2 and still rises towards 2 as they fall. Behind it comes the
-    ratio after/before at the nearest distance.
+    All are (n_steps,). Distances from the solution before a step descend; those after it are infinite where the matrix
+    had no inverse. The slope is infinite where even the longest distance ends at the floor: one step is exact. It is
+    NaN where there are too few distances, or where it is below 2 and still rises towards 2 as they fall. Behind it
+    comes the ratio after/before at the nearest distance.
     """
     if not len(before):
         return np.nan, np.nan
-    above = after > floor
+    above = after > floors
     if not above.any():  # The step is exact, unless roundoff would hide as much as a linear rate.
-        return (inf, 0.0) if floor <= EXACT * before.min() else (np.nan, np.nan)
+        return (inf, 0.0) if (floors <= EXACT * before).all() else (np.nan, np.nan)
     # Once at the floor, always at the floor: an error that rises again at a shorter distance is noise.
     last = int(np.argmin(above)) if not above.all() else len(above)
     before, after = before[:last][-N_FITTED:], after[:last][-N_FITTED:]

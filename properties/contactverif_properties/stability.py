@@ -81,7 +81,7 @@ def stability_translation(case: Case, subject: Subject) -> Measurement:
     """
     near = freeze_state(case, subject)
     far = replace(near, case=move_state(near.case, case.parameters["shift"]))
-    (forces, forces_there), tangents = ask_forces_and_tangents(near, far)
+    (forces, forces_there), tangents = ask_forces_and_tangents(subject, near, far)
     conditioning = roundoff.measure_conditioning(near, forces)
     values = {FORCES: conditioning.count_roundings(forces_there - forces)}
     if tangents:

@@ -157,10 +157,13 @@ def freeze_state(case: Case, subject: Subject) -> FrozenState:
     return FrozenState.at(*prepare_state(case, subject))
 
 
-def ask_forces_and_tangents(*states: FrozenState) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the residuals (n,) and the tangents (n, n), if there are any, of one formulation in some states."""
-    formulation = states[0].formulation
-    methods = ["residual", *(["tangent"] if "tangent" in formulation.provides else [])]
+def ask_forces_and_tangents(subject: Subject, *states: FrozenState) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return the residuals (n,) of one formulation in some states, and its tangents (n, n) if it calls them exact.
+
+    A tangent by differences is another one after any change, by more than roundoff makes of an exact one.
+    """
+    formulation, is_exact = states[0].formulation, subject.traits.promises.tangent == "exact"
+    methods = ["residual", *(["tangent"] if is_exact and "tangent" in formulation.provides else [])]
     answers = formulation.answers([state.call(method) for method in methods for state in states])
     return answers[: len(states)], [dense(tangent) for tangent in answers[len(states) :]]
 

@@ -32,10 +32,11 @@ from contactverif.contract.property import (
     judge,
 )
 from contactverif.contract.subject import Subject
+from contactverif.contract.traits import Traits
 from contactverif.problems.long_states import long_face_states, long_states
 from contactverif.strategies import smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases
-from contactverif_properties.applicability import promise_exact_tangent
+from contactverif_properties.applicability import promise_exact_tangent, tangent_error
 from contactverif_properties.kinks import excuse_barrier, find_kink
 from contactverif_properties.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.states import FrozenState, freeze_state, random_directions
@@ -174,6 +175,11 @@ def _roundoff(case: Case, dtype: type) -> float:
     return unit * case.largest_coordinate / case.resolution
 
 
+def _stated_error(case: Case, traits: Traits) -> float:
+    """Return δ max(S/ℓ, 1) for the error δ that the traits state of a tangent by differences."""
+    return tangent_error(traits) * max(_roundoff(case, np.float64) / UNIT_ROUNDOFF, 1.0)
+
+
 def _step(case: Case, dtype: type) -> float:
     """Return the step h = ℓ (u S/ℓ)^(1/3), a length, at which truncation and roundoff are equal."""
     return case.resolution * float(np.cbrt(_roundoff(case, dtype)))
@@ -249,6 +255,7 @@ class BlockJudge:
     pattern: BoolArray  # (size, size) The entries that the tangent has.
     groups: Groups  # Nodes and multipliers.
     dtype: type  # The precision of the differences; complex for a complex step.
+    stated: float  # The error that the traits state of the tangent, over the surroundings of a block.
 
     @property
     def by_complex_step(self) -> bool:
@@ -277,7 +284,7 @@ class BlockJudge:
 
     def tolerate(self, largest: FloatArray, surroundings: FloatArray, bending: FloatArray) -> FloatArray:
         """Return the tolerance of blocks, given the lengths over ℓ over which they bend; arrays of one shape."""
-        rounding = ROUNDINGS * _roundoff(self.state.case, np.float64) / bending * surroundings
+        rounding = (ROUNDINGS * _roundoff(self.state.case, np.float64) + self.stated) / bending * surroundings
         if self.by_complex_step:
             return EXACT * largest + rounding
         accuracy = (_roundoff(self.state.case, self.dtype) / bending) ** (2 / 3)
@@ -296,7 +303,8 @@ def judge_of(case: Case, subject: Subject) -> BlockJudge:
     pattern = matrix != 0
     if sparse.issparse(tangent):  # A sparse tangent has an entry where it stores a zero, too.
         pattern[tangent.tocoo().coords] = True
-    return BlockJudge(state, matrix, pattern, _groups_of(state.case), dtype)
+    stated = _stated_error(state.case, subject.traits)
+    return BlockJudge(state, matrix, pattern, _groups_of(state.case), dtype, stated)
 
 
 def scatter(answers: FloatArray, moves: Moves) -> FloatArray:
@@ -364,8 +372,9 @@ def tangent_sparsity(case: Case, subject: Subject) -> Measurement:
     - A derivative beyond that tolerance needs an entry in the matrix. In an array an entry that is exactly zero is
       none.
 
-    Where the residual of a failing block bends over a length λ < ℓ, the block is judged again with λ in place of ℓ. A
-    failure names row and column of the worst entry, its value and the derivative.
+    A tangent of which the traits state an error δ may be wrong by s δ max(S/ℓ, 1) more. Where the residual of a failing
+    block bends over a length λ < ℓ, the block is judged again with λ in place of ℓ. A failure names row and column of
+    the worst entry, its value and the derivative.
 
     **Undecided.** Only where nothing else fails: a failing block whose one-sided differences disagree, unless the
     tangent is the derivative to one side; and a failing block whose residual bends over less than ℓ/1024.
@@ -572,7 +581,8 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
       so much roundoff leaves at a node that a cell reaches by a rounding.
     - The Taylor remainder |R(x+hd) − R − hKd| falls with a slope of at least 1.9. A remainder at roundoff is exact.
 
-    Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ, likewise. Where the
+    Where the plugin takes complex positions, a complex step differs by at most 1e-11 + 64 uS/ℓ, likewise. Of an error δ
+    that the traits state, δ max(S/ℓ, 1) is allowed beside it, and a remainder below it is exact. Where the
     residual itself bends over a length λ < ℓ, as a segment seen nearly edge-on does, a failing case is judged again
     with λ in place of ℓ. Each block of the tangent by itself is the question of `tangent.sparsity`.
 
@@ -584,17 +594,19 @@ def tangent_directional(case: Case, subject: Subject) -> Measurement:
     """
     state = freeze_state(case, subject)
     case, shortest = state.case, state.case.resolution
+    stated = _stated_error(case, subject.traits)
     directions = first_directions(case, N_DIRECTIONS)
     undecided, broken = _check_pairing(state, directions)
     by_complex_step = subject.traits.abilities.takes_complex and not state.formulation.decides_anew(state.pairing)
 
     def measure_over(length: float) -> tuple[Measurement, float]:
-        comparison = _compare(state, directions, length)
+        comparison = _compare(state, directions, length, stated)
         more = defect_directions(directions, comparison.defects)
         if len(more):
-            comparison = comparison.join(_compare(state, more, length))
+            comparison = comparison.join(_compare(state, more, length, stated))
         conditioning = UNIT_ROUNDOFF * case.largest_coordinate / length
-        tolerances = {CENTRAL: 30 * conditioning ** (2 / 3), TAYLOR: SLOPE, COMPLEX: 1e-11 + 64 * conditioning}
+        central, complex_step = 30 * conditioning ** (2 / 3) + stated, 1e-11 + 64 * conditioning + stated
+        tolerances = {CENTRAL: central, TAYLOR: SLOPE, COMPLEX: complex_step}
         values, finding = {CENTRAL: comparison.error}, comparison.finding
         if np.isfinite(comparison.slope):
             values[TAYLOR] = comparison.slope
@@ -649,12 +661,12 @@ class _Directional:
         )
 
 
-def _compare(state: FrozenState, directions: FloatArray, length: float) -> _Directional:
+def _compare(state: FrozenState, directions: FloatArray, length: float, stated: float) -> _Directional:
     """Compare derivatives along directions (n, n_unknowns) with central differences and Taylor remainders, all at once.
 
     Steps are shares of the length over which the residual is taken to bend. The length over which it does bend is the
     root of its size over its third derivative, from the central differences of two steps. The tangent plays no part in
-    it.
+    it. `stated` is the relative error that the traits state of the tangent.
     """
     case, n = state.case, len(STEPS)
     derivative = directions @ state.tangent.T  # (n_directions, n_unknowns)
@@ -676,11 +688,11 @@ def _compare(state: FrozenState, directions: FloatArray, length: float) -> _Dire
     sizes = _row_sizes(state, np.maximum(np.abs(derivative).max(axis=0), np.abs(slopes).max(axis=(0, 1))), turns)
     error, finding = _worst_row(case, errors.min(axis=0), sizes, derivative, closest)
     forward = np.r_[0, 2 * n : len(steps)]  # The longest central step serves here too.
-    floor = 1e3 * UNIT_ROUNDOFF * case.largest_coordinate * size
+    floors = size * (1e3 * UNIT_ROUNDOFF * case.largest_coordinate + stated * steps[forward])
 
     def slope_of(derivatives: FloatArray) -> float:
         remainders = moved[forward] - here - steps[forward, None, None] * derivatives
-        return taylor_slope(np.abs(remainders).max(axis=2), steps[forward], floor)
+        return taylor_slope(np.abs(remainders).max(axis=2), steps[forward], floors)
 
     slope = slope_of(derivative)
     if slope < SLOPE and slope_of(closest) < SLOPE:  # The best difference has no better one: no smooth residual.
@@ -721,19 +733,19 @@ def _worst_row(
     return float(relative[number, row]), finding
 
 
-def taylor_slope(remainders: FloatArray, steps: FloatArray, floor: float) -> float:
+def taylor_slope(remainders: FloatArray, steps: FloatArray, floors: FloatArray) -> float:
     """Return the slope of log |remainder| over log h: the best between two steps, the worst over the directions.
 
     Remainders are (n_steps, n_directions), the steps h (n_steps,) in any order. Two steps count only where one is
-    `STEP_RATIO` times the other: between two that are nearly equal, the slope is noise. A remainder below the floor is
-    roundoff, and a direction that has no slope because of that is exact.
+    `STEP_RATIO` times the other: between two that are nearly equal, the slope is noise. A remainder below its floor
+    (n_steps,) is roundoff, and a direction that has no slope because of that is exact.
     """
     best = np.full(remainders.shape[1], -np.inf)
     decided = np.zeros(remainders.shape[1], dtype=bool)
     for long, short in permutations(range(len(steps)), 2):
         if steps[long] < STEP_RATIO * steps[short]:
             continue
-        above = remainders[short] > floor
+        above = remainders[short] > floors[short]
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = np.log(remainders[long] / remainders[short]) / np.log(steps[long] / steps[short])
         best = np.where(above, np.maximum(best, slope), best)

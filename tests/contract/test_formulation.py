@@ -230,6 +230,9 @@ def test_a_trait_holds_no_number_that_ends_the_judge() -> None:
             ContractError, match=rf"Traits.rules.{name}: found 1.7e\+308; needed None or a number above"
         ):
             Rules(**{name: 1.7e308})  # type: ignore[arg-type]
+    for error in (0.0, 0.1, float("nan"), True, "exactly"):
+        with pytest.raises(ContractError, match=r"Traits.promises.tangent: found .*; needed 'exact', 'approximate', N"):
+            Promises(tangent=error)  # type: ignore[arg-type]
 
 
 def test_forces_belong_to_names() -> None:

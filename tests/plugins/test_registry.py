@@ -341,7 +341,8 @@ def test_a_mere_name_is_no_mistake_of_the_user_whatever_its_factory_says() -> No
     [
         (
             {"tangent": "exactly"},
-            "Traits.promises.tangent: found 'exactly'; needed one of 'exact', 'approximate', None",
+            "Traits.promises.tangent: found 'exactly'; "
+            "needed 'exact', 'approximate', None or a number above 0 and up to 0.01",
         ),
         ({"witnesses": ["a1"]}, "Traits.evidence.witnesses: found a list; needed {property id: name of a case}"),
     ],

@@ -20,6 +20,7 @@ STRANGERS: dict[str, Callable[..., Any]] = {
     "exact segments with Simpson's rule": on_strips.SimpsonPoints,
     "exact segments with a table of 14 digits": on_strips.TabulatedPoints,
     "exact segments with five computed points": on_strips.ComputedPoints,
+    "exact segments with a tangent by differences": on_strips.ByDifferences,
     "both sides with half the stiffness": on_strips.BothSidesHalved,
     "half passes in both directions": on_strips.HalfPasses,
     "smoothed normals": at_points.SmoothedNormals,

@@ -11,6 +11,7 @@ from handles import HidesNumbers, WrongTangent
 import contactverif_nts
 from contactverif import Pairing
 from zoo.making import BALANCED, PLANE, add, answers, mutant
+from zoo.on_strips import ByDifferences
 
 DIRECTIONAL, SPARSITY, LONG = "tangent.directional", "tangent.sparsity", "tangent.long"
 UNITS = "newton.units"
@@ -47,8 +48,13 @@ def _sizes(matrix):
     return np.abs(_blocks(matrix)).max(axis=(2, 3))
 
 
+def _scale(right, interface, pairing, z):
+    return (1 + 1e-4) * right(interface, pairing, z)
+
+
 add("real numbers in a handle", DIRECTIONAL, HidesNumbers)
 add("wrong tangent behind a handle", DIRECTIONAL, WrongTangent)
+add("differences off by 1e-4, stated to 1e-8", SPARSITY, answers("tangent", _scale, ByDifferences))
 _change_matrix("tangent symmetrised", DIRECTIONAL)(lambda interface, k: (k + k.T) / 2)
 
 
