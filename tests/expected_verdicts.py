@@ -162,6 +162,7 @@ CANNOT_JUDGE: Mapping[str, frozenset[str]] = {
     TILTED: frozenset(WITHOUT_DIRECTION),
     LINEAR: frozenset(WITHOUT_INTEGRAL),
     NODAL: FAILS.keys() - NODAL_SPRINGS,
+    "intersection-free": FAILS.keys(),  # None of them is a barrier.
     PUBLISHED: frozenset(WITHOUT_TABLE),
     # Multipliers solve nothing on the way, and averaged normals and half passes state nothing.
     CONTINUITY: frozenset({*WITH_MULTIPLIERS, *WITHOUT_RULE}),

@@ -96,6 +96,10 @@ class Promises:
         point at its distance from the origin are not. ``None`` promises nothing: such kernels are common and not wrong.
     independent_multipliers : bool | None
         The constraints are independent on any mesh, so that the multipliers are unique.
+    never_intersects : bool | None
+        No two surfaces ever intersect: the work of a barrier grows without bound as any node of either surface nears
+        any segment or vertex of the other one, and no force jumps where the node passes from a segment to its end.
+        A barrier that weights gaps, or looks from one surface, may be right without it.
     """
 
     patch: PatchPromises = field(default_factory=PatchPromises)
@@ -113,6 +117,7 @@ class Promises:
     nodes_push: bool | None = None
     translation_stable: bool | None = None
     independent_multipliers: bool | None = None
+    never_intersects: bool | None = None
 
     def __post_init__(self) -> None:
         _check_values(self, "promises")

@@ -79,7 +79,7 @@ _STATEMENTS: tuple[tuple[str, Any], ...] = (  # (name, value) of the traits from
     *((name, True) for name in _ALWAYS.split()),
     *(("tangent", "exact"), ("continuity", "C0"), ("locks", False), ("area", "current"), ("area", "reference")),
     *(("penalty", "distributed"), ("penalty", "nodal"), ("enforcement", "multiplier")),
-    ("independent_multipliers", True),
+    *(("independent_multipliers", True), ("never_intersects", True)),
     *(("force_along", "master normal"), ("force_along", "slave normal"), ("published_forces", {"a1": "1 2 1; 2 2"})),
 )
 

@@ -127,6 +127,15 @@ def _slide_over_vertices() -> Case:
     return Case(interface, nodes.reshape(-1), 16.0, {"path": path.reshape(-1)}, name="sliding")
 
 
+def _close_peak() -> Case:
+    """Return a peak of the master that touches the middle of a slave segment, as `closing_cases` describes it."""
+    slave, master = [[-4, 1], [-2, 0], [2, 0], [4, 1]], [[4, -2], [0, 0], [-4, -2]]
+    numbers = {"penetration": 0, "direction": [1, 0], "room": 2, "closing": [5, 2, 1]}
+    parameters = {name: np.array(values, dtype=np.float64) for name, values in numbers.items()}
+    z = np.array(slave + master, dtype=np.float64).reshape(-1)
+    return Case(Interface.from_chains(slave, master), z, 16.0, parameters, name="peak")
+
+
 def _places(lengths: Sequence[float]) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(lengths)])
 
@@ -140,6 +149,7 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "offset-c": _offset_case_c,
     "moved": _moved_case_c,
     "sliding": _slide_over_vertices,
+    "peak": _close_peak,
     "crossed-diagonals": _cross_diagonals,
     "tilted-faces": _tilt_faces,
 }

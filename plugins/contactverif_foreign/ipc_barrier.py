@@ -32,10 +32,12 @@ class IpcBarrier:
         self._ipctk = ipctk
         self._kind = getattr(ipctk.NormalCollisions, kind)
         # The potential is κ w d̂ times a number. A weight w is a length where nodes have areas, and 1 elsewhere.
-        self.traits = Traits(
+        traits = Traits(
             Promises(tangent="exact", symmetric=True, conserves_force=True, conserves_moment=True, unbiased=True),
             Rules(enforcement="barrier", activation=activation, penalty_power=0.0 if areas else 1.0),
         )
+        # In the plane, ogc loses forces where a node passes from a segment to its end.
+        self.traits = traits if kind == "OGC" else traits.revise(never_intersects=True)
 
     def pair(self, interface: Interface, z: FloatArray) -> dict[str, Handle]:
         """Return the collisions at a state."""

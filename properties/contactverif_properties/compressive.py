@@ -156,7 +156,8 @@ REASON = "An open contact is left out, not rounded away."
 OPEN = Quantity("force across an open gap", "0", REASON)
 DISTANT = Quantity("force far from the contact zone", "0", REASON)
 PULL_OF_POINT = Quantity("pull of a contact point", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
-N_HALVINGS = 20
+N_HALVINGS = 40
+ROUNDED = 2.0**12  # The smallest gap in roundings of a position: the gap is known to 2^-11 of itself.
 LEAST_GROWTH = 1.01
 GROWTH = Quantity(
     "growth of a barrier's force at half the gap",
@@ -250,9 +251,9 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
 
     A barrier pushes across a gap, up to its activation distance. Beyond that, at 1.01 times and twice the distance,
     its forces must be exactly 0. The fourth number is the factor by which the force on the flat slave grows where
-    the gap is halved, down to 2^-20 of what it was or to where rounding the positions decides the gap; it is the median
-    of the last half of these steps. A law that has a bound grows by 1 + 2^-15 there, the slowest that has none in use,
-    a logarithm, by 1.06.
+    the gap is halved, down to 2^-40 of what it was or to 4096 u X, where rounding the positions begins to decide the
+    gap; it is the median of the last half of these steps. A law that has a bound grows by 1 + 2^-30 there, the slowest
+    that has none in use, a logarithm, by 1.03.
 
     **Undecided.** A case in which nothing begins is undecided if moving the nodes by 64 u X makes contact begin one way
     and not another: a node that faces a free end exactly is over the master or not, as roundoff decides. Where contact
@@ -316,7 +317,7 @@ def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     def forces_at(height: float) -> FloatArray:
         return FrozenState.at(formulation, lift_slave(case, height - gap)).forces
 
-    least = max(2.0**-N_HALVINGS * gap, 2.0**20 * UNIT_ROUNDOFF * case.largest_coordinate)
+    least = max(2.0**-N_HALVINGS * gap, ROUNDED * UNIT_ROUNDOFF * case.largest_coordinate)
     gaps = gap * 2.0 ** -np.arange(N_HALVINGS + 1)
     pushes = [_push_of_slave(forces_at(each), case) for each in gaps[gaps >= least]]
     size = max(abs(pushes[0]), np.finfo(float).tiny)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from subjects import judge_as, load_property
 from zoo.at_points import LogBarrier
+from zoo.barriers import Bounded, BoundedWork, HalfAtVertices, InsidesAlone, SlaveAlone
 
 from contactverif import Case, Interface, Rules, Subject, Traits, Verdict, judge_case, named_case
 from contactverif.contract.case import ACTIVATION, LEAST_GAP
@@ -18,6 +19,7 @@ from contactverif.run.judge import FirstCall, call_first
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, smooth_cases
+from contactverif.strategies.closings import closing_cases
 from contactverif.strategies.general import closed_cases
 
 BARRIER = Traits(rules=Rules(enforcement="barrier", activation=0.5))
@@ -42,7 +44,7 @@ def test_who_states_no_activation_distance_is_asked_nothing() -> None:
     assert "a length" in load_property("units").refusal(BARRIER.revise(activation_unit="length"))
 
 
-@pytest.mark.parametrize("source", [smooth_cases, flat_cases, closed_cases])
+@pytest.mark.parametrize("source", [smooth_cases, flat_cases, closed_cases, closing_cases])
 def test_a_state_is_lifted_within_the_activation_distance_and_stays_so(source: Any) -> None:
     cases, lifted = draw_cases(source(), seed="lifted", examples=60).cases, 0
     for case in cases:
@@ -114,19 +116,8 @@ MASTER_TAKES_LESS = times(
 )
 
 
-class SlaveAlone(LogBarrier):
-    """Only nodes of the slave are looked at."""
-
-    def pair(self, interface: Any, z: Any) -> Any:
-        pairs = super().pair(interface, z)["pairs"]
-        return {"pairs": pairs[pairs[:, 1] < interface.n_slave_nodes]}
-
-
-class Bounded(LogBarrier):
-    """The force ends at that of a hundredth of the activation distance."""
-
-    def _derivatives(self, distance: Any, interface: Any) -> Any:
-        return super()._derivatives(np.maximum(distance, 0.01 * self._range(interface)), interface)
+class BoundedEarly(Bounded):
+    share = 0.01
 
 
 class TooFar(LogBarrier):
@@ -159,8 +150,10 @@ class Remembers(LogBarrier):
         (MASTER_TAKES_LESS, "balance.force"),
         (SlaveAlone, "swap"),
         (Bounded, "unilateral"),
+        (BoundedEarly, "unilateral"),
         (TooFar, "unilateral"),
         (PULLS, "unilateral"),
+        *((each, "intersection-free") for each in (SlaveAlone, InsidesAlone, HalfAtVertices, Bounded, BoundedWork)),
         (FixedLength, "units"),
         (FOLLOWS_THE_AXIS, "objectivity"),
         (FOLLOWS_THE_AXIS, "symmetric"),
@@ -171,6 +164,18 @@ def test_a_wrong_barrier_is_found_and_the_right_one_is_not_accused(make: Any, pr
     question = load_property(property_id)
     assert Verdict.FAIL in ask(question, make)
     assert set(ask(question, LogBarrier)) <= {Verdict.PASS, Verdict.UNDECIDED}
+
+
+def test_a_barrier_may_state_that_it_lets_surfaces_through() -> None:
+    """Looking from the slave alone is right without a promise, and `peak` shows what it leaves open."""
+    question, traits = load_property("intersection-free"), LogBarrier.traits.revise(unbiased=None)
+    stated = traits.revise(never_intersects=False, witnesses={"intersection-free": "peak"})
+    silent = traits.revise(never_intersects=None)
+    judge_as(Verdict.PASS, question, named_case("peak"), Subject("barrier", LogBarrier))
+    for each, verdict in ((stated, Verdict.FAIL), (silent, Verdict.NOT_APPLICABLE)):
+        subject = Subject("slave alone", type("Stating", (SlaveAlone,), {"traits": each}))
+        (row,) = run([subject], [question], examples=20, seed=1).rows
+        assert (row.verdict, row.unexpected) == (verdict, "")
 
 
 class SameWeights(LogBarrier):

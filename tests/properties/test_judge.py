@@ -81,8 +81,9 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
         "continuity",
         "patch.tilted.nodal",
         "total-stiffness",
+        "intersection-free",
     )
-    multipliers_alone = (nodal, "multipliers.rank", "complementarity", "stability.inf-sup")
+    multipliers_alone = (nodal, "intersection-free", "multipliers.rank", "complementarity", "stability.inf-sup")
     for question in load_properties():
         assert isinstance(question, Property)
         reasons = {

@@ -466,7 +466,14 @@ class LogBarrier(Springs):
     """
 
     traits = Traits(
-        promises=Promises(tangent="exact", symmetric=True, conserves_force=True, conserves_moment=True, unbiased=True),
+        promises=Promises(
+            tangent="exact",
+            symmetric=True,
+            conserves_force=True,
+            conserves_moment=True,
+            unbiased=True,
+            never_intersects=True,
+        ),
         rules=Rules(enforcement="barrier", activation=SHARE, penalty_power=0.0),
     )
 
