@@ -4,6 +4,8 @@ All slave points penetrate by the same depth, so that springs press with the sam
 straight segments forces differ from that by the square of their length, whatever the rule by which a formulation
 measures gaps. Springs that depend on how the surface bends differ on every mesh.
 
+Whole circles are closed chains, a disc in a hole or a hole around a disc.
+
 Rule for the next editor: the master reaches beyond the slave at either end, so that nothing overhangs.
 """
 
@@ -15,9 +17,10 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import Interface, Surface
 
 GRADE = 0.15  # Angles of the master are graded by so much, so that nodes do not meet nodes of the slave.
+WHOLE = 360.0  # Degrees
 SEGMENTS = (3, 4)  # Numbers of segments of slave and master on the coarsest mesh, at refine = 1.
 
 
@@ -48,7 +51,10 @@ class Arcs:
         return self.slave_radius * radians(self.slave[1] - self.slave[0])
 
     def case(self, refine: int = 1, name: str = "") -> Case:
-        """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike."""
+        """Return the arcs as meshes of straight segments, the nodes on the arcs; the slave's segments are all alike.
+
+        The numbers of whole circles begin anywhere.
+        """
         shares = np.linspace(0, 1, SEGMENTS[0] * refine + 1), np.linspace(0, 1, SEGMENTS[1] * refine + 1)
         slave = _directions(self.slave, shares[0])
         master = _directions(self.master, shares[1] + GRADE * shares[1] * (1 - shares[1]))
@@ -57,6 +63,14 @@ class Arcs:
         else:
             slave = slave[::-1]
         interface = Interface.from_chains(self.radius * slave, self.radius * master)
+        if self.slave[1] - self.slave[0] == WHOLE:
+            seams = np.random.default_rng(refine).integers(1, min(len(slave), len(master)) - 1, 2)
+            slave, master = (
+                np.roll(side[:-1], seam, axis=0) for side, seam in zip((slave, master), seams, strict=True)
+            )
+            number, n_slave = np.arange(len(slave) + len(master)), len(slave)
+            surfaces = (Surface(np.column_stack([each, np.roll(each, -1)])) for each in np.split(number, [n_slave]))
+            interface = Interface(self.radius * np.vstack([slave, master]), *surfaces)
         z = np.concatenate([self.slave_radius * slave, self.radius * master]).reshape(-1)
         names = "radius", "depth", "convex_slave", "slave", "master"
         facts = {name: np.array(getattr(self, name), dtype=np.float64) for name in names}

@@ -222,6 +222,9 @@ def search_states() -> Iterator[Case]:
     }
     for (name, (slave, master)), (label, turn) in product(masters.items(), _TWO_TURNS.items()):
         yield flat_state(f"{name}{label}", slave, master, 2.0**-5, turn=turn)
+    for seam in range(len(plate) + 2):
+        hole = _plate(plate, [0.0, 8.0], -3.0, seam)  # A plate that is turned inside out.
+        yield flat_state(f"in a hole, seam {seam}", [2.0, 3.0, 6.0], hole, 2.0**-5, turn=(UPRIGHT, TURNED)[seam % 2])
 
 
 def _plate(top: list[float], bottom: list[float], thickness: float, seam: int = 0) -> Master:

@@ -12,7 +12,7 @@ from subjects import ResidualAlone
 
 import contactverif_mortar
 import contactverif_nts
-from contactverif import Pairing
+from contactverif import Interface, Pairing, Surface
 from contactverif.contract.arrays import dense
 from contactverif.contract.traits import Traits
 from contactverif_nts import nts_ar, nts_lm, vts_me
@@ -155,6 +155,11 @@ _leaves_out("point exactly over a master node left out", "hard.c", lambda i, x, 
 _leaves_out("point on a tiny segment left out", "hard.short-segment", _is_on_a_tiny_segment)
 _leaves_out("deep point left out", "hard.deep", lambda i, x, p: p.gap < -0.4 * i.master.lengths(x).max())
 _leaves_out("segments of the nearest node alone", "hard.search", _is_off_the_nearest_node)
+# A hole is a closed chain that is walked clockwise.
+_leaves_out("hole taken for a disc", "hard.search", lambda i, x, p: (i.master.neighbours >= 0).all()
+            & ((p.normal * (p.position - x[i.n_slave_nodes :].mean(axis=0))).sum(axis=1) < 0))  # fmt: skip
+_leaves_out("seam of a closed slave left out", "accuracy.arc", lambda i, x, p: (i.slave.neighbours >= 0).all()
+            & (np.diff(i.slave.segments, axis=1)[p.slave_segment, 0] < 0))  # fmt: skip
 _leaves_out("area of competence over many segments left out", "hard.contrast",
             lambda i, x, p: p.weight > 2.2 * i.master.lengths(x).mean())  # fmt: skip
 _leaves_out("short area of competence left out", "hard.dead-zone",
@@ -162,6 +167,26 @@ _leaves_out("short area of competence left out", "hard.dead-zone",
 _leaves_out("point between two segments left out", "hard.convex-kink", _is_between_two_segments, nts_ar)
 _leaves_out("point with its foot on no segment left out", "hard.concave-corner",
             lambda i, x, p: (p.xi < 0) | (p.xi > 1), nts_ar)  # fmt: skip
+
+
+def _counter_clockwise(interface, z):
+    """Return the interface with each closed chain turned so that it runs counter-clockwise, as around a disc."""
+    x = np.real(z.reshape(-1, z.shape[-1])[0, : interface.n_unknowns]).reshape(-1, 2)
+    surfaces = []
+    for side in (interface.slave, interface.master):
+        segments = side.segments.copy()
+        for chain in np.split(side.chain_order, side.chain_starts[1:]):
+            first, second = x[segments[chain, 0]], x[segments[chain, 1]]
+            around = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum() < 0
+            if around and (side.neighbours[chain] >= 0).all():
+                segments[chain] = segments[chain, ::-1]
+        surfaces.append(Surface(segments))
+    return Interface(interface.nodes, *surfaces)
+
+
+@mutant("closed chains turned counter-clockwise", "hard.search", "pair residual tangent contact_points", nts_ar)
+def _(right, interface, *state):
+    return right(_counter_clockwise(interface, state[-1]), *state)
 
 
 def _points_of(right, interface, pairing, z):
