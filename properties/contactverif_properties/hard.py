@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 from scipy import linalg
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import CheckedNumber, Measure, Measurement, Property, Quantity, check_all
@@ -34,6 +34,7 @@ from contactverif.mechanics.system import System
 from contactverif.problems import block_scenes, flat_states, hard_corner_states
 from contactverif.problems.blocks import pressure_of
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
+from contactverif.strategies.beside import beside_cases
 from contactverif_properties import exact_forces, patch_solved, roundoff
 from contactverif_properties.applicability import knows_total, may_act_twice, refuse_dependent_multipliers
 from contactverif_properties.newton_method import end_details
@@ -189,18 +190,27 @@ SIZE = Quantity("force over ε̂ D L", "4", f"No gap is longer than D; {TWO_PASS
 
 
 def _measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measurement:
-    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap."""
+    """Compare the total force on the slave with the bounds of the case; all multipliers press as the typical gap.
+
+    Where a case says which slave nodes lie beside the master, the forces on these count.
+    """
     traits, edges = subject.traits, case.parameters["edges"]
     bounds = case.parameters["segment_bounds" if traits.rules.gap else "bounds"] * case.penalty
-    slave = exact_forces.pushing_forces(exact_forces.uniform_state(case, subject))[: case.interface.n_slave_nodes]
+    state, n_slave = exact_forces.uniform_state(case, subject), case.interface.n_slave_nodes
+    beside = case.parameters.get("beside", np.ones(n_slave)) > 0
+    slave = exact_forces.pushing_forces(state)[:n_slave][beside]
     total, size = slave.sum(axis=0), float(np.abs(slave).sum())
     along = float(total @ case.parameters["axis"])
-    largest = case.penalty * case.diameter * case.slave_length
-    numbers, broken = [SIZE.check(size / largest, 4.0)], ""
-    reach = min(case.parameter("penetration"), case.shortest_segment)
-    tolerance = UNIT_ROUNDOFF * (8 * case.largest_coordinate / reach + 4 * case.n_segments + roundoff.WEIGHT_ROUNDINGS)
+    numbers, broken = [], ""
+    if case.interface.dim == PLANE:  # In space nodal springs of two passes have no such bound.
+        numbers.append(SIZE.check(size / (case.penalty * case.diameter * case.slave_length), 4.0))
+    tolerance = roundoff.gap_tolerance(case, min(case.parameter("penetration"), case.shortest_segment))
     if bounds[1] == 0:
-        broken = f"a force of {size:.2g} on a slave that faces no master" if size > 0 else ""
+        broken = (
+            f"a force of {size:.2g} on a slave that faces no master"
+            if size > 0
+            else _find_stiffness(state, beside, traits)
+        )
     else:
         outside = max(0.0, _outside(total, edges) - aside)
         numbers.append(DIRECTION.check(roundoff.ratio(outside, size), tolerance))
@@ -212,9 +222,24 @@ def _measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measur
     return Measurement(numbers, broken=broken, details=details, idle=size == 0 and bounds[0] > 0)
 
 
+def _find_stiffness(state: FrozenState, beside: BoolArray, traits: Traits) -> str:
+    """Return what an exact tangent holds of slave nodes (n_slave_nodes,) that face nothing, or an empty string.
+
+    All that a formulation has is asked: nothing may be paired here, which a kernel may not expect.
+    """
+    _ = state.has_points and state.points
+    if "tangent" not in state.formulation.provides:
+        return ""
+    rows = np.flatnonzero(np.repeat(beside, state.case.interface.dim))
+    stiff = state.tangent[rows, : state.case.interface.n_unknowns].any()
+    return "a stiffness of a slave that faces no master" if stiff and traits.promises.tangent == "exact" else ""
+
+
 def _outside(force: FloatArray, edges: FloatArray) -> float:
-    """Return the part of a force that lies outside the directions between two edges, a force ≥ 0."""
+    """Return the part of a force that lies outside the directions between two edges, in space one; a force ≥ 0."""
     right, left = edges
+    if len(force) != PLANE:
+        return max(exact_forces.distance_from_line(force, right), -float(force @ right))
     middle = right + left
     past_right, past_left = (float(a[0] * b[1] - a[1] * b[0]) for a, b in ((right, force), (force, left)))
     return max(0.0, max(-past_right, -past_left), -float(force @ middle) / float(np.linalg.norm(middle)))
@@ -267,13 +292,19 @@ def hard_concave_corner(case: Case, subject: Subject) -> Measurement:
     return _measure_bounded(case, subject)
 
 
-@_define_bounded(id="hard.free-end", rank=430, cases=Cases.from_list(hard_corner_states.free_end_states))
+@_define_bounded(
+    id="hard.free-end",
+    rank=430,
+    cases=Cases.from_list(hard_corner_states.free_end_states),
+    cases_in_space=Cases.random(beside_cases),
+)
 def hard_free_end(case: Case, subject: Subject) -> Measurement:
     """At a free end the force is between that of the inner segments and that of all; beyond it is 0.
 
     **Question.** The first node of the slave is at the free end of a flat master, a rounding beside it, or up to half a
     segment past it; or the slave is wholly outside. Is the total force between that of the segments that surely face
-    the master and that of all, and 0 outside?
+    the master and that of all, and 0 outside? In space slave faces lie wholly beside an edge or a corner of the master,
+    1e-12 to 2000 of its longest edges away, alone or with another face in contact.
 
     **Why it matters.** A body that slides off an edge passes all these states. A master that is continued past its end
     holds it in the air.
@@ -283,7 +314,10 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     where `penalty` and `area` are stated, the total is at least ε̂ |g| times the length of the other segments, and at
     most that of the whole slave. The detail `share of the upper bound` shows the jump: compare the cases 0.0099 and
     0.0101 past the end for τ = 0.01. A slave wholly outside, by the length of a segment or more, must feel exactly
-    nothing, whatever the formulation. The tolerance is u(8X/min(|g|, ℓ) + 4N + 128).
+    nothing, whatever the formulation. In space that holds from the longest edge of the master on, and nearer the force
+    is no pull, and at most that of the faces beside. Where nothing faces the master, an exact tangent has no entry
+    either, and contact points are asked for: a kernel may not expect that it pairs nothing. The tolerance is
+    u(8X/min(|g|, ℓ) + 4N + 128), in space with D d/h added to X.
 
     The force points along the common normal. If forces are the derivative of an energy of what is covered, the end
     that cuts the cover is pushed along the surface by the energy there, ε̂ g²/2 for a length. That is subtracted, unless

@@ -292,6 +292,22 @@ def _(right, interface, z):
     return Pairing({"home": home, "active": pairing["active"] & (home >= 0)})
 
 
+@mutant("last face taken unchecked for a node that faces none", "hard.free-end", "pair", NTS_AR)
+def _(right, interface, z):
+    pairing = right(interface, z)
+    lost = pairing["home"] < 0
+    return Pairing(
+        {"home": np.where(lost, len(interface.master) - 1, pairing["home"]), "active": pairing["active"] | lost}
+    )
+
+
+@mutant("a pairing that may not be empty", "hard.free-end", "pair")
+def _(right, interface, z):
+    pairing = right(interface, z)
+    assert len(pairing["slave_face"]) > pairing["slave_face"].argmax()
+    return pairing
+
+
 @mutant("deep nodes taken for the other side", "hard.deep", "pair", NTS_AR)
 def _(right, interface, z):
     """Take a penetration of two fifths of an edge or more for the other side of the body."""
