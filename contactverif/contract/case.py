@@ -288,7 +288,7 @@ class Cases:
     @property
     def takes_faces(self) -> bool:
         """True if the function makes cases in space with other faces than triangles, by an argument `faces`."""
-        return "faces" in signature(self.make).parameters
+        return "faces" in signature(self.make, follow_wrapped=False).parameters
 
     def on_faces(self, faces: tuple[int, ...]) -> Cases:
         """Return the cases on faces with these numbers of corners."""
@@ -298,14 +298,19 @@ class Cases:
     def random_source(self) -> str:
         """The stored name of the function, and the faces, on which the cases are others; empty without a name."""
         name = name_of_source(self.make)
-        return f"{name} on faces of {' or '.join(map(str, self.faces))} corners" if name and self.faces else name
+        return name and f"{name}{self.on_which_faces}"
+
+    @property
+    def on_which_faces(self) -> str:
+        """The faces in words, which follow a stored name; empty for triangles alone."""
+        return f" on faces of {' or '.join(map(str, self.faces))} corners" if self.faces else ""
 
     def __call__(self, place: Any) -> Any:
         """Return the cases on an interface or a scene; on None, the property's own."""
         if not self.is_list:
             return self.make(place, self.faces) if self.faces else self.make(place)
         if place is None:
-            return self.make()
+            return self.make(self.faces) if self.faces else self.make()
         return None if self.on_place is None else self.on_place(place)
 
 

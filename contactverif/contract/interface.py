@@ -113,6 +113,7 @@ class Surface:
             return triangles
         # Where the face is flat, its Jacobian is linear in either coordinate, and the rule is exact. Else it is smooth.
         points, weights = np.polynomial.legendre.leggauss(4)
+        corners = corners - corners[:, :1]  # Far from the origin, shares of positions would round the area away.
         areas = np.zeros(len(corners))
         for s, weight_s in zip(points, weights, strict=True):
             for t, weight_t in zip(points, weights, strict=True):

@@ -133,7 +133,8 @@ def uniform_surface_weights_exact(interface: Interface, plane: ArrayLike, domain
 
     The weight of a node is ∫ N over the part of its surface that lies in the convex domain, whose corners (n_corners,
     2) run counter-clockwise. `plane` (n_nodes, 2) are the coordinates of the nodes; floats count as the rationals that
-    they are. A quadrilateral partly outside of the domain is refused: there no polynomial is integrated.
+    they are. A face partly outside of the domain is a triangle or a parallelogram: on no other are shape functions
+    polynomials of the place.
     """
     places, border = _as_points(plane), _as_points(domain)
     weights = [Fraction(0)] * len(places)
@@ -155,14 +156,14 @@ def uniform_surface_weights(interface: Interface, plane: ArrayLike, domain: Arra
 def nodal_surface_weights(interface: Interface, plane: ArrayLike, *, both_surfaces: bool = False) -> FloatArray:
     """Return the forces (n_nodes,) away from the other body of springs of unit force at the nodes of the slave.
 
-    The force of a spring is shared by the shape functions of the triangle below. The surfaces are triangles in one
-    plane, where their nodes have the coordinates `plane` (n_nodes, 2). A node beside the other surface has no spring.
-    With `both_surfaces` there are springs at the nodes of the master too.
+    The force of a spring is shared by the shape functions of the face below. The surfaces are triangles or
+    parallelograms in one plane, where their nodes have the coordinates `plane` (n_nodes, 2). A node beside the other
+    surface has no spring. With `both_surfaces` there are springs at the nodes of the master too.
     """
     places = _as_points(plane)
 
     def parts(node: int, face: list[int]) -> list[Fraction]:
-        return [turn(places[node], places[face[i - 2]], places[face[i - 1]]) for i in range(3)]
+        return _shapes([places[corner] for corner in face], places[node])
 
     return _spring_weights(interface, parts, both_surfaces)
 
@@ -176,29 +177,39 @@ def turn(a: Point, b: Point, c: Point) -> Fraction:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
+def _shapes(corners: Polygon, place: Point) -> list[Fraction]:
+    """Return the shape functions of a triangle or a parallelogram at a place; one is negative outside of it."""
+    first, second, last = corners[0], corners[1], corners[-1]
+    size = turn(first, second, last)
+    s, t = turn(first, place, last) / size, turn(first, second, place) / size
+    return [1 - s - t, s, t] if len(corners) == _TRIANGLE else [(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t]
+
+
 def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
     """Return ∫ of each shape function of a face over its part in the domain.
 
-    A linear function over a triangle is its value at the centroid times the area.
+    Over a triangle a linear function is its value at the centroid times the area. One of degree 2 is the mean of its
+    values in the middle of the edges times the area.
     """
-    edges = list(zip(border, border[1:] + border[:1], strict=True))
-    whole = all(turn(start, end, corner) >= 0 for start, end in edges for corner in corners)
-    if len(corners) != _TRIANGLE:
-        if not whole:
-            needed = "triangles, or none cut by the border"
-            raise MisuseError("plane", "a quadrilateral partly outside of the domain", needed)
-        return _whole_quadrilateral(corners)
-    size = turn(*corners)
-    if whole:
-        return [size / 6] * 3
-    part, weights = cut_polygon(corners, border), [Fraction(0)] * 3
+    edges, is_triangle = list(zip(border, border[1:] + border[:1], strict=True)), len(corners) == _TRIANGLE
+    if all(turn(start, end, corner) >= 0 for start, end in edges for corner in corners):
+        return [turn(corners[0], corners[1], corners[2]) / 6] * 3 if is_triangle else _whole_quadrilateral(corners)
+    part, weights = cut_polygon(corners, border), [Fraction(0)] * len(corners)
+    if part and not is_triangle and any(a + c != b + d for a, b, c, d in zip(*corners, strict=True)):
+        needed = "triangles, parallelograms, or none cut by the border"
+        raise MisuseError("plane", "another quadrilateral partly outside of the domain", needed)
     for second, third in pairwise(part[1:]):
         fan = part[0], second, third
-        area = turn(*fan) / 2
-        centroid = (sum((x for x, _ in fan), Fraction(0)) / 3, sum((y for _, y in fan), Fraction(0)) / 3)
-        for i in range(3):
-            weights[i] += area * turn(corners[(i + 1) % 3], corners[(i + 2) % 3], centroid) / size
+        places = [_mean(fan)] if is_triangle else [_mean((fan[i - 1], fan[i])) for i in range(3)]
+        share = turn(*fan) / 2 / len(places)
+        for place in places:
+            weights = [weight + share * shape for weight, shape in zip(weights, _shapes(corners, place), strict=True)]
     return weights
+
+
+def _mean(points: Sequence[Point]) -> Point:
+    x, y = (sum(values, Fraction(0)) / len(points) for values in zip(*points, strict=True))
+    return x, y
 
 
 def cut_polygon(polygon: Polygon, border: Polygon) -> Polygon:

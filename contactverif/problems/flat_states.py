@@ -8,7 +8,7 @@ rationals: near 1e8 the stored penetration is another one than the penetration t
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from itertools import accumulate, pairwise, product
 from math import cos, radians, sin
 from operator import mul
@@ -17,7 +17,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.oracle.flat_answers import uniform_pressure_weights, uniform_surface_weights
 
 
@@ -28,6 +28,24 @@ def collect(make: Callable[[], Iterator[Case]]) -> Callable[[], tuple[Case, ...]
     @wraps(make)
     def cases() -> tuple[Case, ...]:
         return tuple(make())
+
+    return cases
+
+
+def collect_on_faces(make: Callable[[int], Iterator[Case]]) -> Callable[..., tuple[Case, ...]]:
+    """Return a function that returns the cases of a generator for each number of corners of a face, made once.
+
+    The generator takes the number. On quadrilaterals, the name of a case says so.
+    """
+
+    @cache
+    def on_corners(corners: int) -> tuple[Case, ...]:
+        ending = "" if corners == TRIANGLE else ", quadrilaterals"
+        return tuple(replace(case, name=f"{case.name}{ending}") for case in make(corners))
+
+    @wraps(make)
+    def cases(faces: tuple[int, ...] = (TRIANGLE,)) -> tuple[Case, ...]:
+        return tuple(case for corners in faces for case in on_corners(corners))
 
     return cases
 
@@ -301,7 +319,7 @@ _FACE_PENALTY = 50 / 3  # No number of single precision, in which all penalties 
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """Triangles, counter-clockwise seen from outside of their body."""
+    """Triangles or quadrilaterals, counter-clockwise seen from outside of their body."""
 
     points: Points  # (x, y, z)
     faces: Faces
@@ -312,18 +330,28 @@ class Sheet:
         return Sheet([*self.points, *other.points], [*self.faces, *moved])
 
 
-def grid(xs: Sequence[float], ys: Sequence[float], height: float = 0.0) -> Sheet:
-    """Return a grid with nodes at these places, its cells cut along one diagonal and the other in turn."""
+def grid(xs: Sequence[float], ys: Sequence[float], height: float = 0.0, corners: int = TRIANGLE) -> Sheet:
+    """Return a grid with nodes at these places.
+
+    Its cells are quadrilaterals, or are cut into triangles along one diagonal and the other in turn.
+    """
     rows = len(ys)
     faces = []
     for i, j in product(range(len(xs) - 1), range(rows - 1)):
         a, b, c, d = i * rows + j, (i + 1) * rows + j, (i + 1) * rows + j + 1, i * rows + j + 1
-        faces += [[a, b, c], [a, c, d]] if (i + j) % 2 == 0 else [[a, b, d], [b, c, d]]
+        cut = [[a, b, c], [a, c, d]] if (i + j) % 2 == 0 else [[a, b, d], [b, c, d]]
+        faces += [[a, b, c, d]] if corners == QUADRILATERAL else cut
     return Sheet([(x, y, height) for x, y in product(xs, ys)], faces)
 
 
-def fan(centre: tuple[float, float], low: float, high: float, parts: int = 1) -> Sheet:
-    """Return the square [low, high]² as a fan around a node; each of its sides has so many edges."""
+def fan(centre: tuple[float, float], low: float, high: float, parts: int = 1, corners: int = TRIANGLE) -> Sheet:
+    """Return the square [low, high]² as a fan around a node; each of its sides has so many edges.
+
+    Around a node there are four rectangles, whatever the number of edges.
+    """
+    if corners == QUADRILATERAL:
+        xs, ys = ([low, place, high] for place in centre)
+        return grid(xs, ys, corners=corners)
     steps = [low + (high - low) * k / parts for k in range(parts)]
     border = [(x, low) for x in steps] + [(high, y) for y in steps]
     border += [(low + high - x, high) for x in steps] + [(low, low + high - y) for y in steps]
@@ -333,30 +361,40 @@ def fan(centre: tuple[float, float], low: float, high: float, parts: int = 1) ->
 
 
 def shuffle(sheet: Sheet) -> Sheet:
-    """Return the same triangles in a random order, the same at each call."""
+    """Return the same faces in a random order, the same at each call."""
     order = np.random.default_rng(len(sheet.faces)).permutation(len(sheet.faces))
     return Sheet(sheet.points, [sheet.faces[k] for k in order])
 
 
 def plate(top: Sheet, thickness: float, below: tuple[float, float]) -> Sheet:
-    """Return a closed plate under a flat sheet; its lower side is a fan around the node `below`."""
+    """Return a closed plate under a flat sheet; its lower side is a fan around the node `below`.
+
+    Of quadrilaterals, it is the sheet again, a quarter as large around `below`, with a ring of others around it.
+    """
     edges = {edge for face in top.faces for edge in zip(face, [*face[1:], face[0]], strict=True)}
     border = {start: end for start, end in edges if (end, start) not in edges}
     loop = [min(border)]
     while (following := border[loop[-1]]) != loop[0]:
         loop.append(following)
     count = len(top.points)
-    points = [*top.points, *((*top.points[node][:2], -thickness) for node in loop), (*below, -thickness)]
+    points = [*top.points, *((*top.points[node][:2], -thickness) for node in loop)]
     under = {node: count + k for k, node in enumerate(loop)}
-    faces = [*top.faces]
-    for a, b in pairwise([*loop, loop[0]]):
+    faces, sides = [*top.faces], pairwise([*loop, loop[0]])
+    if len(top.faces[0]) == QUADRILATERAL:
+        for a, b in sides:
+            faces += [[b, a, under[a], under[b]], [under[b], under[a], len(points) + a, len(points) + b]]
+        faces += [[len(points) + node for node in face[::-1]] for face in top.faces]
+        inner = [[(3 * low + place) / 4 for low, place in zip(below, point, strict=False)] for point in top.points]
+        return Sheet([*points, *((x, y, -thickness) for x, y in inner)], faces)
+    points.append((*below, -thickness))
+    for a, b in sides:
         faces += [[b, a, under[a]], [b, under[a], under[b]], [under[b], under[a], len(points) - 1]]
     return Sheet(points, faces)
 
 
-def wedge(slope: float) -> Sheet:
+def wedge(slope: float, corners: int = TRIANGLE) -> Sheet:
     """Return a wedge over [0, 8]² with its edge at x = 0: the upper side is flat, the lower side falls by `slope`."""
-    top, rows = grid([0.0, 4.0, 8.0], [0.0, 3.0, 8.0]), 3
+    top, rows = grid([0.0, 4.0, 8.0], [0.0, 3.0, 8.0], corners=corners), 3
     # The nodes on the edge, which come first, belong to both sides.
     number = [node if node < rows else node + len(top.points) - rows for node in range(len(top.points))]
     points = [*top.points, *((x, y, -slope * x) for x, y, _ in top.points[rows:])]
@@ -398,7 +436,7 @@ def flat_face_state(
     interface = Interface.from_faces(slave_nodes, below, master_nodes, master.faces)
     nodes, count = np.vstack([current, master_nodes]), len(current)
     faces = np.array(master.faces)
-    corners = np.array(master.points)[faces]  # (n_faces, 3, 3)
+    corners = np.array(master.points)[faces]  # (n_faces, n_corners, 3)
     (ax, ay), (bx, by) = (corners[:, end, :2].T - corners[:, 0, :2].T for end in (1, 2))
     flat = faces[(corners[..., 2] == 0).all(axis=1) & (ax * by - ay * bx > 0)]  # In z = 0, and seen from above.
     frame = read_frame(nodes, [*zip(*matrix, strict=True)], size, master_nodes[flat[0, 0]])
@@ -419,19 +457,23 @@ def flat_face_state(
     return Case(interface, nodes.reshape(-1), _FACE_PENALTY, parameters, name=name)
 
 
-# Slave and master
-_SHEETS = grid([0.25, 1.375, 3.0], [0.5, 1.75, 2.5]), grid([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
+def _sheets(corners: int) -> tuple[Sheet, Sheet]:
+    """Return a slave and a master."""
+    slave, master = ([0.25, 1.375, 3.0], [0.5, 1.75, 2.5]), ([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
+    return grid(*slave, corners=corners), grid(*master, corners=corners)
 
 
-@collect
-def node_hit_face_states() -> Iterator[Case]:
+@collect_on_faces
+def node_hit_face_states(corners: int) -> Iterator[Case]:
     """Return flat states in which a node of the master lies under a node, an edge or a centre, or a rounding beside.
 
     Under a slave node it has four edges, two of which lie under edges of the slave, or 32. In the last states it is the
-    slave node that has 32.
+    slave node that has 32. Quadrilaterals are rectangles, of which four meet.
     """
-    slave, below = grid([0.0, 3.0, 6.0], [0.0, 3.0, 6.0]), grid([-3.0, 3.0, 9.0], [-3.0, 3.0, 9.0])
+    slave, below = (grid(places, places, corners=corners) for places in ([0.0, 3.0, 6.0], [-3.0, 3.0, 9.0]))
     places = {"node": (3.0, 3.0, 1), "node, fan of 32": (3.0, 3.0, 8), "edge": (4.5, 3.0, 1)}
+    if corners == QUADRILATERAL:
+        del places["node, fan of 32"]
     places |= {"diagonal": (1.5, 1.5, 1), "centre": (2.0, 1.0, 1)}
     steps = {"on it": (0, 0), "one rounding left": (-1, 0), "one rounding right": (1, 0), "one rounding up": (0, 1)}
     for (place, (x, y, parts)), (label, step), (turn_label, turn) in product(
@@ -439,33 +481,34 @@ def node_hit_face_states() -> Iterator[Case]:
     ):
         rounding = 2.0**-50 if turn is LEVEL else 2.0**-47  # Turned nodes have up to three bits more.
         centre = x + step[0] * rounding, y + step[1] * rounding
-        pairs = {place: (slave, fan(centre, -3.0, 9.0, parts))}
+        pairs = {place: (slave, fan(centre, -3.0, 9.0, parts, corners))}
         if place == "node, fan of 32":
             pairs["slave fan of 32"] = fan(centre, 0.0, 6.0, parts), below
         for name, pair in pairs.items():
             yield flat_face_state(f"{name} {label}{turn_label}", *pair, 2.0**-4, turn=turn)
 
 
-@collect
-def offset_face_states() -> Iterator[Case]:
+@collect_on_faces
+def offset_face_states(corners: int) -> Iterator[Case]:
     """Return flat states whose distance from the origin is 1e9 to 1e15 times their penetration; lengths are near 1."""
+    sheets = _sheets(corners)
     for (label, offset, depth), (turn_label, turn) in product(_OFFSETS, _SPACE_TURNS.items()):
         place = (offset, -offset / 2, offset / 4)
-        yield flat_face_state(f"{label}{turn_label}", *_SHEETS, depth, turn=turn, offset=place)
+        yield flat_face_state(f"{label}{turn_label}", *sheets, depth, turn=turn, offset=place)
     # The stored gap is one step of the doubles there, 1.49e-8, and not the 2e-8 that is asked for.
-    yield flat_face_state("1e8, gap of one step", *_SHEETS, 2e-8, offset=(1e8, 1e8, 1e8))
-    yield flat_face_state("1e6, gap 1e-6 in decimals", *_SHEETS, 1e-6, offset=(1e6, 1e6, 1e6))
+    yield flat_face_state("1e8, gap of one step", *sheets, 2e-8, offset=(1e8, 1e8, 1e8))
+    yield flat_face_state("1e6, gap 1e-6 in decimals", *sheets, 1e-6, offset=(1e6, 1e6, 1e6))
 
 
-@collect
-def deep_face_states() -> Iterator[Case]:
+@collect_on_faces
+def deep_face_states(corners: int) -> Iterator[Case]:
     """Return flat states that penetrate by half a length and by two lengths, where edges have about one."""
     for (name, depth), (label, turn) in product(_DEPTHS.items(), _SPACE_TURNS.items()):
-        yield flat_face_state(f"{name}{label}", *_SHEETS, depth, turn=turn)
+        yield flat_face_state(f"{name}{label}", *_sheets(corners), depth, turn=turn)
 
 
-@collect
-def equal_area_states() -> Iterator[Case]:
+@collect_on_faces
+def equal_area_states(corners: int) -> Iterator[Case]:
     """Return flat states whose slave has as much area as nodes, and a master with as many nodes on that area.
 
     So it does not matter whether the unit of the penalty is stated, and two passes have twice the springs. The master
@@ -477,44 +520,45 @@ def equal_area_states() -> Iterator[Case]:
         ("144 nodes", 12, 2.0**-4, _FACE_PENALTY),
     ):
         places, below = [0.0, *accumulate([1.5, *[1.0] * (n - 3), 1.5])], [-1.375 + k for k in range(n + 4)]
-        state = flat_face_state(name, shuffle(grid(places, places)), shuffle(grid(below, below)), depth)
-        yield replace(state, penalty=penalty)
+        slave, master = (shuffle(grid(lines, lines, corners=corners)) for lines in (places, below))
+        yield replace(flat_face_state(name, slave, master, depth), penalty=penalty)
 
 
-@collect
-def search_face_states() -> Iterator[Case]:
+@collect_on_faces
+def search_face_states(corners: int) -> Iterator[Case]:
     """Return states on which a search is known to go wrong: something else is near the flat part, or faces are many.
 
     Many faces are numbered at random, as a mesh generator may do.
     """
-    big, cells = grid([0.0, 8.0], [0.0, 8.0]), grid([0.0, 2.5, 5.0, 8.0], [0.0, 4.0, 8.0])
-    slave, beside = grid([3.0, 3.5, 4.0], [3.0, 3.5, 4.0]), grid([1.0, 2.0, 3.5], [2.0, 4.0, 4.5])
-    lower = grid([-1.0, 3.5, 9.0], [-1.0, 3.5, 9.0], -0.75)
-    many = shuffle(grid([-0.5 + 0.75 * i for i in range(12)], [-0.25 + 0.75 * i for i in range(13)]))
+    cut = partial(grid, corners=corners)
+    big, cells = cut([0.0, 8.0], [0.0, 8.0]), cut([0.0, 2.5, 5.0, 8.0], [0.0, 4.0, 8.0])
+    slave, beside = cut([3.0, 3.5, 4.0], [3.0, 3.5, 4.0]), cut([1.0, 2.0, 3.5], [2.0, 4.0, 4.5])
+    lower = cut([-1.0, 3.5, 9.0], [-1.0, 3.5, 9.0], -0.75)
+    many = shuffle(cut([-0.5 + 0.75 * i for i in range(12)], [-0.25 + 0.75 * i for i in range(13)]))
     states = {
         "nearest node not on the nearest face": (slave, plate(big, 0.5, (3.5, 3.5))),
         "a thin plate": (beside, plate(cells, 0.125, (3.0, 3.0))),
-        "master angle of 37°": (beside, wedge(0.75)),
-        "master angle of 14°": (beside, wedge(0.25)),
+        "master angle of 37°": (beside, wedge(0.75, corners)),
+        "master angle of 14°": (beside, wedge(0.25, corners)),
         "a second body behind the first": (beside, plate(cells, 0.5, (3.0, 3.0)) + lower),
-        "264 master faces": (shuffle(grid([0.0, 1.0, 3.0, 5.0, 7.5], [0.0, 2.5, 4.0, 7.0])), many),
+        f"{len(many.faces)} master faces": (shuffle(cut([0.0, 1.0, 3.0, 5.0, 7.5], [0.0, 2.5, 4.0, 7.0])), many),
     }
     for (name, (here, master)), (label, turn) in product(states.items(), _SPACE_TURNS.items()):
         yield flat_face_state(f"{name}{label}", here, master, 2.0**-5, turn=turn)
 
 
-@collect
-def touching_face_states() -> Iterator[Case]:
+@collect_on_faces
+def touching_face_states(corners: int) -> Iterator[Case]:
     """Return states that touch exactly at some 160 rotations, and states with a gap of ±1e-16 at a tenth of them.
 
-    The parameters are those of `flat_face_state` and `shift`, the gap before it is stored, a length. Nodes over nodes
-    and edges are among them.
+    Quadrilaterals do at a quarter of these rotations. The parameters are those of `flat_face_state` and `shift`, the
+    gap before it is stored, a length. Nodes over nodes and edges are among them.
     """
     parts = range(-3, 4)
     turns = [(a, b, c, d) for a, b, c, d in product((1, 2), parts, parts, parts) if np.gcd.reduce([a, b, c, d]) == 1]
-    turns = turns[:: len(turns) // 150]
-    slave = grid([0.25, 1.0, 1.375], [0.25, 1.0, 1.5])
-    master = grid([0.0, 0.5, 1.0, 1.75], [0.0, 1.0, 1.75])
+    turns = turns[:: len(turns) // (150 if corners == TRIANGLE else 40)]
+    slave = grid([0.25, 1.0, 1.375], [0.25, 1.0, 1.5], corners=corners)
+    master = grid([0.0, 0.5, 1.0, 1.75], [0.0, 1.0, 1.75], corners=corners)
     for shift, turn in [(0.0, turn) for turn in turns] + list(product((1e-16, -1e-16), turns[::10])):
         case = flat_face_state(f"gap {shift:g}, turned by {turn}", slave, master, 0.0, turn=turn)
         moved = case.positions.copy()

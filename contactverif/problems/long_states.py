@@ -15,7 +15,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface, Surface
-from contactverif.problems.flat_states import collect, grid, rotation
+from contactverif.problems.flat_states import collect, collect_on_faces, grid, rotation
 
 _FINEST = 1e-3  # The shortest over the longest segment of the graded state.
 _PENALTY = 16.0
@@ -31,23 +31,23 @@ class _Part(NamedTuple):
     closed: bool = False  # The last point of each chain is joined to its first.
 
 
-@collect
-def long_face_states() -> Iterator[Case]:
-    """Return the states in space: triangles on a wave, few on many, many on few, and nearly flat and hardly in touch.
+@collect_on_faces
+def long_face_states(corners: int) -> Iterator[Case]:
+    """Return the states in space: faces on a wave, few on many, many on few, and nearly flat and hardly in touch.
 
     In the last one the tangent is nearly symmetric, as it is in everyday use. A slave grid lies over the middle of a
     wider master grid.
     """
     sizes = {
-        "wavy-faces-128": (8, 5, 1 / 16, _DEPTH),
-        "few-faces-on-many-128": (2, 8, 0.0, _DEPTH),
-        "many-faces-on-few-128": (8, 2, 0.0, _DEPTH),
-        "shallow-faces-128": (4, 8, 0.0, _DEPTH / 64),
+        "wavy-faces": (8, 5, 1 / 16, _DEPTH),
+        "few-faces-on-many": (2, 8, 0.0, _DEPTH),
+        "many-faces-on-few": (8, 2, 0.0, _DEPTH),
+        "shallow-faces": (4, 8, 0.0, _DEPTH / 64),
     }
-    for number, (name, (*cells, amplitude, depth)) in enumerate(sizes.items()):
+    for number, (kind, (*cells, amplitude, depth)) in enumerate(sizes.items()):
         slave, master = (
-            grid(_places(2 * number + side, count).tolist(), _places(2 * number + side + 20, count).tolist())
-            for side, count in enumerate(map(int, cells))
+            grid(_places(number, count).tolist(), _places(number + 20, count).tolist(), corners=corners)
+            for number, count in enumerate(map(int, cells), 2 * number)
         )
         upper, lower = np.array(slave.points), 1.1 * np.array(master.points) - [0.05, 0.05, 0.0]
         for points in (upper, lower):
@@ -57,7 +57,8 @@ def long_face_states() -> Iterator[Case]:
         upper[:, 2] -= amplitude / 8 + least * np.random.default_rng(number).uniform(0.5, 1.5, len(upper)) * depth
         matrix, size = rotation((3, 1, 2, 1 + number))
         current = np.vstack([upper, lower]) @ (np.array(matrix).T / size)
-        yield Case(interface, current.reshape(-1), _PENALTY, name=name, kind=name.rpartition("-")[0])
+        name = f"{kind}-{max(len(slave.faces), len(master.faces))}"
+        yield Case(interface, current.reshape(-1), _PENALTY, name=name, kind=kind)
 
 
 @collect

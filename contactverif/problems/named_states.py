@@ -7,46 +7,61 @@ lengths of slave and master are exchanged.
 
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
+from functools import partial
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface
 from contactverif.contract.traits import Traits
 from contactverif.problems.open_states import fit_to_traits
 
 _SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 _FIRST_DIAGONAL, _SECOND_DIAGONAL = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]
-_FROM_BELOW = [face[::-1] for face in _FIRST_DIAGONAL]  # The slave's faces are seen from below.
+_WITH_MIDDLES = np.vstack([_SQUARE, [[0.5, 0, 0], [0.5, 1, 0]]])  # The nodes of a square that is cut in halves.
+_HALVES = [[0, 4, 5, 3], [4, 1, 2, 5]]
 _PENETRATION = 2.0**-4
 
 
-def _cross_diagonals() -> Case:
-    """Return a square over a square, cut along the other diagonal, with a penetration of 1/16 everywhere.
+def _squares(corners: int) -> tuple[Interface, FloatArray, FloatArray]:
+    """Return a square of two faces over one that is cut otherwise, and the nodes (n, 3) of both.
 
-    All nodes meet, and yet the consistent forces of slave and master are different: 1/3 and 1/6 of the pressure.
+    Triangles are cut along one diagonal and the other, quadrilaterals along y and along x.
     """
-    interface = Interface.from_faces(_SQUARE, _FROM_BELOW, _SQUARE, _SECOND_DIAGONAL)
+    slave = master = _SQUARE
+    faces = [_FIRST_DIAGONAL, _SECOND_DIAGONAL]
+    if corners == QUADRILATERAL:
+        slave, master, faces = _WITH_MIDDLES, _WITH_MIDDLES[:, [1, 0, 2]], [_HALVES, [face[::-1] for face in _HALVES]]
+    below = [face[::-1] for face in faces[0]]  # The slave's faces are seen from below.
+    return Interface.from_faces(slave, below, master, faces[1]), slave, master
+
+
+def _cross_cuts(name: str, corners: int) -> Case:
+    """Return a square over a square, cut otherwise, with a penetration of 1/16 everywhere.
+
+    The consistent forces of slave and master are different, on triangles 1/3 and 1/6 of the pressure where nodes meet.
+    """
+    interface, slave, master = _squares(corners)
     parameters = {
         "penetration": np.array(_PENETRATION),
-        "plane": np.vstack([_SQUARE, _SQUARE])[:, :2],
+        "plane": np.vstack([slave, master])[:, :2],
         "domain": _SQUARE[:, :2],
         "normal": np.array([0.0, 0.0, 1.0]),
     }
-    z = np.vstack([_SQUARE - [0, 0, _PENETRATION], _SQUARE]).reshape(-1)
-    return Case(interface, z, 1 / _PENETRATION, parameters, name="crossed-diagonals")
+    z = np.vstack([slave - [0, 0, _PENETRATION], master]).reshape(-1)
+    return Case(interface, z, 1 / _PENETRATION, parameters, name=name)
 
 
-def _tilt_faces() -> Case:
+def _tilt_faces(name: str, corners: int) -> Case:
     """Return a tilted square that penetrates a square and overhangs it, seen along its own normal.
 
     It has a slope of 1/4 along x and 1/8 along y.
     """
-    slave = _SQUARE + np.column_stack([np.zeros((4, 2)), _SQUARE[:, :2] @ [0.25, 0.125] - 0.5])
-    interface = Interface.from_faces(_SQUARE, _FROM_BELOW, _SQUARE, _SECOND_DIAGONAL)
-    return Case(interface, np.vstack([slave, _SQUARE]).reshape(-1), 16.0, name="tilted-faces")
+    interface, slave, master = _squares(corners)
+    tilted = slave + np.column_stack([np.zeros((len(slave), 2)), slave[:, :2] @ [0.25, 0.125] - 0.5])
+    return Case(interface, np.vstack([tilted, master]).reshape(-1), 16.0, name=name)
 
 
 _LENGTHS: dict[str, tuple[Sequence[float], Sequence[float]]] = {
@@ -150,16 +165,29 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "moved": _moved_case_c,
     "sliding": _slide_over_vertices,
     "peak": _close_peak,
-    "crossed-diagonals": _cross_diagonals,
-    "tilted-faces": _tilt_faces,
+    "crossed-diagonals": partial(_cross_cuts, "crossed-diagonals", TRIANGLE),
+    "tilted-faces": partial(_tilt_faces, "tilted-faces", TRIANGLE),
+    "crossed-halves": partial(_cross_cuts, "crossed-halves", QUADRILATERAL),
+    "tilted-halves": partial(_tilt_faces, "tilted-halves", QUADRILATERAL),
 }
 FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)
 NAMED: tuple[str, ...] = (*FLAT_NAMES, *_OTHERS)
-IN_SPACE = "crossed-diagonals"  # A flat interface that penetrates uniformly.
+_FLAT_IN_SPACE = {TRIANGLE: "crossed-diagonals", QUADRILATERAL: "crossed-halves"}  # They penetrate uniformly.
+_TILTED_IN_SPACE = {TRIANGLE: "tilted-faces", QUADRILATERAL: "tilted-halves"}
 # Its lengths of 3.2 and 2.8 are rounded: on A1 single precision makes no error.
 _FIRST = "c-prime"
 
 
+def flat_in_space(traits: Traits) -> str:
+    """Return the name of a flat interface in space that penetrates uniformly, of faces that a formulation takes."""
+    return _FLAT_IN_SPACE[min(traits.abilities.faces)]
+
+
+def tilted_in_space(faces: tuple[int, ...] = (TRIANGLE,)) -> tuple[Case, ...]:
+    """Return a tilted square over a square for each number of corners that a face may have."""
+    return tuple(named_case(_TILTED_IN_SPACE[corners]) for corners in faces)
+
+
 def first_state(traits: Traits) -> tuple[Case, str]:
     """Return the state of the first answers of a process, and why a formulation takes it not, or an empty string."""
-    return fit_to_traits(named_case(_FIRST if traits.abilities.in_plane else IN_SPACE), traits)
+    return fit_to_traits(named_case(_FIRST if traits.abilities.in_plane else flat_in_space(traits)), traits)

@@ -26,7 +26,7 @@ from contactverif.contract.property import (
 )
 from contactverif.contract.result import JUDGED_SHARE, OPPOSITE_SIGN, NodalForces, Row, exceeds
 from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
-from contactverif.problems.named_states import IN_SPACE, first_state, named_case
+from contactverif.problems.named_states import first_state, flat_in_space, named_case
 from contactverif.problems.open_states import fit_to_traits
 from contactverif.sampling.hypothesis_draws import one_thread
 
@@ -173,7 +173,7 @@ def call_first(subject: Subject, parts: Collection[str]) -> FirstCall:
     try:
         with one_thread(), np.errstate(all="ignore"):
             first = ask_first(subject, first_case, parts)
-            name, *others = STATES if subject.traits.abilities.in_plane else (IN_SPACE,)
+            name, *others = STATES if subject.traits.abilities.in_plane else (flat_in_space(subject.traits),)
             start = perf_counter()
             push = _push(subject, name)
             seconds = perf_counter() - start

@@ -18,6 +18,7 @@ from math import sqrt
 from contactverif.contract import schema
 from contactverif.contract.case import Case, needs_of_place
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import FAILED, Outcome, Outcomes, Property, Verdict
 from contactverif.contract.result import NOT_HERE, OF_TRAITS, OMITTED, NotLoaded, Row, Run
 from contactverif.contract.subject import STATED_PARTS, Subject
@@ -296,6 +297,10 @@ def find_witness(subject: Subject, question: Property, listed: Sequence[Case]) -
         if case.interface.dim not in subject.traits.abilities.dimensions:
             words = f"{name!r}, whose interface has {case.interface.dim} coordinates"
             raise MisuseError("name", words, f"one that {subject.name} takes by its trait dimensions")
+        corners = {side.faces.shape[1] for side in (case.interface.slave, case.interface.master)}
+        if case.interface.dim != PLANE and not corners <= {*subject.traits.abilities.faces}:
+            words = f"{name!r}, whose faces have {max(corners)} corners"
+            raise MisuseError("name", words, f"one that {subject.name} takes by its trait faces")
     except MisuseError as error:
         listed_names = f"a case of {question.id} ({'; '.join(case.name for case in listed)}), or " if listed else ""
         raise MisuseError(f"witness of {question.id}", error.found, f"{listed_names}{error.needed}") from None

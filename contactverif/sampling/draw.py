@@ -82,8 +82,9 @@ def strategy_name(question: Property) -> str:
 
     A run draws the cases of a name once, and those in space are others.
     """
-    in_space = question.cases is question.cases_in_space
-    return name_of_source(question.cases) or f"{question.id}{' in space' if in_space else ''}"
+    space = question.cases_in_space
+    in_space = f" in space{space.on_which_faces}" if space is not None and question.cases is space else ""
+    return name_of_source(question.cases) or f"{question.id}{in_space}"
 
 
 @dataclass(frozen=True, slots=True)

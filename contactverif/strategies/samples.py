@@ -34,13 +34,16 @@ FURTHEST = 2**20  # The largest offset of an exact turn, in units of the lattice
 _EXACT_TURNS = [(1, 0), (0, 1), (-1, 0), (0, -1), (3, 4), (-4, 3), (-5, -12), (12, -5), (8, 15)]
 
 
-def on_own_meshes(draw_case: Callable[[DrawFn], Case]) -> Callable[..., SearchStrategy[Case] | None]:
-    """Return the cases of a function that draws one on a mesh of its own; there are none on a mesh of the user."""
+def on_own_meshes(draw_case: Callable[..., Case]) -> Callable[..., SearchStrategy[Case] | None]:
+    """Return the cases of a function that draws one on a mesh of its own; there are none on a mesh of the user.
+
+    A function that draws in space takes the numbers of corners that a face may have, too.
+    """
     cases = st.composite(draw_case)
 
     @wraps(draw_case)
-    def make(interface: Interface | None = None) -> SearchStrategy[Case] | None:
-        return cases() if interface is None else None
+    def make(interface: Interface | None = None, *faces: tuple[int, ...]) -> SearchStrategy[Case] | None:
+        return cases(*faces) if interface is None else None
 
     return make
 

@@ -15,6 +15,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
+from contactverif.contract.interface import TRIANGLE
 from contactverif.strategies import samples
 from contactverif.strategies.surfaces import SpaceMotion, surface_pairs
 
@@ -136,27 +137,29 @@ def _exact_space_turns() -> SearchStrategy[SpaceMotion]:
 
 @random_source("contactverif.strategies.surfaces.plane_slaves.tilted_plane_cases")
 @samples.on_own_meshes
-def tilted_plane_cases(draw: DrawFn) -> Case:
+def tilted_plane_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return states of a plane slave that is tilted by up to 19° against a flat master, and wholly in contact."""
-    return _tilted_plane(draw)[0]
+    return _tilted_plane(draw, faces)[0]
 
 
 @samples.on_own_meshes
-def plane_cases_by_a_plate(draw: DrawFn) -> Case:
+def plane_cases_by_a_plate(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return states as `tilted_plane_cases` does, with a place for a plate behind the master or at the slave's back.
 
     The parameter "behind" (8, 3) holds its corners, those of the lower side first, counter-clockwise from above.
     """
-    case, turn = _tilted_plane(draw)
+    case, turn = _tilted_plane(draw, faces)
     low = draw(_HEIGHTS)
     square = np.array([[-1.0, -1], [2, -1], [2, 2], [-1, 2]])
     plate = np.column_stack([np.vstack([square, square]), np.repeat([low, low + 1], 4)])
     return replace(case, parameters={"behind": turn(plate)})
 
 
-def _tilted_plane(draw: DrawFn) -> tuple[Case, SpaceMotion]:
+def _tilted_plane(draw: DrawFn, faces: tuple[int, ...]) -> tuple[Case, SpaceMotion]:
     """Return a case, and the similarity that took it where it is."""
-    pair = draw(surface_pairs(same_domain=False, stretched=False, most=4))
+    pair = draw(surface_pairs(same_domain=False, stretched=False, most=4, faces=faces))
+    if pair.slave.corners != TRIANGLE:  # Only on parallelograms are shape functions polynomials of the place.
+        pair = replace(pair, slave=replace(pair.slave, straight=True))
     slopes, quarters = (draw(_SLOPES), draw(_SLOPES)), draw(_SIXTEENTHS_OF_DEPTH)
     turn, penalty, seed = draw(_exact_space_turns()), draw(samples.PENALTIES), draw(samples.SEEDS)
     interface, plane, domain = pair.lay_out()

@@ -199,8 +199,8 @@ def surface_pairs(
 ) -> SearchStrategy[SurfacePair]:
     """Return pairs of grids; unless `same_domain` says which, half of them share their domain and half do not.
 
-    `faces` and `straight` are those of `surface_grids`. The border of a slave may cut a triangle of a larger master,
-    but no straight quadrilateral, whose forces would have no exact answer.
+    `faces` and `straight` are those of `surface_grids`. A larger master of straight quadrilaterals turns by a multiple
+    of 90°, so that they stay rectangles: the border of a slave may cut those, and triangles.
     """
     same = st.booleans().map(lambda larger: not larger) if same_domain is None else st.just(same_domain)
     grids = surface_grids(most=most, faces=faces, straight=straight)
@@ -209,17 +209,18 @@ def surface_pairs(
     def pair(
         slave: SurfaceGrid, master: SurfaceGrid, same: bool, degrees: int, stretch: int, shuffle: int
     ) -> SurfacePair:
-        return SurfacePair(slave, master, same or master.straight, degrees, stretch, shuffle)
+        return SurfacePair(slave, master, same, degrees // 90 * 90 if master.straight else degrees, stretch, shuffle)
 
     return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, samples.SHUFFLES)
 
 
 @cache
-def _matched_pairs() -> SearchStrategy[SurfacePair]:
+def _matched_pairs(faces: tuple[int, ...]) -> SearchStrategy[SurfacePair]:
     def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
         return SurfacePair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number, matched=True)
 
-    return st.builds(pair, surface_grids(), st.booleans(), _STRETCHES, samples.SHUFFLES)
+    grids = surface_grids(faces=faces, straight=True)
+    return st.builds(pair, grids, st.booleans(), _STRETCHES, samples.SHUFFLES)
 
 
 _QUARTERS = st.integers(1, 8)  # The penetration of the middle, in quarters of a unit of the least height of a face.
@@ -248,15 +249,19 @@ def skewed_surface_cases(
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")
-def matched_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+def matched_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
     """Return cases as `flat_surface_cases` does, with each master node over the slave on a slave node."""
-    return _flat_states(_matched_pairs()) if interface is None else None
+    return _flat_states(_matched_pairs(faces)) if interface is None else None
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.overhung_surface_cases")
-def overhung_surface_cases(interface: Interface | None = None) -> SearchStrategy[Case] | None:
+def overhung_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> SearchStrategy[Case] | None:
     """Return cases as `flat_surface_cases` does, with a master that goes beyond the slave on all sides."""
-    return _flat_states(surface_pairs(same_domain=False)) if interface is None else None
+    return _flat_states(surface_pairs(same_domain=False, faces=faces, straight=True)) if interface is None else None
 
 
 @st.composite

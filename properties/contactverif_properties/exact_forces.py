@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import PLANE, Interface, Surface
+from contactverif.contract.interface import PLANE, TRIANGLE, Interface, Surface
 from contactverif.contract.property import Finding, Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
@@ -285,19 +285,23 @@ def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
         for (a, b), length in zip(interface.slave.segments, measures, strict=True):
             nodal[a] += length * (2 * pressures[a] + pressures[b]) / 6
             nodal[b] += length * (pressures[a] + 2 * pressures[b]) / 6
-    else:  # ∫ N_i N_j over a triangle is a twelfth of its area, and a sixth for i = j.
+    else:
+        # ∫ N_i N_j over a triangle is a twelfth of its area, and a sixth for i = j. Over a parallelogram it is a ninth
+        # of the area times 1/2 for each of the two ways in which i and j are not the same.
+        triangle = (np.ones((TRIANGLE, TRIANGLE)) + np.eye(TRIANGLE)) / 12
+        parallelogram = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36
         for face, area in zip(interface.slave.faces, measures, strict=True):
-            nodal[face] += area * (pressures[face] + pressures[face].sum()) / 12
+            nodal[face] += area * (triangle if len(face) == TRIANGLE else parallelogram) @ pressures[face]
     return np.outer(nodal, of_master if traits.rules.force_along == "master normal" else of_slave)
 
 
 def _largest_part(case: Case, surface: Surface) -> NDArray[Any]:
-    """Return the exact ends or corners (dim, dim) of the longest segment, or the largest triangle, of a surface."""
+    """Return the exact ends or corners (n_corners, dim) of the longest segment, or the largest face, of a surface."""
     return _exact(case.positions[surface.faces[int(np.argmax(surface.measures(case.positions)))]])
 
 
 def _normal_of_face(corners: NDArray[Any]) -> NDArray[Any]:
-    """Return the exact normal (3,) of a triangle, as long as twice its area, out of its body."""
+    """Return an exact normal (3,) of a flat face, of any length, out of its body."""
     (a, b, c), (d, e, f) = corners[1] - corners[0], corners[2] - corners[0]
     return np.array([b * f - c * e, c * d - a * f, a * e - b * d], dtype=object)
 

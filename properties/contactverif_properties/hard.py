@@ -392,8 +392,8 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
     """Surfaces that touch, or miss each other by 1e-16, give neither a force nor a wrong stiffness.
 
     **Question.** Flat surfaces touch: the gap is exactly 0 at 1000 angles, or 1e-16 open or closed at 24. In space they
-    do at some 160 rotations, and 17. Is the force no more than roundoff makes it, and is the tangent that of a spring
-    across the surface, or of none?
+    do at some 160 rotations, and 17; quadrilaterals at 40, and 5. Is the force no more than roundoff makes it, and is
+    the tangent that of a spring across the surface, or of none?
 
     **Why it matters.** A normal that is computed as the difference of point and foot over their distance is 0/0 in
     touch, and has any direction at 1e-16. The force is tiny then, and the tangent is as wrong as can be: Newton's

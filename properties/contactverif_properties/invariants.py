@@ -17,7 +17,7 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.errors import NonFiniteError
-from contactverif.contract.interface import PLANE, Interface, Surface
+from contactverif.contract.interface import PLANE, QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.contract.property import (
     WITH_BARRIER,
     WITHOUT_BARRIER,
@@ -183,7 +183,10 @@ ANY, CLOSED = "any mesh, numbered at random", "closed rings, the seam elsewhere"
 FAR, BEHIND = "a far pair of bodies", "a body behind the master"
 MOST_NUMBERS = 12  # So many new numbers of nodes are said.
 DISTANCE = 64.0  # The distance of the far pair over the diameter of the state.
-PLATE = np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]])  # The faces of a plate's lower and upper side.
+PLATES = {
+    TRIANGLE: np.array([[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]]),
+    QUADRILATERAL: np.array([[0, 3, 2, 1], [4, 5, 6, 7]]),
+}  # The faces of a plate's lower and upper side.
 
 
 def renumber(case: Case, nodes: IntArray, slave: IntArray, master: IntArray) -> tuple[Case, Carry]:
@@ -337,9 +340,11 @@ def _remote_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
 
 
 @random_source("contactverif_properties.remote.remote_surface_cases")
-def _remote_surface_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
+def _remote_surface_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> dict[str, SearchStrategy[Case]] | None:
     """Return the same in space; there are none on an interface of the user."""
-    far, behind = smooth_surface_cases(interface), plane_cases_by_a_plate(interface)
+    far, behind = smooth_surface_cases(interface, faces), plane_cases_by_a_plate(interface, faces)
     return None if far is None or behind is None else {FAR: far, BEHIND: behind}
 
 
@@ -372,8 +377,10 @@ def remote(case: Case, subject: Subject) -> Measurement:
     changes the answer by a quarter of the error or more.
     """
     if "behind" in case.parameters:
-        nothing = np.empty((0, case.interface.dim))
-        parts, first, name = ((nothing, nothing.astype(np.int64)), _as_part(case.parameters["behind"])), False, BEHIND
+        slave, master = (side.faces for side in (case.interface.slave, case.interface.master))
+        nothing = np.empty((0, case.interface.dim)), slave[:0]
+        parts = nothing, _as_part(case.parameters["behind"], master.shape[1])
+        first, name = False, BEHIND
     else:  # Multipliers of a plane case keep their places.
         parts, first, name = _make_far_pair(case), case.interface.dim != PLANE and case.seed % 2 == 1, FAR
     return _compare(remote, subject, case, *_add_parts(case, *parts, first=first), f"beside {name}")
@@ -395,14 +402,19 @@ def _make_far_pair(case: Case) -> tuple[_Part, _Part]:
         slave = np.array([[0.0, 0.0, -0.125], [0.0, 1.0, -0.125], [1.0, 0.0, -0.25]])
         master = np.array([[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]])
     origin = case.positions.mean(axis=0) + DISTANCE * case.diameter * direction
-    return _as_part(origin + length * slave), _as_part(origin + length * master)
+    sides = (slave, case.interface.slave), (master, case.interface.master)
+    first, second = (_as_part(origin + length * nodes, side.faces.shape[1]) for nodes, side in sides)
+    return first, second
 
 
-def _as_part(nodes: FloatArray) -> _Part:
-    """Return a part with these nodes: a chain as it is walked, a triangle, or a plate."""
+def _as_part(nodes: FloatArray, corners: int) -> _Part:
+    """Return a part with these nodes: a chain as it is walked, a triangle, a parallelogram, or a plate."""
     if nodes.shape[1] == PLANE:
         return nodes, np.column_stack([np.arange(len(nodes) - 1), np.arange(1, len(nodes))])
-    return nodes, PLATE if len(nodes) == 8 else np.array([[0, 1, 2]])
+    if len(nodes) > TRIANGLE:
+        return nodes, PLATES[corners]
+    fourth = [nodes[0] + nodes[2] - nodes[1]] if corners == QUADRILATERAL else []
+    return np.vstack([nodes, *fourth]), np.arange(corners)[None]
 
 
 def _add_parts(case: Case, slave: _Part, master: _Part, *, first: bool = False) -> tuple[Case, Carry]:

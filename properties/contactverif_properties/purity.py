@@ -13,7 +13,7 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.property import WITH_BARRIER, CheckedNumber, Measurement, Property, Quantity
 from contactverif.contract.subject import CheckedFormulation, FirstAnswers, Restartable, Subject, ask_first
-from contactverif.problems.named_states import first_state, named_case
+from contactverif.problems.named_states import first_state, named_case, tilted_in_space
 from contactverif.strategies.surfaces import surface_cases
 from contactverif_properties.roundoff import pair_coordinates, ratio, slenderness
 from contactverif_properties.states import any_cases, prepare_state
@@ -331,7 +331,7 @@ def _move_some(state: Case, distant: FloatArray, random: np.random.Generator) ->
     rank=80,
     quantities=(IN_LIFE, FIRST_RESIDUAL, FIRST_TANGENT),
     cases=Cases.from_list(lambda: (named_case("offset-c"),)),
-    cases_in_space=Cases.from_list(lambda: (named_case("tilted-faces"),)),
+    cases_in_space=Cases.from_list(tilted_in_space),
 )
 def purity_long(case: Case, subject: Subject) -> Measurement:
     """The first answers of an instance and of a process are those that a long life repeats.
@@ -348,7 +348,7 @@ def purity_long(case: Case, subject: Subject) -> Measurement:
     entries of repeated answers that differ; the tolerance is 0. A pairing that differs fails in words. The other two
     compare the first residual and the first tangent of the process with those that it gives now, each as `purity`
     compares a batch with a loop. A run notes the first answers where it calls a formulation for the first time, on case
-    C′ or on two pairs of triangles, in a process of its own or in that of the harness. They are only compared to
+    C′ or on two pairs of faces, in a process of its own or in that of the harness. They are only compared to
     roundoff, since a process may compile in its first calls and add in another order later.
 
     **Undecided.** Never.

@@ -393,8 +393,8 @@ def tangent_long(case: Case, subject: Subject) -> Measurement:
     """Each block of the tangent of a long interface is the derivative of the residual.
 
     **Question.** Six interfaces have 104 to 200 segments on one side: wavy, graded, a ring, three chains, many segments
-    on few, and few on many. In space four have 128 triangles. Is each block of the tangent the derivative of the
-    residual?
+    on few, and few on many. In space four have 128 triangles or 64 quadrilaterals. Is each block of the tangent the
+    derivative of the residual?
 
     **Why it matters.** Some errors need size: a table that is too short, a block of rows that is forgotten behind the
     hundredth segment, a wrong entry among a hundred thousand. A norm of the whole matrix loses that entry, and the more

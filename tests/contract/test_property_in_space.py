@@ -72,7 +72,7 @@ def test_a_question_about_the_plane_alone_is_not_applicable_in_space() -> None:
     assert question.cases_in_space is None
     assert question.for_traits(IN_SPACE) is question
     assert "plane" in question.refusal(IN_SPACE)
-    assert "triangles" in load_property("patch.tilted.nodal").refusal(IN_SPACE.revise(faces=(4,)))
+    assert "triangles" in load_property("projection.place").refusal(IN_SPACE.revise(faces=(4,)))
     barrier = IN_SPACE.revise(enforcement="barrier", activation=0.1)
     assert "barrier" in load_property("balance.force").refusal(barrier)
 

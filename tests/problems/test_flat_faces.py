@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,7 +20,8 @@ from contactverif.problems.flat_states import (
     touching_face_states,
 )
 
-LISTS = [node_hit_face_states, offset_face_states, search_face_states, touching_face_states]
+MAKERS = [node_hit_face_states, offset_face_states, search_face_states, touching_face_states]
+LISTS = [partial(make, (corners,)) for make in MAKERS for corners in (3, 4)]
 
 
 def exact_heights(case: Case) -> set[Fraction]:
@@ -73,8 +75,11 @@ def test_rotations_keep_right_angles() -> None:
 
 
 def test_a_plate_is_closed_and_its_faces_look_outside() -> None:
-    sheet = plate(grid([0.0, 2.0, 8.0], [0.0, 8.0]), 0.5, (3.0, 3.0))
-    corners = np.array(sheet.points)[np.array(sheet.faces)]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert normals.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
-    assert (corners[:, 0] * normals).sum() / 6 == pytest.approx(8 * 8 * 0.5)
+    for n in (3, 4):
+        sheet = plate(grid([0.0, 2.0, 8.0], [0.0, 8.0], corners=n), 0.5, (3.0, 3.0))
+        corners = np.array(sheet.points)[np.array(sheet.faces)]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+        if n == 4:
+            normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        assert normals.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
+        assert (corners[:, 0] * normals).sum() / 6 == pytest.approx(8 * 8 * 0.5)
