@@ -56,7 +56,8 @@ class PluginError(ContractError):
     """The plugin raised an exception, which is the `__cause__` of this error, or its process ended."""
 
     # Causes: "exception", "memory", "exit", "signal", "hang" (no answer in time), "channel" (no readable answer) and
-    # "not asked": it has ended its process too often to be asked again. `ended`: its process has ended.
+    # "not asked": it has ended its process too often to be asked again, or the state is too deep for it. `ended`: its
+    # process has ended.
     def __init__(self, message: str, cause: str = "exception", *, ended: bool = False) -> None:
         super().__init__(message)
         self.cause, self.ended = cause, ended

@@ -21,7 +21,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, CaseSummary
 from contactverif.contract.errors import MisuseError, clean, refuse
 from contactverif.contract.interface import TRIANGLE
-from contactverif.contract.subject import SOLVE, EngineSubject, Subject
+from contactverif.contract.subject import SOLVE, TOO_DEEP, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 
 LEAST_CONTACT = 0.8  # A pass with less than this share of cases in contact says little.
@@ -31,6 +31,7 @@ NONE_UNDECIDED = 3 / 2300
 LAST_TURN = 99
 # The reason of a case that is not asked of a formulation of open chains (`Abilities.chains`): no case to be judged.
 CLOSED_CHAIN = "a chain is closed, and the formulation takes open ones"
+FOREIGN = (CLOSED_CHAIN, TOO_DEEP)  # The reasons of all cases that a formulation does not take.
 WITHOUT_BARRIER = frozenset({"penalty", "multiplier"})
 WITH_BARRIER = WITHOUT_BARRIER | {"barrier"}
 

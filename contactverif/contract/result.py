@@ -22,9 +22,9 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, freeze
 from contactverif.contract.errors import LONGEST_FACT, clean, name_line, one_line
 from contactverif.contract.property import (
-    CLOSED_CHAIN,
     DECIDED,
     FAILED,
+    FOREIGN,
     CheckedNumber,
     Outcome,
     PropertyInfo,
@@ -301,6 +301,11 @@ class Row:
         return self.tally.verdicts.get(Verdict.UNDECIDED, 0)
 
     @property
+    def foreign(self) -> int:
+        """The number of random cases that the formulation does not take, which count as undecided too."""
+        return sum(self.tally.reasons.get(reason, 0) for reason in FOREIGN)
+
+    @property
     def idle(self) -> int:
         """The number of judged random cases in which nothing was in contact."""
         return self.tally.counts.idle
@@ -318,8 +323,7 @@ class Row:
         More than twice the usual share counts, and only if a binomial distribution makes that no chance.
         """
         counts, usual = self.tally.counts, self.info.usual_undecided
-        closed = self.tally.reasons.get(CLOSED_CHAIN, 0)
-        if not exceeds(counts.undecided - closed, counts.cases - closed, min(2 * usual, 1.0)):
+        if not exceeds(counts.undecided - self.foreign, counts.cases - self.foreign, min(2 * usual, 1.0)):
             return ""
         share = f"{percent(counts.undecided_share)} of the cases are undecided"
         return f"{share}, of right formulations {percent(usual)}: what is undecided may hide what is wrong"

@@ -32,6 +32,7 @@ from contactverif.contract.errors import (
 )
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.reach import find_depth
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 
 _Value = TypeVar("_Value")
@@ -59,6 +60,9 @@ OPTIONAL_PARTS = ("pair", "tangent", "contact_points")
 FAST_PARTS = ("residual_and_tangent",)  # These repeat other parts in less time, so none is missing without them.
 MULTIPLIERS_AN_UNKNOWN = 100  # No formulation has so many; the judge has to find room for all of them.
 POINTS_A_SEGMENT = 1000  # No formulation has so many; the judge looks at each of them in exact numbers.
+_TOO_DEEP = "the slave lies deeper than the formulation looks (trait `reach`)"
+TOO_DEEP = f"not asked: {_TOO_DEEP}"  # The reason of a case in which a formulation meets such a state.
+_BELOW_REACH = 1 - 2.0**-20  # So no rounding of a depth decides whether a formulation sees it.
 STATED_PARTS = frozenset({"tangent"})  # A trait says that they are there. To leave out another part breaks no promise.
 Call = tuple[str, Interface, Pairing | None, Array]  # A method and its arguments: meshes, pairing and state.
 
@@ -263,13 +267,19 @@ class CheckedFormulation:
 
     def own_pairing(self, interface: Interface, z: FloatArray) -> Pairing | None:
         """Return the pairing at one state z (n_unknowns,), with a handle if it has one; None without ``pair``."""
+        self._check_size(interface, z)
+        self._check_depth(interface, z[: interface.n_unknowns].reshape(interface.nodes.shape))
         if "pair" not in self.provides:
             return None
-        self._check_size(interface, z)
         answer = _call_plugin("pair", self.plugin.pair, interface, freeze(z, np.float64))
         pairing = answer if isinstance(answer, Pairing) else _call_plugin("pair", Pairing, answer)
         pairing.check_bounds(interface)
         return pairing
+
+    def _check_depth(self, interface: Interface, positions: FloatArray) -> None:
+        reach = self._traits.abilities.reach
+        if reach is not None and find_depth(interface, positions) > _BELOW_REACH * reach:
+            raise PluginError(_TOO_DEEP, "not asked")
 
     def _pairing_at(self, interface: Interface, pairing: Pairing | None, z: Array) -> Pairing | None:
         return self.own_pairing(interface, z.real) if self.decides_anew(pairing) else pairing

@@ -11,10 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
+from math import inf
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from contactverif.contract.errors import ContractError
 
+_LEAST_REACH = 0.125  # Segments. Who looks less far takes almost no state.
 _FARTHEST = 1e9  # The largest activation distance, in segments or lengths: a barrier acts near contact.
 _HIGHEST = 8.0  # The largest power of the penalty.
 _COARSEST = 1e-2  # The largest error that a tangent may promise. A coarser one is `"approximate"`.
@@ -197,6 +199,11 @@ class Abilities:
         ``"small"``: normals are those of the reference configuration, so that the state is not turned.
     chains : Literal['any', 'open']
         ``"open"``: no chain of segments is closed. Of the states, those with a closed one are left out.
+    reach : float | None
+        The depth behind a surface down to which contact is looked for, at least 0.125, over the length of the master's
+        shortest segment or edge in the reference: a search that measures by the segment in hand, by the mean or by the
+        longest looks no less far. States in which the slave lies deeper, as its own normal sees it, are left out.
+        ``None`` is any depth.
     """
 
     dimensions: tuple[int, ...] = (2,)
@@ -206,9 +213,13 @@ class Abilities:
     takes_longdouble: bool = False
     motions: Literal["finite", "small"] = "finite"
     chains: Literal["any", "open"] = "any"
+    reach: float | None = None
 
     def __post_init__(self) -> None:
         _check_values(self, "abilities")
+        if self.reach is not None and not (isinstance(self.reach, int | float) and _LEAST_REACH <= self.reach < inf):
+            needed = f"None or a number of at least {_LEAST_REACH:g}"
+            raise ContractError(f"Traits.abilities.reach: found {self.reach!r}; needed {needed}")
         for name, first, second in (("dimensions", 2, 3), ("faces", 3, 4)):
             if (value := getattr(self, name)) not in ((first,), (second,), (first, second)):
                 needed = f"({first},), ({second},) or ({first}, {second})"

@@ -16,7 +16,6 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError, describe_error, place_of_error
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import (
-    CLOSED_CHAIN,
     Outcome,
     Property,
     PropertyInfo,
@@ -31,6 +30,7 @@ from contactverif.problems.open_states import fit_to_traits
 from contactverif.sampling.hypothesis_draws import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
+LEAST_SHARE = 0.1  # A row says nothing of a formulation that takes less than this share of its cases.
 RAISED = "the property raised "
 ACTS_APART = "it acts where the gap is open, not where it is closed: look at the normal, and the order of master nodes"
 SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
@@ -109,7 +109,10 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
     if worst is not None and worst.verdict in (Verdict.CRASHED, Verdict.FAIL):
         name = worst.case_or_summary.name  # A finite list has named its cases.
         return worst.verdict, f"{name}: {worst.reason}" if name and worst is not row.witness else worst.reason
-    planned = max(row.planned - row.tally.reasons.get(CLOSED_CHAIN, 0), 1)
+    planned = max(row.planned - row.foreign, 1)
+    if row.planned - row.foreign < LEAST_SHARE * row.planned:
+        cause = next(iter(row.tally.reasons))
+        return Verdict.UNDECIDED, f"{row.judged} of {row.planned} cases judged; too few are left because {cause}"
     fewest = JUDGED_SHARE * (1 - row.info.usual_undecided) * planned
     if not any(outcome.case_or_summary.name for outcome in row.outcomes[:1]):
         # Not a list. Of a few random cases, the one that cannot be judged comes by chance.

@@ -235,6 +235,13 @@ def test_a_trait_holds_no_number_that_ends_the_judge() -> None:
             Promises(tangent=error)  # type: ignore[arg-type]
 
 
+def test_a_reach_is_no_less_than_an_eighth_of_a_segment() -> None:
+    assert Traits().revise(reach=0.125).abilities.reach == 0.125
+    for reach in (0.1, -1.0, float("inf"), float("nan"), "2"):
+        with pytest.raises(ContractError, match=r"reach: found .*; needed None or a number of at least 0\.125"):
+            Traits().revise(reach=reach)
+
+
 def test_forces_belong_to_names() -> None:
     with pytest.raises(ContractError, match=r"published_forces: found a str; needed \{name of a flat case: forces\}"):
         Traits(evidence=Evidence(published_forces="1 2 1; 2 2"))  # type: ignore[arg-type]
