@@ -28,8 +28,10 @@ def find_depth(interface: Interface, positions: FloatArray) -> float:
 
 def _normals(faces: FloatArray) -> FloatArray:
     """Return the unit normals (n, dim) of faces (n, n_corners, dim) out of their body."""
-    run, across = faces[:, -1] - faces[:, 1], faces[:, 2 % faces.shape[1]] - faces[:, 0]
-    normals = np.column_stack([-run[:, 1], run[:, 0]]) if faces.shape[2] == PLANE else np.cross(across, run)
+    if faces.shape[2] == PLANE:
+        normals = (faces[:, 1] - faces[:, 0])[:, ::-1] * [1.0, -1.0]
+    else:  # The cross product of the diagonals is twice the vector area; a triangle has an edge for one of them.
+        normals = np.cross(faces[:, 2] - faces[:, 0], faces[:, -1] - faces[:, 1])
     units: FloatArray = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return units
 
