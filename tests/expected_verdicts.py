@@ -22,6 +22,7 @@ SYMMETRIC, SWAP, CONTINUITY = "symmetric", "swap", "continuity"
 CURVED, KINKED, ARC = "patch.curved", "patch.kinked", "accuracy.arc"
 HERTZ = "accuracy.hertz"
 TILTED, LINEAR = "patch.tilted.resultant", "patch.tilted.nodal"
+WEIGHTED, OPEN_END = "patch.tilted.weighted", "unilateral.overhang"
 NODAL_PUSH = "nodal-push"
 LOCAL, STIFFNESS = "stability.local", "stability.stiffness"
 INF_SUP, LOCKING = "stability.inf-sup", "stability.locking"
@@ -75,6 +76,7 @@ FAILED_BY: Mapping[str, frozenset[str]] = {
     LINEAR: frozenset(
         {"nts-ar", "nts-ar:area=reference", "vts-me", "vts-me:n=4", *VTS_PPT[:3], "mortar", "mortar-dual"}
     ),
+    OPEN_END: frozenset({"mortar-dual", "mortar-dual-lm"}),  # Dual shapes extrapolate the gap.
     SYMMETRIC: frozenset({*AREAS_THAT_STRETCH, *VTS_PPT, *MORTARS, HALF_PASSES, "sts", "chen-hisada"}),
     INF_SUP: frozenset({"vts-me-lm", "vts-ppt-lm", "two-pass/nts-lm"}),
     LOCKING: frozenset(
@@ -161,6 +163,7 @@ CANNOT_JUDGE: Mapping[str, frozenset[str]] = {
     STIFFNESS: frozenset({*WITH_MULTIPLIERS, *(name for name, fails in FAILS.items() if TANGENT in fails)}),
     TILTED: frozenset(WITHOUT_DIRECTION),
     LINEAR: frozenset(WITHOUT_INTEGRAL),
+    WEIGHTED: FAILS.keys() - set(MORTARS) | {"mortar:normals=averaged"},
     NODAL: FAILS.keys() - NODAL_SPRINGS,
     "intersection-free": FAILS.keys(),  # None of them is a barrier.
     PUBLISHED: frozenset(WITHOUT_TABLE),

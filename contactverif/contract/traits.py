@@ -92,6 +92,9 @@ class Promises:
     nodes_push : bool | None
         No node is ever pulled towards the other surface, but for master nodes of a segment that a foot lies past (Eq. 6
         leaves ξ unclipped). Dual shape functions, which are negative in places, may pull.
+    opens_at_ends : bool | None
+        No force passes where a surface ends under a segment of the other one and the gap is open wherever one faces the
+        other, however little that is. A gap that is extrapolated to a node past that end may be negative there.
     translation_stable : bool | None
         An exact translation of the whole state, however far, changes forces and tangent by no more than rounding the
         positions relative to one another would. Kernels that take differences of nodes first are; kernels that round a
@@ -117,6 +120,7 @@ class Promises:
     local: bool | None = None
     unbiased: bool | None = None
     nodes_push: bool | None = None
+    opens_at_ends: bool | None = None
     translation_stable: bool | None = None
     independent_multipliers: bool | None = None
     never_intersects: bool | None = None
@@ -151,6 +155,10 @@ class Rules:
         of a slave with a master segment seen along the slave's normal; the nearest in the middle of its overlap. A
         weighted node has its own normal and segment by this rule, but the mean gap of its cells. ``"cells and nodes"``:
         as ``"cells"``, but pressures and contact follow from gaps of the slave nodes by ``"closest point"``.
+    gap_shapes, pressure_shapes : Literal['standard', 'dual'] | None
+        The shapes of the slave nodes in a mortar method: those by which gaps are weighted, G_j = ∫φ_j g / ∫φ_j, and
+        those that nodal pressures are multiplied by, Σ ψ_j p_j. ``"standard"``: linear. ``"dual"``: biorthogonal to the
+        linear ones; what they are on a segment that is covered in part is not stated.
     force_along : Literal['master normal', 'slave normal'] | None
         The direction in which a contact point pushes: along the normal of its master segment, or of its slave segment.
     activation : float | None
@@ -167,6 +175,8 @@ class Rules:
     penalty: Literal["nodal", "distributed"] | None = None
     area: Literal["reference", "current"] | None = None
     gap: Literal["closest point", "slave normal", "cells", "cells and nodes"] | None = None
+    gap_shapes: Literal["standard", "dual"] | None = None
+    pressure_shapes: Literal["standard", "dual"] | None = None
     force_along: Literal["master normal", "slave normal"] | None = None
     activation: float | None = None
     activation_unit: Literal["segment", "length"] = "segment"
@@ -338,6 +348,11 @@ class Traits:
     def by_name(self) -> dict[str, Any]:
         """Return ``{name: value}`` of the traits of all groups."""
         return dict(_flatten(self))
+
+
+def promise_at_ends(traits: Traits, tau: float) -> Traits:
+    """Return traits without `opens_at_ends` if feet count more than 0.05 of a segment past an end: no case has more."""
+    return traits if tau <= 0.05 else traits.revise(opens_at_ends=None)
 
 
 Fractions = tuple[Fraction, ...]

@@ -73,7 +73,7 @@ def stated_failures(question: Property, installed: Iterable[object]) -> str:
 
 _ALWAYS = (
     "flat normal single overhang kinked symmetric conserves_force conserves_moment converges inf_sup "
-    "integrates_linear_gap local unbiased nodes_push translation_stable"
+    "integrates_linear_gap local unbiased nodes_push opens_at_ends translation_stable"
 )
 _STATEMENTS: tuple[tuple[str, Any], ...] = (  # (name, value) of the traits from which a promise may follow.
     *((name, True) for name in _ALWAYS.split()),

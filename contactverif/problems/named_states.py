@@ -151,6 +151,12 @@ def _close_peak() -> Case:
     return Case(Interface.from_chains(slave, master), z, 16.0, parameters, name="peak")
 
 
+def _end_openly() -> Case:
+    """Return a slave segment over a master that ends under its middle; the gap is open and grows inwards."""
+    interface = Interface.from_chains([(0.0, 0.0), (1.0, 0.0)], [(1.5, -0.5), (0.5, -0.02)])
+    return Case(interface, interface.nodes.reshape(-1), 16.0, name="open-end")
+
+
 def _places(lengths: Sequence[float]) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(lengths)])
 
@@ -165,6 +171,7 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "moved": _moved_case_c,
     "sliding": _slide_over_vertices,
     "peak": _close_peak,
+    "open-end": _end_openly,
     "crossed-diagonals": partial(_cross_cuts, "crossed-diagonals", TRIANGLE),
     "tilted-faces": partial(_tilt_faces, "tilted-faces", TRIANGLE),
     "crossed-halves": partial(_cross_cuts, "crossed-halves", QUADRILATERAL),

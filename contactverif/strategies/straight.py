@@ -1,5 +1,7 @@
 """A straight or plane slave that penetrates a flat part of a larger master with all of itself: its gap is linear.
 
+In the last ones in the plane the gap is open, and the master ends under a segment of the slave.
+
 Each rule for gaps sees the same straight line or plane opposite. Everything stands on a lattice of 2^-24, in 3-D of
 2^-23, and the turns are matrices of integers, so that no coordinate is rounded: straight and plane stay so bit for bit.
 """
@@ -26,6 +28,9 @@ _STEEP_SIXTEENTHS = st.sampled_from([11, 16, 24, 40, 64, *(91, 112, 144, 200, 28
 _LEVEL_OR_TILTED = st.integers(0, 11)
 _SIGNS = st.sampled_from([1, -1])
 _QUARTERS = st.integers(1, 8)  # The depth of the shallow end, in quarters of a unit.
+CLEAR = 0.05  # Five times the share of a segment by which a foot may lie past a free end and still count.
+_EXPONENTS = st.integers(0, 300).map(lambda hundredths: hundredths / 100)
+_NUMBERS = st.integers(0, 3)
 _BENDS = st.sampled_from([0.3, 0.9, 0.6, 0.1, -0.1, -0.3])  # Turns of an end of the master in rad, down if positive.
 _DISTANCES = st.integers(1, 4)  # Distances of the body behind, in lengths that no depth reaches.
 
@@ -89,6 +94,27 @@ def cases_over_a_body(draw: DrawFn) -> Case:
     depth = reach * draw(_DISTANCES)
     behind = np.column_stack([np.linspace(master[0, 0] + reach, master[-1, 0] - reach, 4), np.full(4, -2 * depth)])
     return _place(draw, slave, master, behind=samples.on_lattice(behind))
+
+
+@random_source("contactverif.strategies.straight.open_end_cases")
+@samples.on_own_meshes
+def open_end_cases(draw: DrawFn) -> Case:
+    """Return straight slaves over a flat master that ends under one of their segments; None for a given mesh.
+
+    It covers 1e-3 to 1 of that segment. The gap is linear, with a slope of 0.06 to 0.7. Where one of both surfaces ends
+    it is least, `CLEAR` to 1 of slope × longest segment. So it is open past that end, as far as a foot still counts.
+    """
+    segments, slope, left = draw(_SLAVE), draw(_SIXTEENTHS) / 16, draw(_SIGNS) > 0
+    x, number = samples.ends_of(segments), draw(_NUMBERS) % len(segments)
+    end, stop = float(x[number + 1] - 10.0 ** -draw(_EXPONENTS) * segments[number]), float(x[-1]) + 1
+    steps = cycle(draw(samples.lengths(graded=False)))
+    master_x = np.array([*takewhile(lambda place: place < stop, accumulate(steps, initial=end)), stop])
+    least = CLEAR ** (draw(_EXPONENTS) / 3) * slope * max(*segments, *np.diff(master_x))
+    slave = np.column_stack([x, least + slope * (x - end if left else x[-1] - x)])
+    master = np.column_stack([master_x[::-1], np.zeros(len(master_x))])
+    if draw(_SIGNS) < 0:
+        slave, master = slave[::-1] * [-1.0, 1.0], master[::-1] * [-1.0, 1.0]
+    return _place(draw, samples.on_lattice(slave), samples.on_lattice(master))
 
 
 def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, float]:

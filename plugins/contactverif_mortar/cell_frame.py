@@ -34,6 +34,9 @@ v of c on what is covered of its segment, too: κ = (1 − c̄²)/2v. So each sl
     ∫1 Δc̄ = Σ (c − c̄) Δw + w Δc        ∫1 Δv = Σ ((c − c̄)² − v) Δw + 2 w (c − c̄) Δc
     ∂φ_B/∂c̄ = 1/2 − κ − c̄ (c − c̄)/v        ∂φ_B/∂v = −κ (c − c̄)/v
 
+Gaps may be weighted with standard shapes though pressures have dual ones (not `alike`). Then D_j has those in place of
+φ_j, and gains nothing from c̄ and v.
+
 Rule for the next editor: nothing is allocated for a cell. The array `rows` is room that a caller reuses.
 """
 
@@ -202,8 +205,8 @@ def add_cell(forces: FloatArray, csr: Csr, rows: FloatArray, pushes: FloatArray,
             add_block(csr, local[k], local[column], xx, xy, yx, yy)
 
 
-# What is known of the shapes on a slave segment: a place c_0 on it, c̄ − c_0, κ, v and ∫1.
-ORIGIN, MEAN, KAPPA, VARIANCE, EXTENT, N_SHAPE = range(6)
+# What is known of the shapes on a slave segment: a place c_0 on it, c̄ − c_0, κ, v and ∫1; 1 if gaps have them, or 0.
+ORIGIN, MEAN, KAPPA, VARIANCE, EXTENT, ALIKE, N_SHAPE = range(7)
 
 
 Weights = tuple[FloatArray, FloatArray, FloatArray]  # ∫φ_j and ∫φ_j g (n_slave_nodes,), and the numbers of the shapes.
@@ -218,19 +221,22 @@ class NodeState(NamedTuple):
     divisor: FloatArray
 
 
-def weigh(interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, dual: bool) -> Weights:
+def weigh(
+    interface: Interface, cells: Cells, rule: Quadrature, x: FloatArray, dual: bool, alike: bool = True
+) -> Weights:
     """Compute the integrals of the shapes on some cells, at the positions x (n_nodes, 2).
 
-    The numbers of the shapes (n_slave_segments, 5) are undefined where a segment has no cell.
+    Shapes of gaps are standard if not `alike`. The numbers (n_slave_segments, 6) are undefined for a segment without
+    cells.
     """
     areas, with_gap = np.zeros((2, interface.n_slave_nodes))
     shapes = np.empty((len(interface.slave), N_SHAPE))
-    _weigh((areas, with_gap, shapes), x, *cell_arguments(interface, cells, rule), dual)
+    _weigh((areas, with_gap, shapes), x, *cell_arguments(interface, cells, rule), dual, alike)
     return areas, with_gap, shapes
 
 
 @compile_maker
-def _weigh(written: Weights, x: FloatArray, segments_and_cells: Fields, rule: Fields, dual: bool) -> None:
+def _weigh(written: Weights, x: FloatArray, segments_and_cells: Fields, rule: Fields, dual: bool, alike: bool) -> None:
     """Add ∫φ_j and ∫φ_j g of all slave segments, and write what is known of their shapes."""
     areas, with_gap, shapes = written
     slave, cell_slave = segments_and_cells[1], segments_and_cells[3]
@@ -251,8 +257,9 @@ def _weigh(written: Weights, x: FloatArray, segments_and_cells: Fields, rule: Fi
                 points[count, 0], points[count, 1], points[count, 2] = point.c, point.gap, point.weight
                 count += 1
         _write_shape(shapes, s, points, count, dual)
+        shapes[s, ALIKE] = alike
         for i in range(count):
-            first, second = _shapes_at(shapes, s, points[i, 0])
+            first, second, _ = _weights_at(shapes, s, points[i, 0])
             a, b, gap, w = slave[s, A], slave[s, B], points[i, 1], points[i, 2]
             areas[a] += w * first
             areas[b] += w * second
@@ -289,6 +296,15 @@ def _shapes_at(shapes: FloatArray, s: int, c: float) -> tuple[float, float]:
     mean = shapes[s, ORIGIN] + shapes[s, MEAN]
     bent = shapes[s, KAPPA] * ((c - shapes[s, ORIGIN]) - shapes[s, MEAN])
     return (1 - mean) / 2 - bent, (1 + mean) / 2 + bent
+
+
+@compile_inline
+def _weights_at(shapes: FloatArray, s: int, c: float) -> tuple[float, float, float]:
+    """Return the shapes by which gaps are weighted, and the slope of the second."""
+    if not shapes[s, ALIKE]:
+        return (1 - c) / 2, (1 + c) / 2, 0.5
+    first, second = _shapes_at(shapes, s, c)
+    return first, second, shapes[s, KAPPA]
 
 
 def node_rows(
@@ -335,9 +351,11 @@ def _add_rows(
             kappa, difference = shapes[s, KAPPA], pressure[b] - pressure[a]
             p = pressure[a] * first + pressure[b] * second
             push_point(rows, pushes, cell, point, p, difference * kappa, 0.0)
-            for end, (shape, slope, j) in enumerate(((first, -kappa, a), (second, kappa, b))):
-                above, w = point.gap - gaps[j], point.weight
-                add_to_row(rows, 4 + end, cell, point, (above * shape, above * w * slope, 0.0, w * shape))
+            by_first, by_second, slope = _weights_at(shapes, s, point.c)
+            w = point.weight
+            for end, (shape, by, sign, j) in enumerate(((first, by_first, -1, a), (second, by_second, 1, b))):
+                above = point.gap - gaps[j]
+                add_to_row(rows, 4 + end, cell, point, (above * by, above * w * sign * slope, 0.0, w * by))
                 _add_unit(units, end, point, shape)
             if dual:
                 _add_moments((rows, units, chain), cell, point, shapes, s, difference, (gaps[a], gaps[b]))
@@ -381,7 +399,7 @@ def _add_moments(
     add_to_row(rows, 7, cell, point, ((centred * centred - variance) / extent, 2 * w * centred / extent, 0.0, 0.0))
     _add_unit(units, 2, point, difference * by_mean)
     _add_unit(units, 3, point, difference * by_variance)
-    for end, sign in enumerate((-1.0, 1.0)):
+    for end, sign in enumerate((-shapes[s, ALIKE], shapes[s, ALIKE])):
         chain[s, end, 0] += sign * (point.gap - gaps[end]) * w * by_mean
         chain[s, end, 1] += sign * (point.gap - gaps[end]) * w * by_variance
 

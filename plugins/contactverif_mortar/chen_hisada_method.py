@@ -16,7 +16,7 @@ from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, check_tau, choose
 from contactverif.contract.interface import Interface
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Traits, promise_at_ends
 from contactverif.geometry.block_rows import Couplings, Csr, NumberArray, add_block
 from contactverif.geometry.projection import (
     PointOnSegment,
@@ -192,4 +192,4 @@ def chen_hisada(*, penalty: float, area: str = "current", tau: float = 1e-2) -> 
         witnesses={"patch.dead-zone": "dead-zone", **CELL_TRAITS.evidence.witnesses},
         source="Chen & Hisada, as in Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416",
     )
-    return ChenHisada(traits, check_penalty(penalty), quadrature, check_tau(tau))
+    return ChenHisada(promise_at_ends(traits, tau), check_penalty(penalty), quadrature, check_tau(tau))

@@ -60,6 +60,7 @@ CELL_TRAITS = Traits(
         integrates_linear_gap=True,
         local=True,
         nodes_push=True,
+        opens_at_ends=True,
         unbiased=False,
         translation_stable=True,
     ),

@@ -6,6 +6,8 @@
 | `mortar-dual` | the same | ψ, biorthogonal to N on what is covered |
 | `mortar-lm`, `mortar-dual-lm` | a multiplier λ_j, ∫φ_j g = 0 where active | N, ψ |
 
+With `gap_shapes="standard"` dual shapes carry pressures alone, and gaps are weighted with N (Popp, Seitz et al. 2013).
+
 Source: Puso & Laursen (2004); dual shapes: Popp, Gitterle, Gee & Wall (2010).
 """
 
@@ -33,6 +35,7 @@ from contactverif_mortar.shape_rows import (
 
 # ∫φ_j and ∫φ_j g (n_slave_nodes,) at one state, and the shapes: their numbers, or at points.
 StateWeights = tuple[FloatArray, FloatArray, FloatArray | Weighted]
+GAP_SHAPES = {"dual": True, "standard": False}  # The words of the option `gap_shapes`.
 NORMALS = {"segment": False, "averaged": True}  # The words of the option `normals`.
 
 _SOURCES = {
@@ -51,6 +54,7 @@ class Weighting:
 
     averaged: bool  # Normals are averaged at the slave nodes; else they are those of the segments.
     dual: bool  # Shapes are biorthogonal; else they are standard.
+    alike: bool  # Gaps are weighted with the shapes of the pressures; else with standard ones.
     quadrature: Quadrature  # The points on a cell, and the configuration in which lengths are measured.
 
     def carrying(self, interface: Interface, pairing: Pairing, x: Array) -> Weighted:
@@ -59,13 +63,13 @@ class Weighting:
         They lie on the cells whose slave segment has an active node; the others carry no pressure.
         """
         cells = near(Cells.from_pairing(pairing), pairing["active"], interface)
-        return weigh_points(interface, cells, self.quadrature, x, self.dual)
+        return weigh_points(interface, cells, self.quadrature, x, self.dual, self.alike)
 
     def weigh(self, interface: Interface, cells: Cells, x: FloatArray) -> StateWeights:
         """Compute the integrals of the shapes on some cells at one state, x (n_nodes, 2)."""
         if not self.averaged:
-            return weigh(interface, cells, self.quadrature, x, self.dual)
-        weighted = weigh_points(interface, cells, self.quadrature, x[None], self.dual)
+            return weigh(interface, cells, self.quadrature, x, self.dual, self.alike)
+        weighted = weigh_points(interface, cells, self.quadrature, x[None], self.dual, self.alike)
         return weighted.areas[0], weighted.with_gap[0], weighted
 
     def gaps(self, interface: Interface, cells: Cells, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -235,14 +239,18 @@ def mortar(*, penalty: float, area: str = "current", normals: str = "segment") -
     return Mortar(*_make(penalty, area, normals, dual=False))
 
 
-def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segment") -> Mortar:
+def mortar_dual(*, penalty: float, area: str = "current", normals: str = "segment", gap_shapes: str = "dual") -> Mortar:
     """Mortar with dual shapes: a nodal pressure moves no other slave node.
 
     Its promises are those of `mortar`. The weighted gap of a node is the value of a linear fit to the gaps around it.
+    That fit is extrapolated to a node that is not covered. There a gap that grows inwards may be below zero though it
+    is open all along, and then it pushes. With `gap_shapes="standard"` gaps are weighted as in `mortar`, and it does
+    not. A linear gap is integrated exactly, too.
 
-    Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
+    Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465; standard shapes of gaps: Popp,
+    Seitz, Gee & Wall, Comput. Methods Appl. Mech. Engrg 264 (2013) 67–80.
     """
-    return Mortar(*_make(penalty, area, normals, dual=True))
+    return Mortar(*_make(penalty, area, normals, dual=True, gap_shapes=gap_shapes))
 
 
 def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
@@ -259,7 +267,7 @@ def mortar_lm(*, penalty: float, area: str = "current", normals: str = "segment"
 def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "segment") -> MortarMultipliers:
     """Mortar with a Lagrange multiplier, a pressure, at each slave node, and dual shapes.
 
-    Its promises are those of `mortar_lm`.
+    Its promises are those of `mortar_lm`, but for gaps that open past the end of the master (`mortar_dual`).
 
     Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428–1465.
     """
@@ -267,24 +275,30 @@ def mortar_dual_lm(*, penalty: float, area: str = "current", normals: str = "seg
 
 
 def _make(
-    penalty: float, area: str, normals: str, *, dual: bool, multipliers: bool = False
+    penalty: float, area: str, normals: str, *, dual: bool, multipliers: bool = False, gap_shapes: str = "dual"
 ) -> tuple[Traits, float, Weighting]:
     averaged, current = choose("normals", normals, NORMALS), choose("area", area, AREAS)
+    extrapolates = choose("gap_shapes", gap_shapes, GAP_SHAPES) and dual
     kinked = {"patch.kinked": "edge of 53°, lower slave"} if averaged else {}
     pulls = {"nodal-push": "b"} if dual else {}
+    extrapolated = {"unilateral": "open-end"} if extrapolates else {}
     traits = CELL_TRAITS.revise(
         kinked=not averaged,  # An averaged normal belongs to neither facet of a kink.
         # On a coarse ring, averaged directions turn away from a segment that is still seen, and its cell vanishes.
         continuity=None if averaged or multipliers else "C0",
-        integrates_linear_gap=None if averaged or multipliers else False,
+        integrates_linear_gap=None if averaged or multipliers else dual and not extrapolates,
+        opens_at_ends=not extrapolates,
         nodes_push=not dual,  # Dual shapes are negative in places.
         area=area,
         gap=None if averaged else "cells",
+        gap_shapes="dual" if extrapolates else "standard",
+        pressure_shapes="dual" if dual else "standard",
         force_along=None if averaged else "slave normal",
-        witnesses={**kinked, **pulls, "patch.tilted": "tilted", **CELL_TRAITS.evidence.witnesses},
+        witnesses={**kinked, **pulls, **extrapolated, "patch.tilted": "tilted", **CELL_TRAITS.evidence.witnesses},
         source=_SOURCES[dual],
     )
     if multipliers:
         traits = traits.revise(enforcement="multiplier", independent_multipliers=True, inf_sup=True)
     # Two points are exact for linear shapes × linear gaps. Unit normals that turn are not polynomials and get a third.
-    return traits, check_penalty(penalty), Weighting(averaged, dual, Quadrature.gauss(3 if averaged else 2, current))
+    rule = Quadrature.gauss(3 if averaged else 2, current)
+    return traits, check_penalty(penalty), Weighting(averaged, dual, extrapolates or not dual, rule)

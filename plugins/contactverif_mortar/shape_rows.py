@@ -1,6 +1,7 @@
 """The shapes of the slave nodes at points, weighted gaps, and the tangent for directions that turn and for half passes.
 
-Pressures of slave nodes are interpolated along the slave, and gaps weighted, with the same shapes. Standard shapes:
+Pressures of slave nodes are interpolated along the slave, and gaps weighted, with the same shapes; or with dual shapes
+and standard ones, respectively. Standard shapes:
 N_A = (1−c)/2, N_B = (1+c)/2. Dual shapes: ψ_A, ψ_B with ∫ψ_j N_k = δ_jk ∫N_j over the covered part of each slave
 segment. With c̄ the mean of c over that part and v its variance these are
 
@@ -116,6 +117,7 @@ class Weighted(NamedTuple):
     segment: IntArray  # (n_points,) The slave segment of each point.
     areas: Array  # (n_states, n_slave_nodes) ∫φ_j and ∫φ_j g.
     with_gap: Array
+    weights: Shapes  # The shapes φ_j: those of the pressures, or standard ones.
 
     def forces(self, pressure: Array) -> Array:
         """Compute forces (n_states, n_nodes, 2) from pressures (n_states, n_slave_nodes) of the slave nodes."""
@@ -123,16 +125,19 @@ class Weighted(NamedTuple):
         return forces(self.points, at_points, nodes, len(self.sides.nodes))
 
 
-def weigh_points(sides: Interface | Sides, parts: Parts, rule: Quadrature, x: Array, dual: bool) -> Weighted:
+def weigh_points(
+    sides: Interface | Sides, parts: Parts, rule: Quadrature, x: Array, dual: bool, alike: bool = True
+) -> Weighted:
     """Compute points, shapes and weighted gaps on some parts of slave segments, at x (n_states, n_nodes, 2)."""
     points, segment, n_nodes = rule.points(sides, parts, x), parts.carriers(len(rule)), sides.n_slave_nodes
     ends = sides.slave.segments[segment]
     shapes = Shapes.dual(points, segment, len(sides.slave)) if dual else Shapes.standard(points)
-    weighted = shapes.values * points[..., WEIGHT, None]
+    weights = shapes if alike else Shapes.standard(points)
+    weighted = weights.values * points[..., WEIGHT, None]
     with_gap = weighted * points[..., GAP, None]
     areas = _sum_by_node(weighted.reshape(len(points), -1), ends.ravel(), n_nodes)
     gaps = _sum_by_node(with_gap.reshape(len(points), -1), ends.ravel(), n_nodes)
-    return Weighted(sides, parts, points, shapes, ends, segment, areas, gaps)
+    return Weighted(sides, parts, points, shapes, ends, segment, areas, gaps, weights)
 
 
 def own_lengths(sides: Interface | Sides, x: FloatArray) -> FloatArray:
@@ -170,14 +175,15 @@ def add_shaped_rows(
     dual = len(groups.starts) - 1 > len(state.pressure)
     chain = np.zeros((len(slave) if dual else 0, 2, 2))
     n_q = len(points) // max(n_cells, 1)
+    weighting = weighted.weights.values[0], weighted.weights.slope[0]
     places, at_points = (points, weighted.segment, slave, groups.local), tuple(each[0] for each in weighted.shapes)
     at_nodes, factors = (state.pressure, state.gaps, state.divisor), (groups.nodes, groups.starts, left, right)
     written = total, (rest.indptr, rest.indices, rest.data), factors, chain
     size = max(PIECE // max(n_q, 1), 1)
     for begin in range(0, n_cells, size):
         variations = rule.variations(weighted.sides, weighted.parts.select(slice(begin, begin + size)), x)
-        _add_points(written, (begin * n_q, n_q, n_pushed), places, at_points, variations, at_nodes)
-    if dual:
+        _add_points(written, (begin * n_q, n_q, n_pushed, *weighting), places, at_points, variations, at_nodes)
+    if dual and weighted.weights is weighted.shapes:
         add_chains(slave, chain, state.divisor, groups.nodes, groups.starts, right)
     return NodeRows(total, rest, groups, left, right, state.weights)
 
@@ -187,7 +193,7 @@ def _add_points(
     written: Fields, counts: Fields, places: Fields, shapes: Fields, variations: FloatArray, at_nodes: Fields
 ) -> None:
     """Add what the points from the first one on give, one for each of their Δ."""
-    first_point, n_q, n_pushed = counts
+    first_point, n_q, n_pushed, by, by_place = counts
     total, csr, factors, chain = written
     points, segment, slave, local = places
     values, slope, by_mean, by_variance, centred, extent, variance = shapes
@@ -209,12 +215,12 @@ def _add_points(
             total[2 * cell[k] + 1] += transmit[k] * w * p * point[NORMAL_Y]
         for end, sign in enumerate((-1.0, 1.0)):
             j = slave[s, end]
-            shape, above = values[number, end], point[GAP] - gaps[j]
+            shape, weight, above = values[number, end], by[number, end], point[GAP] - gaps[j]
             if starts[j + 1] > starts[j]:
                 for k in range(n_local):
                     for axis in range(2):
-                        d_weighted = shape * d[D_WEIGHT, k, axis] + w * sign * slope[number] * d[D_C, k, axis]
-                        row[k, axis] = (w * shape * d[D_GAP, k, axis] + above * d_weighted) / divisor[j]
+                        d_weighted = weight * d[D_WEIGHT, k, axis] + w * sign * by_place[number] * d[D_C, k, axis]
+                        row[k, axis] = (w * weight * d[D_GAP, k, axis] + above * d_weighted) / divisor[j]
                 _add_row(factors, j, cell, row, n_pushed, point, shape)
             if len(chain):
                 chain[s, end, 0] += sign * above * w * by_mean[number]

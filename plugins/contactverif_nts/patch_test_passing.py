@@ -27,7 +27,7 @@ from contactverif.compiler import match_precision
 from contactverif.contract.arrays import Array, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, check_tau, choose
 from contactverif.contract.interface import Interface, split_state
-from contactverif.contract.traits import Traits
+from contactverif.contract.traits import Traits, promise_at_ends
 from contactverif.geometry.block_rows import NO_NODE, Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree
 from contactverif.geometry.threads import run_in_threads, share_couplings, split_range
@@ -178,7 +178,7 @@ def vts_ppt(
     """
     rule = choose("free_end", free_end, FREE_ENDS)
     return PatchTestPassing(
-        traits=_promises_as_printed(rule, check_count(n)),
+        traits=promise_at_ends(_promises_as_printed(rule, check_count(n)), tau),
         penalty=check_penalty(penalty),
         n=check_count(n),
         transmission=vts_ppt_force.PRINTED,
@@ -201,7 +201,8 @@ def vts_ppt_basic(
     Source: Zavarise & De Lorenzis (2009), Boxes 1–3; tangent: Eqs. 10–11.
     """
     consistent = vts_ppt(penalty=penalty, n=n, free_end=free_end, tau=tau, threads=threads)
-    return replace(consistent, consistent=False, traits=_basic_promises(consistent.free_end, n))
+    traits = promise_at_ends(_basic_promises(consistent.free_end, n), tau)
+    return replace(consistent, consistent=False, traits=traits)
 
 
 def vts_ppt_balanced(
@@ -225,7 +226,7 @@ def vts_ppt_balanced(
         consistent,
         transmission=vts_ppt_force.BALANCED,
         current_area=current,
-        traits=_balanced_promises(consistent.free_end, n, current),
+        traits=promise_at_ends(_balanced_promises(consistent.free_end, n, current), tau),
     )
 
 

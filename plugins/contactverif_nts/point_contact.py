@@ -39,7 +39,7 @@ from contactverif.compiler import TAKES_LONGDOUBLE, match_precision
 from contactverif.contract.arrays import Array, FloatArray, IntArray, freeze
 from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, check_tau, choose
 from contactverif.contract.interface import Interface, split_state
-from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits
+from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Promises, Rules, Traits, promise_at_ends
 from contactverif.geometry.block_rows import Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree
 from contactverif_nts import nts_force
@@ -102,6 +102,7 @@ POINT_TRAITS = Traits(
         conserves_moment=True,
         local=True,
         nodes_push=True,
+        opens_at_ends=True,
         unbiased=False,
         continuity="jumps",
         translation_stable=True,
@@ -365,7 +366,7 @@ def _points_at(
     c: ArrayLike, weight: ArrayLike, traits: Traits, penalty: float, tau: float, area_from: int, at_nodes: bool = False
 ) -> PointContact:
     return PointContact(
-        traits=traits,
+        traits=promise_at_ends(traits, tau),
         penalty=check_penalty(penalty),
         c=freeze(c, np.float64),
         weight=freeze(weight, np.float64),

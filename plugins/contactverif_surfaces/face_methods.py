@@ -212,7 +212,8 @@ def mortar_3d(*, penalty: float) -> SurfaceMortar:
     here.
     """
     source = "Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629; the slave's normal: here"
-    return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source), check_penalty(penalty))
+    shapes = {"gap_shapes": "standard", "pressure_shapes": "standard"}
+    return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source, **shapes), check_penalty(penalty))
 
 
 N_PARTS = 4

@@ -23,6 +23,7 @@ from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Rules, Traits
 from contactverif.strategies import flat_cases, general_cases
+from contactverif.strategies.straight import open_end_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties import roundoff
 from contactverif_properties.applicability import may_act_twice
@@ -510,3 +511,39 @@ def _allow_points(each: Pass, normals: dict[int, set[Direction]], allowance: Flo
     for segment, pull in zip(points.master_segment.tolist(), pulls, strict=True):
         if segment >= 0:
             allowance[numbers[master[segment]]] += pull
+
+
+@Property.define(
+    id="unilateral.overhang",
+    family="invariants",
+    rank=65,
+    role="trait",
+    quantities=(OPEN,),
+    cases=Cases.random(open_end_cases),
+    promise=lambda traits: traits.promises.opens_at_ends,
+    applicable=lambda traits: "" if traits.promises.opens_at_ends is not None else "state promises.opens_at_ends",
+)
+def unilateral_overhang(case: Case, subject: Subject) -> Measurement:
+    """No force acts across an open gap where one surface ends under a segment of the other.
+
+    **Question.** A straight slave is tilted over a flat master that ends under one of its segments. The gap is open
+    wherever one faces the other. Is there no force?
+
+    **Why it matters.** Dual shapes on the covered part of a segment extrapolate the gap to the node past the end. Where
+    the gap grows inwards, that may be negative, and springs push across an open gap. Dual shapes of the whole segment
+    do worse: their integrals over a part may be negative. No uniform gap shows either. The cure is to weight gaps with
+    standard shapes, and to keep dual ones for pressures.
+
+    **How it is judged.** The number is the largest entry of the residual over ε̂ L², with all multipliers 0; it must be
+    0. The master covers 1e-3 to 1 of a segment. The gap is at least 0.05 times slope times longest segment, so that it
+    is open where a foot may lie past an end, too: how far past counts is a choice.
+
+    **Undecided.** Never.
+
+    **Source.** Popp, Seitz, Gee & Wall (2013).
+    """
+    state = FrozenState.with_multiplier(subject.for_case(case), case, 0.0)
+    number = OPEN.check(float(np.abs(state.residual).max()) / (case.penalty * case.slave_measure**2), 0.0)
+    forces = -state.forces
+    worst = worst_force(case.interface, forces, 0 * forces, ("force", "needed")) if forces.any() else None
+    return Measurement([number], finding=worst)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contactverif.contract.arrays import BoolArray, FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import PLANE, TRIANGLE, Interface, Surface
+from contactverif.contract.interface import PLANE, QUADRILATERAL, Interface, Surface
 from contactverif.contract.property import Finding, Measurement, Quantity
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Traits
@@ -274,25 +274,46 @@ def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
     The traits `gap` and `force_along` name the normals, `area` the configuration of ds. With multipliers the pressure
     is `uniform_multiplier` everywhere. The sum is the total of every formulation with these traits.
     """
-    interface, (of_master, of_slave) = case.interface, directions(case)
-    measures = interface.slave.measures(interface.nodes if traits.rules.area == "reference" else case.positions)
-    depths = -node_gaps(case) / (1.0 if traits.rules.gap in ALONG_MASTER else float(of_master @ of_slave))
+    depths, direction = _depths(case, traits)
     pressures = case.penalty * depths
     if traits.rules.enforcement == "multiplier":
         pressures = np.full_like(pressures, uniform_multiplier(case))
-    nodal = np.zeros(interface.n_slave_nodes)
-    if interface.dim == PLANE:
-        for (a, b), length in zip(interface.slave.segments, measures, strict=True):
-            nodal[a] += length * (2 * pressures[a] + pressures[b]) / 6
-            nodal[b] += length * (pressures[a] + 2 * pressures[b]) / 6
-    else:
-        # ∫ N_i N_j over a triangle is a twelfth of its area, and a sixth for i = j. Over a parallelogram it is a ninth
-        # of the area times 1/2 for each of the two ways in which i and j are not the same.
-        triangle = (np.ones((TRIANGLE, TRIANGLE)) + np.eye(TRIANGLE)) / 12
-        parallelogram = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36
-        for face, area in zip(interface.slave.faces, measures, strict=True):
-            nodal[face] += area * (triangle if len(face) == TRIANGLE else parallelogram) @ pressures[face]
-    return np.outer(nodal, of_master if traits.rules.force_along == "master normal" else of_slave)
+    return np.outer(shape_integrals(case, traits) @ pressures, direction)
+
+
+def weighted_forces(case: Case, traits: Traits) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return ∫φ_j |g| (n_slave_nodes,), p_j = ε̂ ∫φ_j |g| / ∫φ_j, and the forces ∫N_i Σ ψ_j p_j n on slave nodes.
+
+    The traits `gap_shapes` and `pressure_shapes` say what φ_j and ψ_j are; all else is as for `exact_slave_forces`.
+    """
+    standard, (depths, direction) = shape_integrals(case, traits), _depths(case, traits)
+    areas = standard.sum(axis=1)
+    integrals = {"standard": standard, "dual": np.diag(areas)}  # ∫ψ_i N_j ds is 0 for i ≠ j.
+    gaps = integrals[traits.rules.gap_shapes or ""] @ depths
+    pressures = case.penalty * gaps / areas
+    return gaps, pressures, np.outer(integrals[traits.rules.pressure_shapes or ""] @ pressures, direction)
+
+
+# ∫N_i N_j over a parallelogram of area 1. Over a segment it is 1/6, over a triangle 1/12, and twice that for i = j.
+_IN_PARALLELOGRAM = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36
+
+
+def shape_integrals(case: Case, traits: Traits) -> FloatArray:
+    """Return ∫N_i N_j ds of the linear shapes of slave nodes; the trait `area` names the configuration of ds."""
+    interface = case.interface
+    measures = interface.slave.measures(interface.nodes if traits.rules.area == "reference" else case.positions)
+    faces, corners = interface.slave.faces, interface.slave.faces.shape[1]
+    shares = _IN_PARALLELOGRAM if corners == QUADRILATERAL else (1 + np.eye(corners)) / (corners * (corners + 1))
+    integrals = np.zeros((interface.n_slave_nodes, interface.n_slave_nodes))
+    np.add.at(integrals, (faces[:, :, None], faces[:, None]), measures[:, None, None] * shares)
+    return integrals
+
+
+def _depths(case: Case, traits: Traits) -> tuple[FloatArray, FloatArray]:
+    """Return |g| (n_slave_nodes,) along the stated normal, and the direction (dim,) in which contact pushes."""
+    of_master, of_slave = directions(case)
+    cosine = 1.0 if traits.rules.gap in ALONG_MASTER else float(of_master @ of_slave)
+    return -node_gaps(case) / cosine, of_master if traits.rules.force_along == "master normal" else of_slave
 
 
 def _largest_part(case: Case, surface: Surface) -> NDArray[Any]:

@@ -463,6 +463,7 @@ def _springs(case: Case, subject: Subject) -> tuple[float, float, float]:
 OFF_NORMAL = roundoff.stated_gap_quantity("part of the force off the normal")
 TILTED_TOTAL = roundoff.stated_gap_quantity("error of the total force")
 TILTED_NODAL = roundoff.stated_gap_quantity("error of a nodal force")
+TILTED_ROW = roundoff.stated_gap_quantity("error of a constraint row")
 TILTED, STEEP = "tilted by 3° to 35°", "tilted by 35° to 89°"
 
 
@@ -572,3 +573,50 @@ def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
     number = TILTED_NODAL.check(error, _tolerance(case, subject.traits))
     finding = exact_forces.worst_force(case.interface, forces, exact) if number.ratio > 1 else None
     return Measurement([number], idle=not forces.any(), finding=finding)
+
+
+def _refuse_unknown_shapes(traits: Traits) -> str:
+    if traits.rules.penalty == "nodal":
+        return "there are no pressures"
+    return refuse_unstated(traits, "penalty", "area", "gap", "force_along", "gap_shapes", "pressure_shapes")
+
+
+@Property.define(
+    id="patch.tilted.weighted",
+    rank=375,
+    quantities=(TILTED_NODAL, TILTED_ROW),
+    cases=Cases.random(tilted_cases),
+    cases_in_space=Cases.random(tilted_plane_cases),
+    applicable=_refuse_unknown_shapes,
+)
+def patch_tilted_weighted(case: Case, subject: Subject) -> Measurement:
+    """Forces on a straight, tilted slave follow from weighted gaps and the stated shapes.
+
+    **Question.** A straight slave is tilted against a flat master and penetrates it with all its length. Do the forces
+    on its nodes follow from gaps that are weighted with the shapes that the traits name?
+
+    **Why it matters.** Any weights that add up to 1 make a mean of a uniform gap. So no flat patch test shows wrong
+    points of integration of a mortar method. And there is no one answer: on a segment of length 2 with depths of 3 and
+    9, standard shapes give 17/3 and 19/3, dual ones 3 and 9, and dual pressures of standard gaps 5 and 7.
+
+    **How it is judged.** With the shapes φ_j of `gap_shapes`, ψ_j of `pressure_shapes` and linear N_i, pressures are
+    p_j = ε̂ ∫φ_j |g| ds / ∫φ_j ds, and forces ∫N_i Σ ψ_j p_j ds. The slave is covered, so dual shapes have ∫ψ_j N_i = 0
+    for i ≠ j, and ∫N_i for i = j. The largest error of a nodal force counts over the total. Multipliers are these
+    pressures; the error of a constraint row, ∫φ_j |g| ds, counts over the sum of all. Springs of one dual and one
+    standard shape have the same forces in either order, and rows tell them apart. Gap, direction, lengths and the
+    tolerance u(8Z/|g| + 4N + 128) are those of `patch.tilted.resultant`.
+
+    **Undecided.** Never: the slave is in contact with all its length, and far from the ends of the master.
+    """
+    gaps, pressures, exact = exact_forces.weighted_forces(case, subject.traits)
+    formulation = subject.for_case(case)
+    count = formulation.n_multipliers(case.interface)
+    state = FrozenState.at(formulation, case.with_multipliers(pressures) if count else case)
+    forces = exact_forces.pushing_forces(state)[: len(exact)]
+    error = float(np.linalg.norm(forces - exact, axis=1).max()) / float(np.linalg.norm(exact.sum(axis=0)))
+    values = {TILTED_NODAL: error}
+    if count:
+        values[TILTED_ROW] = float(np.abs(state.residual[case.interface.n_unknowns :] - gaps).max() / gaps.sum())
+    numbers = check_all(values, _tolerance(case, subject.traits))
+    finding = exact_forces.worst_force(case.interface, forces, exact) if numbers[0].ratio > 1 else None
+    return Measurement(numbers, idle=not forces.any(), finding=finding)

@@ -18,6 +18,7 @@ FORMULATIONS = (
     *("sts", "sts:area=reference", "chen-hisada", "chen-hisada:area=reference"),
     *("mortar", "mortar:area=reference", "mortar:normals=averaged"),
     *("mortar-dual", "mortar-dual:normals=averaged,area=reference"),
+    *("mortar-dual:gap_shapes=standard", "mortar-dual:gap_shapes=standard,normals=averaged"),
     *("mortar-lm", "mortar-dual-lm:normals=averaged"),
     *("mortar-two-half-pass", "mortar-two-half-pass:area=reference,n=3"),
 )

@@ -28,6 +28,7 @@ from contactverif_properties.exact_forces import (
     forces_of_penetration,
     node_gaps,
     total_force,
+    weighted_forces,
     worst_force,
 )
 from contactverif_properties.invariants import BITS
@@ -399,6 +400,21 @@ def test_the_exact_forces_are_those_of_a_hand_calculation() -> None:
     )
     reference = load_subject("nts-ar:area=reference").traits
     assert exact_slave_forces(case, reference).sum(axis=0) == pytest.approx([0, 20.0])
+
+
+@pytest.mark.parametrize(
+    ("gaps", "pressures", "exact"),
+    [
+        ("standard", "standard", ["175/12", "50/3"]),
+        ("dual", "dual", ["25/4", "25"]),
+        ("standard", "dual", ["25/2", "75/4"]),
+        ("dual", "standard", ["25/2", "75/4"]),
+    ],
+)
+def test_weighted_gaps_have_an_answer_for_each_pair_of_shapes(gaps: Any, pressures: Any, exact: list[str]) -> None:
+    traits = load_subject("mortar").traits.revise(gap_shapes=gaps, pressure_shapes=pressures)
+    *_, forces = weighted_forces(tilted_segment(), traits)
+    assert np.linalg.norm(forces, axis=1) == pytest.approx([float(Fraction(each)) for each in exact], rel=1e-15)
 
 
 def test_a_force_along_the_other_normal_is_told_by_its_direction() -> None:

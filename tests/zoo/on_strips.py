@@ -104,6 +104,48 @@ class SegmentPenalty(Springs):
         return report(self.penalty, slave, 2 * s - 1, master, t, position, normals, gap, weight, pairing["active"])
 
 
+class WholeShapes(Springs):
+    """Mortar with the shapes of whole segments, standard or dual; the latter err where a segment is covered in part."""
+
+    gaps = pressures = "standard"
+    weights = GAUSS[1]
+
+    def __init__(self, *, penalty):
+        super().__init__(penalty=penalty)
+        self.inner = SegmentPenalty(penalty=penalty)
+        self.inner.weights = self.weights
+        words = {"gap_shapes": self.gaps, "pressure_shapes": self.pressures}
+        self.traits = ON_STRIPS.revise(gap="cells", force_along="slave normal", **words)
+
+    def pair(self, interface, z):
+        strips = self.inner.pair(interface, z)["strips"]
+        gaps = self._weigh(interface, strips, z.reshape(-1, 2))[0]
+        return {"strips": strips, "active": gaps < 0}
+
+    def _weigh(self, interface, strips, x):
+        """Return the weighted gaps (..., n_slave_nodes), and the points of the strips."""
+        gap, s, t, weight, normal = self.inner._at_points(self.inner._corners(interface, strips, x))
+        sums = np.zeros((*x.shape[:-2], 2, interface.n_slave_nodes), x.dtype)
+        for node, shape in zip(interface.slave.segments[strips[:, 0]].T, shapes_of(s, self.gaps), strict=True):
+            for number, factor in enumerate((gap, 1)):
+                np.add.at(sums, (..., number, node), (shape * weight * factor).sum(axis=-1))
+        covered = sums[..., 1, :] != 0
+        return np.where(covered, sums[..., 0, :] / np.where(covered, sums[..., 1, :], 1), 0), (s, t, weight, normal)
+
+    def residual(self, interface, pairing, z):
+        x, strips = z.reshape(*z.shape[:-1], -1, 2), pairing["strips"]
+        gaps, (s, t, weight, normal) = self._weigh(interface, strips, x)
+        at_nodes = (self.penalty * np.where(pairing["active"], gaps, 0))[..., interface.slave.segments[strips[:, 0]]]
+        pull = sum(shape * at_nodes[..., end, None] for end, shape in enumerate(shapes_of(s, self.pressures)))
+        nodes = self.inner._nodes(interface, strips)[:, :4].T
+        return spread(x, nodes, (1 - s, s, t - 1, -t), pull, normal[..., 0, :], weight)
+
+
+def shapes_of(s, word):
+    """Return the two shapes of a whole segment at shares s of it."""
+    return (1 - s, s) if word == "standard" else (2 - 3 * s, 3 * s - 1)
+
+
 class SimpsonPoints(SegmentPenalty):
     """Springs at the points of Simpson's rule: at the ends of strips a shape is 0, or what roundoff leaves."""
 

@@ -10,11 +10,12 @@ from functools import partial
 import numpy as np
 
 import contactverif_nts
-from contactverif_mortar import chen_hisada, mortar, mortar_lm, sts
+from contactverif_mortar import chen_hisada, mortar, mortar_dual, mortar_dual_lm, mortar_lm, sts
 from contactverif_mortar.integration_cells import Quadrature
 from contactverif_nts import nts, nts_ar, two_pass, vts_g, vts_me, vts_ppt
 from zoo.lines import SMALL
 from zoo.making import BALANCED, add, decides, reports, says, whole_segments
+from zoo.on_strips import WholeShapes
 
 SEGMENT, PLACE, AREA, FORCES = "projection.segment", "projection.place", "projection.area", "projection.forces"
 ACTIVITY, NORMAL, ARC = "projection.activity", "patch.flat.normal", "accuracy.arc"
@@ -152,3 +153,25 @@ for _name, _property, _base, _promises in (
 # It is exact for a uniform gap, and so on flat interfaces; action equals reaction at each point.
 add("one Gauss point a cell", "patch.tilted.nodal",
     lambda *, penalty: replace(sts(penalty=penalty), quadrature=Quadrature.gauss(1, True)))  # fmt: skip
+
+
+class _WholeDualShapes(WholeShapes):
+    gaps = pressures = "dual"
+
+
+class _EvenWeights(WholeShapes):
+    """Three Gauss points that weigh a third each: right for a uniform gap."""
+
+    weights = np.full(3, 1 / 3)
+
+
+class _DualGaps(WholeShapes):
+    gaps = "dual"
+
+
+WEIGHTED, OPEN_END = "patch.tilted.weighted", "unilateral.overhang"
+add("dual shapes of whole segments", OPEN_END, says(_WholeDualShapes, opens_at_ends=True))
+add("gaps extrapolated to a node past the end", OPEN_END, says(mortar_dual, opens_at_ends=True))
+add("points of a mortar method that weigh the same", WEIGHTED, _EvenWeights)
+add("gaps weighted with other shapes than stated", WEIGHTED, says(_DualGaps, gap_shapes="standard"))
+add("rows weighted with other shapes than stated", WEIGHTED, says(mortar_dual_lm, gap_shapes="standard"))
