@@ -1,4 +1,6 @@
-"""A slave that lies wholly beside the master, beside an edge or a corner: a search may pair it all the same."""
+"""States in space where a search may take the wrong face: slaves beside the master, and masters of two layers."""
+
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
@@ -7,7 +9,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
 from contactverif.strategies import samples
-from contactverif.strategies.surfaces import SurfaceGrid, space_motions, surface_grids
+from contactverif.strategies.surfaces import SurfaceGrid, flat_surface_cases, space_motions, surface_grids
 
 _EXPONENTS = st.one_of(st.integers(0, 10), st.integers(-40, -1))  # Powers of two of the longest edge.
 _EIGHTHS, _PLACES, _SIZES = st.integers(1, 8), st.integers(-4, 4), st.integers(-4, 1)
@@ -69,3 +71,17 @@ def _beside_states(draw: DrawFn, faces: tuple[int, ...]) -> Case:
         "penetration": np.array(depth * motion.scale),
     }
     return Case(interface, motion(current).reshape(-1), penalty, parameters, seed)
+
+
+@samples.on_own_meshes
+def layered_cases(draw: DrawFn) -> Case:
+    """Return flat cases with a copy of the master behind it, by 1/8 to 30 penetrations: either may be nearer."""
+    cases = flat_surface_cases()
+    assert cases is not None
+    case, eighths, exponent = draw(cases), draw(st.integers(1, 7)), draw(st.integers(-3, 4))
+    slave, master, n_slave = case.interface.slave, case.interface.master, case.interface.n_slave_nodes
+    behind = 2.0**exponent * (1 + eighths / 8) * case.parameter("penetration") * case.parameters["normal"]
+    copy = master.faces + len(master.nodes)
+    nodes, positions = (np.vstack([x, x[n_slave:] - behind]) for x in (case.interface.nodes, case.positions))
+    interface = Interface(nodes, slave, Surface(np.vstack([master.faces, copy])))
+    return replace(case, interface=interface, z=positions.reshape(-1), parameters={})

@@ -25,6 +25,7 @@ from contactverif.contract.traits import Traits
 from contactverif.oracle import exact_points
 from contactverif.oracle.exact_points import DEEP, Coverage, closest_excess, lies_in_shadow, seen_excess
 from contactverif.strategies import general_cases, tie_cases
+from contactverif.strategies.beside import layered_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties import roundoff
@@ -136,13 +137,13 @@ def _largest(values: FloatArray) -> float:
     return float(np.max(values, initial=0.0))
 
 
-FLAT, TILTED = "flat faces", "tilted and warped faces"
+FLAT, TILTED, LAYERED = "flat faces", "tilted and warped faces", "a second layer of the master"
 
 
 @random_source("contactverif_properties.shared.face_places.projected_faces")
 def _projected_faces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
-    """Return flat cases in space, and tilted and warped ones."""
-    cases = {FLAT: flat_surface_cases(interface), TILTED: surface_cases(interface)}
+    """Return flat cases in space, tilted and warped ones, and flat ones with another layer behind the master."""
+    cases = {FLAT: flat_surface_cases(interface), TILTED: surface_cases(interface), LAYERED: layered_cases(interface)}
     if interface is not None and interface.slave.faces.shape[1] + interface.master.faces.shape[1] > 2 * TRIANGLE:
         return None  # A foot on a quadrilateral is a root, and no exact number.
     return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
@@ -171,6 +172,7 @@ class _FacePlaces:
     # D turns it by D over its height h. Coordinates in a slave face of length ℓ and height h round a place by ℓ/h along
     # it, and the shape functions of the master face change over its own height. So the product is over both faces.
     scale: FloatArray
+    slave_edges: FloatArray  # (n_points,) The longest edge of the slave face.
     carrier_height: FloatArray  # (n_points,) The height of the face whose normal is taken.
     # (n_points,) The weight over the square of the lengths, 1 at most. A corner of a cell is a quotient by the width of
     # the cell. So the error of a place counts by the area that it moves.
@@ -194,7 +196,7 @@ class _FacePlaces:
             slender = edges / view.heights * slave_edges / slave_height
             scale = 2 * size * slender / np.maximum(view.cosine, 0.0)
         share = np.minimum(np.abs(points.weight) / size**2, 1.0)
-        return cls(each.interface, lattice, points, exact, view, scale, carrier, share)
+        return cls(each.interface, lattice, points, exact, view, scale, slave_edges, carrier, share)
 
     @property
     def depth_inside(self) -> FloatArray:
@@ -209,19 +211,35 @@ class _FacePlaces:
         past = self.view.shape.floats() * self.view.heights[:, None] <= 4 * UNIT_ROUNDOFF * self.scale[:, None]
         return np.asarray((np.roll(free, -1, axis=1) & past).any(axis=1))  # Edge b + 1 is opposite corner b.
 
-    def closest_excess(self) -> FloatArray:
-        """Return how much farther each point's face (n_points,) is than another one with a foot inside, a length."""
-        n_master, n_points = len(self.lattice.master), len(self.reported.gap)
-        point, face = np.divmod(np.arange(n_points * n_master), n_master)
-        exact = exact_points.ExactFacePoints(
-            self.exact.place[point], self.exact.weight[point], self.exact.outward[point]
-        )
-        view = exact_points.FaceView.of_faces(self.lattice, exact, face, closest=True)
-        rounding = 4 * UNIT_ROUNDOFF * self.scale[point] * (1 + _longest_edges(view.corners) / view.heights)
-        inside = view.shape.floats().min(axis=1, initial=np.inf) * view.heights > rounding
-        gap = np.where(inside, np.abs(view.gap.floats()), np.inf).reshape(n_points, n_master)
-        excess: FloatArray = np.abs(self.view.gap.floats()) - gap.min(axis=1, initial=np.inf)
-        return np.maximum(excess, 0.0)
+    def excess(self, positions: FloatArray, rule: str) -> FloatArray:
+        """Return how much farther each point's face (n_points,) is than another one with a foot inside, a length.
+
+        Distances that differ by rounding are tied, so floats tell. A rule of `CELLS` may choose anywhere in the slave
+        face, where distances are others by the slopes of both.
+        """
+        excess, gaps = np.zeros(len(self.share)), np.abs(self.view.gap.floats())
+        master, slave = (positions[side.faces] for side in (self.interface.master, self.interface.slave))
+        outward, edges, slope = turns_of(master)[:, 0], _longest_edges(master), np.zeros(len(master))
+        for number in np.unique(self.reported.slave_segment):
+            here = np.flatnonzero(self.reported.slave_segment == number)
+            look = -outward if rule == CLOSEST else np.broadcast_to(turns_of(slave[[number]])[0, 0], outward.shape)
+            front_faces = np.flatnonzero((outward * look).sum(axis=1) < 0)
+            look, front = look[front_faces], outward[front_faces]
+            product = (front * look).sum(axis=1)
+            arms = master[front_faces] - (self.reported.slave_shape[here] @ slave[number])[:, None, None]
+            inside = np.ones(arms.shape[:2], bool)
+            for k in range(TRIANGLE):
+                inside &= (np.cross(arms[:, :, k - 2], arms[:, :, k - 1]) * look).sum(axis=-1) / product > INSIDE
+            distance = np.abs((arms[:, :, 0] * front).sum(axis=-1) / product) * _norms(look)
+            if rule != CLOSEST:
+                inside &= distance <= DEEP * (edges[front_faces] + self.slave_edges[here[0]])
+            if rule in CELLS:
+                slope[front_faces] = np.sqrt(np.maximum((_norms(front) * _norms(look) / product) ** 2 - 1, 0.0))
+                slopes = slope[front_faces] + slope[self.reported.master_segment[here], None]
+                distance += self.slave_edges[here[0]] * slopes
+            excess[here] = gaps[here] - np.where(inside, distance, np.inf).min(axis=1, initial=np.inf)
+        rounding = TIED * gaps + 64 * UNIT_ROUNDOFF * (np.abs(positions).max() + self.scale)
+        return np.where(excess > rounding, excess, 0.0)
 
 
 def _longest_edges(corners: FloatArray) -> FloatArray:
@@ -243,6 +261,7 @@ def _refuse_unknown_areas(traits: Traits) -> str:
 OVERLAP_ROUNDOFF = 8 * UNIT_ROUNDOFF
 # A search may call segments tied whose distances differ by so little, and no gap shows which of them it took.
 TIED = 1e-12
+INSIDE = 2.0**-20  # The least shape function of a foot in a face that another one may have to give way to.
 FARTHER = Quantity(
     "distance beyond the nearest segment", "1e-12", "A search may call segments tied that differ by less."
 )
@@ -267,7 +286,9 @@ def projection_segment(case: Case, subject: Subject) -> Measurement:
     point or in the middle of its overlap, and segments beyond two lengths of both are no rivals.
 
     In space a master face must look at the slave. Along the slave's normal the foot lies in it, or past the border of
-    the master. By the closest point no face with a foot inside is nearer. Lengths are those of `projection.place`.
+    the master. No face with a foot inside is nearer, by whichever rule, within two longest edges of both along the
+    slave's normal. For `cells` that is asked where slopes make no other face nearer elsewhere in the slave face. In a
+    third of the cases the master has a second layer. Lengths are those of `projection.place`.
 
     **Undecided.** Never. The number of exact ties is a detail. A point that names no segment is not judged here.
     """
@@ -298,10 +319,10 @@ def _find_farther(each: Pass, reported: _Reported) -> tuple[FloatArray, int, str
 def _find_farther_face(each: Pass, reported: _Reported) -> tuple[FloatArray, int, str]:
     places = _FacePlaces.from_pass(each, reported)
     counted = places.view.faces_it
-    if reported.rule == CLOSEST:
-        excess = places.closest_excess()
-    else:
-        excess = np.where(places.beside_border, 0.0, np.maximum(-places.depth_inside, 0.0)) * places.share
+    excess = places.excess(each.positions, str(reported.rule))
+    if reported.rule != CLOSEST:
+        outside = np.where(places.beside_border, 0.0, np.maximum(-places.depth_inside, 0.0)) * places.share
+        excess = np.maximum(outside, excess)
     wrong = (places.reported.active & ~counted & (places.share > 4 * UNIT_ROUNDOFF)).any()
     breach = "a master face does not face the slave face of its point" if wrong else ""
     return (excess / places.scale)[counted], 0, breach
@@ -419,9 +440,9 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     **Undecided.** A point is left out where formulations may decide either way: a gap of roundoff, 4u(L + |P − A| + D);
     a foot past a free end by up to one segment, since each formulation has its own tolerance τ; an idle point whose
     slave segment does not face the master, or that has no weight; a penetration of more than two lengths of both
-    segments. Details say how many points were decided and how many were left out. Multipliers have their own decision,
-    λ − c g ≥ 0, and pressures that are interpolated between nodes have the nodes' decision, which is not reported; both
-    are not asked.
+    segments, or of two longest edges of both faces. Details say how many points were decided and how many were left
+    out. Multipliers have their own decision, λ − c g ≥ 0, and pressures that are interpolated between nodes have the
+    nodes' decision, which is not reported; both are not asked.
     """
     # All lengths are divided by 2^32, which rounds nothing; the penalty stays.
     large = replace(case, interface=case.interface.at(case.interface.nodes * LARGE_UNIT), z=case.z * LARGE_UNIT)
@@ -474,7 +495,8 @@ def _decide(each: Pass, reported: _Reported) -> tuple[BoolArray, BoolArray, Bool
 def _decide_on_faces(each: Pass, reported: _Reported) -> tuple[BoolArray, BoolArray, BoolArray]:
     places = _FacePlaces.from_pass(each, reported)
     points, gap, rounding = places.reported, places.view.gap.floats(), 4 * UNIT_ROUNDOFF * places.scale
-    certain = places.view.faces_it & (points.weight != 0) & (np.abs(gap) > rounding)
+    shallow = np.abs(gap) <= DEEP * (_longest_edges(places.view.corners) + places.slave_edges)
+    certain = places.view.faces_it & (points.weight != 0) & (np.abs(gap) > rounding) & shallow
     return points.active, certain & (places.depth_inside > rounding), gap < 0
 
 

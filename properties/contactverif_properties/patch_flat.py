@@ -413,13 +413,13 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
 
     **How it is judged.** The number is the force that pushes the slave over ε̂ |g| L, and likewise that on the master;
     the worse of both counts. It must lie within 1/n of 1, or within 2/n of 2 where the traits leave room for springs on
-    both surfaces; n is the number of slave segments, 8, 16 or 304. So a stiffness that is wrong by 0.4 % shows, and so
-    does a master that gets more than the slave. The largest force on a node is that of a few mean segments, so that a
-    number of a segment that overflows shows. Nodal springs of ε̂ L/n at n + 1 nodes give 1 + 1/n. A node that faces the
-    end of the master exactly may be lost to roundoff, which takes no more than 1/n either. Segments have the mean
-    length 1, so that it does not matter whether the unit of the penalty is stated. A factor of 2 on one pass looks like
-    two passes, so the row says that the springs are 2 ε̂ L, unless the traits say `unbiased`. In space L is the area,
-    and n is the number of slave nodes, 25 or 144; each has the mean area 1.
+    both surfaces; n is the number of slave segments, 8, 16 or 304. So a stiffness that is wrong by 0.4 % shows, in
+    space by 0.7 %, and so does a master that gets more than the slave. The largest force on a node is that of a few
+    mean segments, so that a number of a segment that overflows shows. Nodal springs of ε̂ L/n at n + 1 nodes give 1 +
+    1/n. A node that faces the end of the master exactly may be lost to roundoff, which takes no more than 1/n either.
+    Segments have the mean length 1, so that it does not matter whether the unit of the penalty is stated. A factor of 2
+    on one pass looks like two passes, so the row says that the springs are 2 ε̂ L, unless the traits say `unbiased`. In
+    space L is the area, and n is the number of slave nodes, 25 or 144; each has the mean area 1.
 
     A law that is not linear has no stiffness. The state is asked again at half the depth, and where the number changes
     by more than u(8Z/|g| + 4N + 128), it is kept as a detail and not judged.

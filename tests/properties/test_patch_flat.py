@@ -274,7 +274,7 @@ def test_another_factor_fails_in_silence_too(factor: float) -> None:
 
 
 def test_a_long_interface_shows_what_a_short_one_hides() -> None:
-    """Half a percent too stiff, and the number of a segment in one byte."""
+    """Half a percent too stiff, in space a little more, and the number of a segment in one byte."""
 
     def pair(right: Any, *state: Any) -> Any:
         pairing = dict(right(*state))
@@ -285,6 +285,11 @@ def test_a_long_interface_shows_what_a_short_one_hides() -> None:
     judge_as(Verdict.FAIL, SCALE, long, scale_springs(1.005, SILENT))
     judge_as(Verdict.PASS, SCALE, CASES["16 segments, stiff"], scale_springs(1.005, SILENT))
     judge_as(Verdict.FAIL, SCALE, long, with_verbs(PointSprings, pair=pair))
+    right = load_subject("sts-3d")
+    in_space = SCALE.for_traits(right.traits)
+    for factor, verdict in ((1.0065, Verdict.PASS), (1.0075, Verdict.FAIL)):  # 1/144 lies between.
+        stiff = Subject("stiff", lambda *, penalty, factor=factor: right._make(penalty=factor * penalty))
+        judge_as(verdict, in_space, in_space.cases(None)[-1], stiff)
 
 
 def test_a_master_that_gets_more_than_the_slave_fails_whatever_is_promised() -> None:

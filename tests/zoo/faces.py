@@ -308,6 +308,21 @@ def _(right, interface, z):
     return pairing
 
 
+@mutant("first layer of the master searched alone", "projection.segment", "pair")
+def _(right, interface, z):
+    """Search the first half of the master's faces where no edge joins it to the other half."""
+    half = len(interface.master) // 2
+    pairing, x, slave = right(interface, z), z.reshape(-1, 3), interface.slave.faces
+    if half == 0 or (interface.master.neighbours[:half] >= half).any():
+        return pairing
+    sizes = np.full(len(slave), np.inf), np.full(half, np.inf)
+    faces, codes = find_cells(x, slave, interface.master.faces[:half], *sizes)
+    codes = np.pad(codes, ((0, 0), (0, MOST_CORNERS - codes.shape[1]), (0, 0)), mode="edge")
+    view = SlaveView.of_corners(x[slave[faces[:, 0]]], x[interface.master.faces[faces[:, 1]]])
+    active = right_rule(view, codes).gap < 0
+    return Pairing({"slave_face": faces[:, 0], "master_face": faces[:, 1], "corners": codes, "active": active})
+
+
 @mutant("deep nodes taken for the other side", "hard.deep", "pair", NTS_AR)
 def _(right, interface, z):
     """Take a penetration of two fifths of an edge or more for the other side of the body."""
