@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
-from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.oracle.nearest import integers
 
@@ -133,8 +132,8 @@ def uniform_surface_weights_exact(interface: Interface, plane: ArrayLike, domain
 
     The weight of a node is ∫ N over the part of its surface that lies in the convex domain, whose corners (n_corners,
     2) run counter-clockwise. `plane` (n_nodes, 2) are the coordinates of the nodes; floats count as the rationals that
-    they are. A face partly outside of the domain is a triangle or a parallelogram: on no other are shape functions
-    polynomials of the place.
+    they are. On a quadrilateral that is no parallelogram shape functions are no polynomials of the place: if it is
+    partly outside of the domain, its weights are approximate, to some 1e-6.
     """
     places, border = _as_points(plane), _as_points(domain)
     weights = [Fraction(0)] * len(places)
@@ -196,8 +195,7 @@ def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
         return [turn(corners[0], corners[1], corners[2]) / 6] * 3 if is_triangle else _whole_quadrilateral(corners)
     part, weights = cut_polygon(corners, border), [Fraction(0)] * len(corners)
     if part and not is_triangle and any(a + c != b + d for a, b, c, d in zip(*corners, strict=True)):
-        needed = "triangles, parallelograms, or none cut by the border"
-        raise MisuseError("plane", "another quadrilateral partly outside of the domain", needed)
+        return [*map(Fraction, _integrate_part(np.array(corners, np.float64), np.array(part, np.float64)).tolist())]
     for second, third in pairwise(part[1:]):
         fan = part[0], second, third
         places = [_mean(fan)] if is_triangle else [_mean((fan[i - 1], fan[i])) for i in range(3)]
@@ -205,6 +203,31 @@ def _integrate_shapes(corners: Polygon, border: Polygon) -> Sequence[Fraction]:
         for place in places:
             weights = [weight + share * shape for weight, shape in zip(weights, _shapes(corners, place), strict=True)]
     return weights
+
+
+def _integrate_part(corners: FloatArray, part: FloatArray) -> FloatArray:
+    """Return ∫ of the shape functions (4,) of a quadrilateral (4, 2) over a convex part (n, 2) of it, nearly exact."""
+    points, shares = np.polynomial.legendre.leggauss(12)
+    u, v = np.meshgrid((1 + points) / 2, (1 + points) / 2, indexing="ij")
+    b, c = part[1:-1] - part[0], part[2:] - part[0]  # (n_triangles, 2) Each has its points along rays from a corner.
+    r = part[0] - corners[0] + u[..., None, None] * (b + v[..., None, None] * (c - b))
+    weights = np.outer(shares * (1 + points) / 2, shares)[..., None] / 4 * _cross(b, c)
+    first, last = corners[1] - corners[0], corners[3] - corners[0]
+    twist = corners[2] - corners[1] - last
+    # A place is s first + t last + s t twist. Without s, that is a quadratic equation in t.
+    constant, linear = _cross(r, first), _cross(r, twist) + _cross(first, last)
+    root = np.sqrt(np.maximum(linear**2 + 4 * constant * _cross(last, twist), 0.0))
+    t = -2 * constant / (linear + root)
+    edge = first + t[..., None] * twist
+    s = ((r - t[..., None] * last) * edge).sum(axis=-1) / (edge**2).sum(axis=-1)
+    shapes = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t])
+    total: FloatArray = (shapes * weights).sum(axis=(1, 2, 3))
+    return total
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    product: FloatArray = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return product
 
 
 def _mean(points: Sequence[Point]) -> Point:

@@ -17,7 +17,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, random_source
-from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
+from contactverif.contract.interface import TRIANGLE, Interface, Surface
 from contactverif.problems.flat_states import rotation
 from contactverif.strategies import samples
 from contactverif.strategies.given_interface import given_surface_states, least_height
@@ -196,11 +196,13 @@ def surface_pairs(
     stretched: bool = True,
     faces: tuple[int, ...] = (TRIANGLE,),
     straight: bool = False,
+    skewed: bool = False,
 ) -> SearchStrategy[SurfacePair]:
     """Return pairs of grids; unless `same_domain` says which, half of them share their domain and half do not.
 
     `faces` and `straight` are those of `surface_grids`. A larger master of straight quadrilaterals turns by a multiple
-    of 90°, so that they stay rectangles: the border of a slave may cut those, and triangles.
+    of 90°, so that they stay rectangles: the border of a slave may cut those, and triangles. If they may be `skewed`,
+    half of the pairs have quadrilaterals of any convex shape instead, turned by any angle.
     """
     same = st.booleans().map(lambda larger: not larger) if same_domain is None else st.just(same_domain)
     grids = surface_grids(most=most, faces=faces, straight=straight)
@@ -209,6 +211,8 @@ def surface_pairs(
     def pair(
         slave: SurfaceGrid, master: SurfaceGrid, same: bool, degrees: int, stretch: int, shuffle: int
     ) -> SurfacePair:
+        if skewed and degrees % 2:  # No draw of its own, so that triangles are those that they would be without.
+            slave, master = replace(slave, straight=False), replace(master, straight=False)
         return SurfacePair(slave, master, same, degrees // 90 * 90 if master.straight else degrees, stretch, shuffle)
 
     return st.builds(pair, grids, grids, same, st.integers(0, 359), stretches, samples.SHUFFLES)
@@ -234,18 +238,10 @@ def flat_surface_cases(
 
     Their parameters are "penetration" (|g| > 0, a length), "plane" (n_nodes, 2) (coordinates of the nodes in the plane
     of the interface, before any rigid motion), "domain" (4, 2) (the corners of the slave's domain there) and "normal"
-    (3,) (the unit vector out of the master). Quadrilaterals are rectangles. There are no cases on an interface of the
-    user.
+    (3,) (the unit vector out of the master). Half of the quadrilaterals are rectangles. There are no cases on an
+    interface of the user.
     """
-    return _flat_states(surface_pairs(faces=faces, straight=True)) if interface is None else None
-
-
-@random_source("contactverif.strategies.surfaces.uniform_surfaces.skewed_surface_cases")
-def skewed_surface_cases(
-    interface: Interface | None = None, faces: tuple[int, ...] = (QUADRILATERAL,)
-) -> SearchStrategy[Case] | None:
-    """Return cases as `flat_surface_cases` does, on the same domain, with quadrilaterals of any convex shape."""
-    return _flat_states(surface_pairs(same_domain=True, faces=faces)) if interface is None else None
+    return _flat_states(surface_pairs(faces=faces, straight=True, skewed=True)) if interface is None else None
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")

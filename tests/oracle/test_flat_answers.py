@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from contactverif import Interface, MisuseError
+from contactverif import Interface
 from contactverif.oracle.flat_answers import (
     is_of_class,
     nodal_spring_weights,
@@ -60,13 +60,18 @@ def test_a_quadrilateral_of_any_shape_has_the_moments_of_its_area() -> None:
         assert quadrilateral == triangles
 
 
-def test_a_quadrilateral_is_cut_only_where_its_shapes_are_polynomials() -> None:
+def test_a_parallelogram_is_cut_exactly_and_another_quadrilateral_nearly_so() -> None:
     meshes = interface(SQUARE, [[0, 2, 1], [0, 3, 2]], [[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2, 3]])
     weights = uniform_surface_weights_exact(meshes, meshes.nodes[:, :2], SQUARE)
     assert weights[4:] == [Fraction(3, 8), Fraction(1, 8), Fraction(1, 8), Fraction(3, 8)]
     meshes = interface(SQUARE, [[0, 2, 1], [0, 3, 2]], [[0, 0], [2, 0], [2, 1], [0, 2]], [[0, 1, 2, 3]])
-    with pytest.raises(MisuseError, match="plane: found another quadrilateral partly outside of the domain"):
-        uniform_surface_weights(meshes, meshes.nodes[:, :2], SQUARE)
+    weights = uniform_surface_weights(meshes, meshes.nodes[:, :2], SQUARE)
+    assert [weights[4:].sum(), *(weights[4:] @ meshes.nodes[4:, :2])] == pytest.approx([1, 0.5, 0.5], rel=1e-14)
+    exact, nearly = (
+        uniform_surface_weights(meshes, meshes.nodes[:, :2], domain)[4:]
+        for domain in ([[-1, -1], [3, -1], [3, 3], [-1, 3]], [[1e-12, -1], [3, -1], [3, 3], [1e-12, 3]])
+    )
+    assert nearly == pytest.approx(exact, rel=1e-6)
 
 
 def cut(polygon: Polygon, edges: Polygon) -> Polygon:
