@@ -17,9 +17,9 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
-from contactverif.contract.interface import TRIANGLE
+from contactverif.contract.interface import TRIANGLE, Interface, Surface
 from contactverif.strategies import samples
-from contactverif.strategies.surfaces import SpaceMotion, surface_pairs
+from contactverif.strategies.surfaces import SpaceMotion, surface_grids, surface_pairs
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
 _SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.
@@ -166,6 +166,29 @@ def _exact_space_turns() -> SearchStrategy[SpaceMotion]:
 def tilted_plane_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return states of a plane slave that is tilted by up to 19° against a flat master, and wholly in contact."""
     return _tilted_plane(draw, faces)[0]
+
+
+@samples.on_own_meshes
+def steep_plane_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
+    """Return states as `tilted_plane_cases` does, tilted by 14° to 89°; the slave's edges are short against the depth.
+
+    No gap along the slave's normal is longer than an edge of the master.
+    """
+    # Quadrilaterals are parallelograms, on which shape functions are polynomials of the place.
+    slave, master = (draw(surface_grids(most=3, faces=faces, straight=True)) for _ in range(2))
+    slope = 2.0 ** draw(st.integers(-2, 5)) * (1 + draw(_QUARTERS) / 16)
+    slopes, shallow = slope * np.array([1.0, draw(_PARTS) / 4]), draw(_QUARTERS) / 32
+    turn, penalty, seed = draw(_exact_space_turns()), draw(samples.PENALTIES), draw(samples.SEEDS)
+    # Few bits, so that no product is rounded.
+    x = samples.on_lattice(slave.points(), 6) * 2.0 ** -ceil(3 + log2(max(slope, 1.0)))
+    depth = x @ slopes - (x @ slopes).min() + shallow
+    reach = ceil(2 * depth.max() * slope) + 1
+    level = np.vstack([x, 6 * reach * (master.points() - 0.5)])
+    nodes = np.column_stack([level, np.zeros(len(level))])
+    current = nodes.copy()
+    current[: len(x), 2] = -depth
+    sides = Surface(slave.faces()[:, ::-1]), Surface(master.faces() + len(x))
+    return Case(Interface(nodes * turn.scale, *sides), turn(current).reshape(-1), penalty, {}, seed)
 
 
 @samples.on_own_meshes

@@ -14,7 +14,7 @@ from hypothesis.strategies import SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.errors import ContractError
-from contactverif.contract.interface import PLANE, Interface
+from contactverif.contract.interface import PLANE, TRIANGLE, Interface
 from contactverif.contract.property import WITH_BARRIER, Finding, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits, parse_forces
@@ -22,7 +22,7 @@ from contactverif.oracle.flat_answers import nodal_spring_weights, nodal_surface
 from contactverif.problems.flat_states import equal_area_states, equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
-from contactverif.strategies.straight import steep_cases, tilted_cases, tilted_plane_cases
+from contactverif.strategies.straight import steep_cases, steep_plane_cases, tilted_cases, tilted_plane_cases
 from contactverif_properties import exact_forces, roundoff
 from contactverif_properties.applicability import (
     may_act_twice,
@@ -468,6 +468,7 @@ TILTED_TOTAL = roundoff.stated_gap_quantity("error of the total force")
 TILTED_NODAL = roundoff.stated_gap_quantity("error of a nodal force")
 TILTED_ROW = roundoff.stated_gap_quantity("error of a constraint row")
 TILTED, STEEP = "tilted by 3° to 35°", "tilted by 35° to 89°"
+TILTED_PLANE, STEEP_PLANE = "a plane tilted by up to 19°", "a plane tilted by 14° to 89°"
 
 
 @random_source("contactverif_properties.straight_slaves.resultant_cases")
@@ -475,6 +476,15 @@ def _resultant_cases(interface: Interface | None = None) -> dict[str, SearchStra
     """Return {kind: strategy} of tilted and of steep slaves; None for a given mesh."""
     tilted, steep = tilted_cases(interface), steep_cases(interface)
     return {TILTED: tilted, STEEP: steep} if tilted is not None and steep is not None else None
+
+
+@random_source("contactverif_properties.straight_slaves.resultant_plane_cases")
+def _resultant_plane_cases(
+    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
+) -> dict[str, SearchStrategy[Case]] | None:
+    """Return the same in space."""
+    tilted, steep = tilted_plane_cases(interface, faces), steep_plane_cases(interface, faces)
+    return {TILTED_PLANE: tilted, STEEP_PLANE: steep} if tilted is not None and steep is not None else None
 
 
 def _tolerance(case: Case, traits: Traits) -> float:
@@ -487,7 +497,7 @@ def _tolerance(case: Case, traits: Traits) -> float:
     rank=250,
     quantities=(OFF_NORMAL, TILTED_TOTAL),
     cases=Cases.random(_resultant_cases),
-    cases_in_space=Cases.random(tilted_plane_cases),
+    cases_in_space=Cases.random(_resultant_plane_cases),
     kinds=(TILTED, STEEP),
     promise=lambda traits: True if traits.rules.force_along else None,
     applicable=lambda traits: refuse_unstated(traits, "force_along"),
@@ -496,7 +506,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     """A straight slave, tilted against a flat master, gets the force ε̂ ∫ |g| ds along the stated normal.
 
     **Question.** A straight slave is tilted against a flat master by 3° to 89°, and penetrates it with all its length.
-    In space it is a plane, tilted by up to 19°. Is the force on the slave ε̂ ∫ |g| ds, along the normal that the traits
+    In space it is a plane, tilted by up to 89°. Is the force on the slave ε̂ ∫ |g| ds, along the normal that the traits
     name?
 
     **Why it matters.** Flat patch tests never tilt a surface. A pressure that falls with the tilt, for example with its
@@ -510,16 +520,17 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     the direction alone. The tolerance is u(8Z/|g| + 4N + 128), where Z is the diameter of a formulation that promises
     `translation_stable`, and the largest coordinate of any other.
 
-    In half of the cases the tilt is 35° to 89°, and no coordinate is rounded. Gaps along the slave's normal are up to
-    57 times those along the master's there, and yet no longer than two master segments, so that every search finds
-    them. A formulation that states no rule `gap` may overlook a slave so steep, and give no force at all.
+    In half of the cases the tilt is 35° to 89°, in space 14° to 89°, and no coordinate is rounded. Gaps along the
+    slave's normal are up to 57 times those along the master's there, and yet no longer than two master segments, so
+    that every search finds them. A formulation that states no rule `gap` may overlook a slave so steep, and give no
+    force at all.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
     """
     traits, total = subject.traits, exact_forces.slave_forces(case, subject).sum(axis=0)
     # No rule says that a formulation sees what it is so steep to.
-    if not total.any() and case.kind == STEEP and traits.rules.gap is None:
+    if not total.any() and case.kind in (STEEP, STEEP_PLANE) and traits.rules.gap is None:
         return Measurement()
     normal = exact_forces.directions(case)[0 if traits.rules.force_along == "master normal" else 1]
     push, across = float(total @ normal), exact_forces.distance_from_line(total, normal)

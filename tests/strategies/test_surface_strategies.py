@@ -12,7 +12,7 @@ from contactverif import Case
 from contactverif.contract.interface import turns_of
 from contactverif.oracle.flat_answers import nodal_surface_weights, uniform_surface_weights_exact
 from contactverif.sampling.draw import draw_cases
-from contactverif.strategies.straight import tilted_plane_cases
+from contactverif.strategies.straight import steep_plane_cases, tilted_plane_cases
 from contactverif.strategies.surfaces import (
     flat_surface_cases,
     matched_surface_cases,
@@ -68,8 +68,9 @@ def test_nearly_all_states_are_in_contact(strategy: Callable[[], Any]) -> None:
     assert np.mean(np.array(forces) > 0) >= 0.95
 
 
-def test_a_tilted_plane_stays_a_plane_below_the_master_bit_by_bit() -> None:
-    for case in collect(tilted_plane_cases, 60):
+@pytest.mark.parametrize("strategy", [tilted_plane_cases, steep_plane_cases])
+def test_a_tilted_plane_stays_a_plane_below_the_master_bit_by_bit(strategy: Callable[[], Any]) -> None:
+    for case in collect(strategy, 60):
         interface, places = case.interface, [tuple(map(Fraction, place)) for place in case.positions.tolist()]
         for surface in (interface.slave, interface.master):
             a, b, c = (places[node] for node in surface.faces[0].tolist())

@@ -308,6 +308,27 @@ def _(right, interface, z):
     return pairing
 
 
+@mutant("faces at more than 45° to each other left open", "patch.tilted.resultant", "pair")
+def _(right, interface, z):
+    pairing, x = right(interface, z), z.reshape(-1, 3)
+    normals = []
+    for side, name in ((interface.slave, "slave_face"), (interface.master, "master_face")):
+        corners = x[side.faces[pairing[name]]]
+        normals.append(unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])))
+    facing = (normals[0] * normals[1]).sum(axis=-1) < -np.sqrt(0.5)
+    return Pairing({**pairing, "active": pairing["active"] & facing[:, None]})
+
+
+@mutant("keys of pairs in 16 bits", "hard.search", "pair")
+def _(right, interface, z):
+    pairing = right(interface, z)
+    keys = (pairing["slave_face"] * len(interface.master) + pairing["master_face"]).astype(np.int16)
+    if len(np.unique(keys)) == len(keys):
+        return pairing
+    first = np.sort(np.unique(keys, return_index=True)[1])
+    return Pairing({name: array[first] for name, array in pairing.items()})
+
+
 @mutant("first layer of the master searched alone", "projection.segment", "pair")
 def _(right, interface, z):
     """Search the first half of the master's faces where no edge joins it to the other half."""
