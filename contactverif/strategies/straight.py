@@ -9,7 +9,7 @@ Each rule for gaps sees the same straight line or plane opposite. Everything sta
 from dataclasses import replace
 from functools import cache, partial
 from itertools import accumulate, cycle, takewhile
-from math import ceil, log2
+from math import ceil, hypot, log2
 
 import numpy as np
 from hypothesis import strategies as st
@@ -125,7 +125,11 @@ def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, float]:
     # Lines along the slave's normal meet the master less than one depth aside; two depths keep off the corners.
     reach = float(ceil(2 * depth.max()) + 1)
     x = x + float(samples.on_lattice(np.array(draw(samples.SEVENTHS) / 7)))
-    steps, end = cycle(draw(samples.lengths(graded=False))), float(ceil(x[-1])) + reach
+    lengths, end = np.array(draw(samples.lengths(graded=False))), float(ceil(x[-1])) + reach
+    # No gap along the slave's normal is longer than twice the longest segments of both: a search may end there.
+    while depth.max() * hypot(1.0, slope) > 2 * (np.diff(x).max() + lengths.max()):
+        lengths = 2 * lengths
+    steps = cycle(lengths.tolist())
     master_x = [*takewhile(lambda place: place < end, accumulate(steps, initial=-reach)), end]
     master = np.column_stack([master_x[::-1], np.zeros(len(master_x))])
     return np.column_stack([x, -depth]), master, reach

@@ -11,7 +11,7 @@ import pytest
 from subjects import judge_as, load_property, load_subject
 from surfaces import complex_step, contact_forces, make_bent, make_closed, make_flat
 
-from contactverif import Case, Interface, Verdict
+from contactverif import Case, Interface, Verdict, named_case
 from contactverif_nts import vts_ppt, vts_ppt_balanced
 
 PENALTY = 8.0
@@ -67,6 +67,21 @@ def test_beside_a_step_of_the_master_a_node_is_pulled_so_vts_ppt_promises_no_pus
         judge_as(Verdict.FAIL, question, case, load_subject(name))
         assert load_subject(name).traits.promises.nodes_push is None
     judge_as(Verdict.PASS, question, case, load_subject("vts-ppt-balanced:n=1"))
+
+
+@pytest.mark.parametrize("name", ["nts", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced", "chen-hisada"])
+def test_an_open_gap_may_be_closed_where_feet_count_far_past_a_free_end(name: str) -> None:
+    promises = [load_subject(f"{name}:tau={tau}").traits.promises.opens_at_ends for tau in (0.05, 0.06)]
+    assert promises == [True, None]
+
+
+def test_dual_shapes_push_across_an_open_gap_unless_gaps_have_standard_ones() -> None:
+    """The gap of 0.02 + 0.48 s is −0.22 at the node that is not covered, ∫N of which is 1/8."""
+    case = named_case("open-end")
+    for name, force in (("mortar-dual", 0.22 / 8), ("mortar-dual:gap_shapes=standard", 0.0), ("mortar", 0.0)):
+        formulation = load_subject(name).with_penalty(1.0)
+        forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)
+        assert -forces.reshape(-1, 2)[:2].sum(axis=0) == pytest.approx([0.0, force], abs=1e-15)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
