@@ -11,7 +11,7 @@ from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
 from zoo.at_points import NearbyOnly, PointsFirst, SlaveNormalAtGaussPoints, TurnedFrame
-from zoo.on_strips import OnePoint, SegmentPenalty, SimpsonPoints
+from zoo.on_strips import CommonPlane, OnePoint, SegmentPenalty, SimpsonPoints
 from zoo.right import STRANGERS
 
 from contactverif import Case, Interface, Promises, Property, Rules, Subject, Traits, Verdict, judge_case
@@ -87,6 +87,7 @@ SECOND_ORDER = {
     "textbook springs of second order": Subject("quadratic", QuadraticSprings),
     "textbook nodal multipliers": Subject("multipliers", NodalMultipliers),
 }
+ON_PLANES = {"common planes": Subject("common planes", CommonPlane)}
 AT_POINTS = {
     name: Subject(name, make)
     for name, make in {
@@ -120,6 +121,9 @@ GROUPS = (
     (TILTED | SECOND_ORDER, ("mirror", "renumbering", "remote"), "same/{}", 10, 0.0),
     (AT_POINTS, [name for name in OF_STATES if name.startswith("hard.")], "", ALL, 0.9),
     (AT_POINTS, ("total-stiffness",), "", ALL, 1.0),
+    # Ties between equally near middles, decided by number, are undecided in a mirror image, and nothing else is.
+    (ON_PLANES, ("mirror", "renumbering"), "planes/{}", 60, 0.95),
+    (ON_PLANES, ("balance.force", "balance.moment", "objectivity", "remote", "unilateral"), "planes/{}", 10, 0.9),
     (TEXTBOOK, [name for name in FOR_LOOPS if name not in ("hard.touch", "hard.contrast")], "textbook/{}", 8, 0.0),
 )
 ROWS = [

@@ -586,3 +586,54 @@ class OnePoint(Springs):
         add_at(forces, master[:, 0], (t - 1)[..., None] * part)
         add_at(forces, master[:, 1], -t[..., None] * part)
         return forces.reshape(z.shape)
+
+
+class CommonPlane(Springs):
+    """A spring in the middle of each overlap of two segments, seen along the mean of both normals.
+
+    As the common planes of explicit codes. Of master segments over one place
+    of the slave that one counts whose middle is nearest to the slave's; of equally near ones the first.
+    """
+
+    traits = Traits(promises=Promises(conserves_force=True, conserves_moment=True), rules=Rules(penalty="distributed"))
+
+    def pair(self, interface, z):
+        x, master, rows = z.reshape(-1, 2), interface.master.segments, []
+        for slave in interface.slave.segments:
+            middle, covered = x[slave].mean(axis=0), []
+            for number in np.argsort(np.hypot(*(x[master].mean(axis=1) - middle).T), kind="stable"):
+                nodes = [*slave, *master[number]]
+                if dot(x[nodes[1]] - x[nodes[0]], x[nodes[3]] - x[nodes[2]]) < 0:
+                    along = self._frame(x[nodes][None])[1][0]
+                    low = max(along[:2].argmin(), 2 + along[2:].argmin(), key=lambda end: along[end])
+                    high = min(along[:2].argmax(), 2 + along[2:].argmax(), key=lambda end: along[end])
+                    begin, end = sorted((along[[low, high]] - along[0]) / (along[1] - along[0]))
+                    if along[low] < along[high] and not any(a < (begin + end) / 2 < b for a, b in covered):
+                        covered.append((begin, end))
+                        rows.append([*nodes, low, high])
+        table = np.array(rows, dtype=np.int64).reshape(-1, 6)
+        return {"nodes": table[:, :4], "ends": table[:, 4:], "active": self._look(x, table[:, :4], table[:, 4:])[0] < 0}
+
+    def _frame(self, corners):
+        """Return the normal out of the master (n, 2), and the places (n, 4) of the nodes across it."""
+        slave, master = (
+            along / np.hypot(*along.T)[:, None] for along in (corners[:, end + 1] - corners[:, end] for end in (0, 2))
+        )
+        mean = master - slave
+        mean = mean / np.hypot(*mean.T)[:, None]
+        return np.column_stack([mean[:, 1], -mean[:, 0]]), np.einsum("nki,ni->nk", corners - corners[:, :1], mean)
+
+    def _look(self, x, nodes, ends):
+        normal, along = self._frame(x[nodes])
+        low, high = np.take_along_axis(along, ends, axis=1).T
+        places = ((low + high)[:, None] / 2 - along[:, ::2]) / (along[:, 1::2] - along[:, ::2])
+        shares = np.column_stack([1 - places[:, 0], places[:, 0], places[:, 1] - 1, -places[:, 1]])
+        heights = np.einsum("nki,ni->nk", x[nodes] - x[nodes[:, :1]], normal)
+        return (shares * heights).sum(axis=1), high - low, shares, normal
+
+    def residual(self, interface, pairing, z):
+        forces = np.zeros((interface.n_nodes, 2))
+        gap, length, shares, normal = self._look(z.reshape(-1, 2), pairing["nodes"], pairing["ends"])
+        pulls = (self.penalty * np.where(pairing["active"], gap * length, 0))[:, None, None] * shares[..., None]
+        np.add.at(forces, pairing["nodes"], pulls * normal[:, None])
+        return forces.reshape(-1)
