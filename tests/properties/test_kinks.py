@@ -1,5 +1,6 @@
 """Kinks: computed from positions where the plugin reports contact points, and else from differences."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -201,3 +202,16 @@ def test_a_wrong_tangent_is_asked_for_kinks_in_few_columns() -> None:
     wrong = with_verbs("nts-ar", residual=count, tangent=drop_last_column)
     judge_as(Verdict.FAIL, load_property("objectivity"), flat_state().case, wrong)
     assert sum(states) < 300  # All columns took 1,226.
+
+
+class OneOfEight(OneForce):
+    """The force is 1 in one of eight sectors around a node, as where eight faces meet there, and 0 in the others."""
+
+    def force(self, z: Any, pairing: Any) -> Any:
+        return 1.0 * (0 <= np.arctan2(z[3] - z[1], z[0] + z[2]) < np.pi / 4)
+
+
+def test_one_of_eight_choices_is_excused() -> None:
+    for seed in range(20):
+        state = at(OneOfEight, replace(over_a_node(0.0), seed=seed))
+        assert is_like_its_surroundings(state, REACH), seed
