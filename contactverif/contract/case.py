@@ -24,6 +24,9 @@ BODIES = "bodies_"  # The prefix of the parameters that hold the bodies of a sce
 _PREFIX = "parameter_"
 # The parameters of a state whose surfaces are apart, as a barrier needs it: two lengths.
 LEAST_GAP, ACTIVATION = "least_gap", "activation"
+# Those of a state that is asked of a law of its own: the penalty that the formulation gets there, and the length over
+# which its forces change.
+OWN_PENALTY, FORCE_LENGTH = "own_penalty", "force_length"
 
 
 @dataclass(frozen=True, eq=False)

@@ -300,6 +300,8 @@ class Property(PropertyInfo):
     exact : Callable[[Case], FloatArray] | None
         Returns the exact forces (n_nodes, dim) that push the nodes of a case, for pictures; None where no exact
         answer is known.
+    linear : str
+        The reason why a law of its own (`Rules.own_law`) is not asked; empty if it is.
     turn : int
         The turn in the first round of a run, from 0 on: cheap properties, of which one fails for most mistakes.
     restarts : bool
@@ -319,6 +321,7 @@ class Property(PropertyInfo):
     exact: Callable[[Case], FloatArray] | None = None
     question: str = ""
     cases_in_space: Cases | None = None
+    linear: str = ""
     turn: int = LAST_TURN
     restarts: bool = False
 
@@ -387,7 +390,7 @@ class Property(PropertyInfo):
         if enforcement in self.asks:
             if enforcement == "barrier" and traits.rules.activation is None:
                 return "the barrier does not state the trait `activation`, so no gap is known"
-            return self.applicable(traits)
+            return (self.linear if traits.rules.own_law else "") or self.applicable(traits)
         if enforcement == "barrier" and "penalty" in self.asks:
             return "the states penetrate, where a barrier is not defined"
         return f"the enforcement is by a {enforcement}"

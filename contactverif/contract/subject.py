@@ -18,7 +18,7 @@ from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 import numpy as np
 
 from contactverif.contract.arrays import Array, FloatArray, compressed_matrix, dense, freeze, sparse_of_scipy
-from contactverif.contract.case import Case
+from contactverif.contract.case import OWN_PENALTY, Case
 from contactverif.contract.engine import Engine, EngineAnswer, EngineTraits, SceneArrays
 from contactverif.contract.errors import (
     ContractError,
@@ -152,6 +152,10 @@ class Subject:
         traits = _call_plugin("traits", getattr, plugin, "traits", Traits())
         if not isinstance(traits, Traits):
             raise ContractError(f"traits: found a {type(traits).__name__}; needed contactverif.contract.traits.Traits")
+        rules = traits.rules
+        if rules.law is not None and (rules.enforcement, rules.penalty) != ("penalty", "distributed"):
+            law = f"{rules.law!r} with penalty {rules.penalty!r} and enforcement {rules.enforcement!r}"
+            raise ContractError(f"Traits.rules: found law {law}; needed penalty 'distributed', enforcement 'penalty'")
         self.traits: Traits = traits
         self.provides = frozenset(
             part for part in OPTIONAL_PARTS + FAST_PARTS if callable(_call_plugin(part, getattr, plugin, part, None))
@@ -164,8 +168,10 @@ class Subject:
         """Return the penalty of a case in the unit that the formulation takes.
 
         It is ε̂ itself; for a nodal formulation ε̂ × the mean length of the slave segments in the reference, and in space
-        ε̂ × the slave's area over the number of its nodes.
+        ε̂ × the slave's area over the number of its nodes. A law of its own has a penalty that the case says.
         """
+        if OWN_PENALTY in case.parameters:
+            return case.parameter(OWN_PENALTY)
         return self._convert(case.interface, case.penalty)
 
     def _convert(self, interface: Interface, penalty: float) -> float:

@@ -28,7 +28,8 @@ _LONG_EXPONENT = re.compile(r"[eE][-+]?[\d_]{3}")
 class PatchPromises:
     """The interfaces across which a formulation transmits a uniform pressure exactly.
 
-    With a penalty, the pressure is ε̂ |gap|; so a formulation whose law is not linear promises nothing here.
+    With a penalty, the pressure is ε̂ |gap|. A law of its own (trait `law`) has on all meshes the pressure that it has
+    on a flat pair whose inner nodes meet.
 
     Attributes
     ----------
@@ -165,10 +166,20 @@ class Rules:
         The largest distance at which a barrier pushes, over the length of `activation_unit`. A barrier that does not
         state it is asked nothing.
     activation_unit : Literal['segment', 'length']
-        The unit of `activation`: the shortest segment of both surfaces in the reference configuration, or a length.
+        The unit of `activation` and `law_distance`: the shortest segment of both surfaces in the reference
+        configuration, or a length.
     penalty_power : float | None
-        The power of a length in the stiffness of a barrier: in a unit of length that is s times as small, it gets
-        s^penalty_power times its number. It is −1 for a pressure per length, and 0 for a force per length.
+        The power of a length in the stiffness of a barrier or a law of its own: in a unit of length that is s times as
+        small, it gets s^penalty_power times its number. It is −1 for a pressure per length, and 0 for a force per
+        length.
+    law : Literal['linear', 'own'] | None
+        The pressure of distributed springs in one pass. ``"linear"``, and ``None`` where `penalty` is stated: ε̂ |gap|.
+        ``"own"``: the penalty times any function of the gap, the same on every mesh. The harness finds it on one flat
+        pair, so that a factor is not seen, and asks nothing that hangs on a stiffness, on the gap at which contact
+        begins, or on a number of iterations.
+    law_distance : float
+        The gap at which the pressure of a law of its own begins, over the length of `activation_unit`. It is 0 where
+        contact begins in touch.
     """
 
     enforcement: Literal["penalty", "multiplier", "barrier"] = "penalty"
@@ -181,11 +192,20 @@ class Rules:
     activation: float | None = None
     activation_unit: Literal["segment", "length"] = "segment"
     penalty_power: float | None = None
+    law: Literal["linear", "own"] | None = None
+    law_distance: float = 0.0
 
     def __post_init__(self) -> None:
         _check_values(self, "rules")
         _check_number(self, "rules", "activation", 0.0, _FARTHEST)
         _check_number(self, "rules", "penalty_power", -_HIGHEST, _HIGHEST)
+        if self.law_distance != 0:
+            _check_number(self, "rules", "law_distance", 0.0, _FARTHEST, "0, ")
+
+    @property
+    def own_law(self) -> bool:
+        """Return whether springs have a law of their own, which is not known but for the forces that it gives."""
+        return self.law == "own" and self.enforcement == "penalty" and self.penalty == "distributed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
     """
     try:
         with np.errstate(all="ignore"):
+            if subject.traits.rules.own_law:  # Patterns are of forces in proportion to the gap.
+                return ""
             springs = subject.traits.rules.enforcement == "penalty"
             if springs and (text := _diagnose_numbering(subject)):
                 return text

@@ -106,6 +106,7 @@ def property_text(question: Property) -> str:
         ("Dimensions", f"in the plane{in_space}"),
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
+        *([("Not asked of a law of its own", question.linear)] if question.linear else []),
     ]
     answers = []
     for paragraph in question.question.split("\n\n"):

@@ -27,11 +27,11 @@ NOT_LIFTED = "the surfaces cannot be taken apart to a gap within the activation 
 
 
 def activation_distance(interface: Interface, traits: Traits) -> float:
-    """Return the largest distance at which a barrier pushes, a length."""
-    activation = traits.rules.activation or 0.0
+    """Return the largest distance at which a barrier pushes, or a law of its own begins, a length."""
+    activation = (traits.rules.law_distance if traits.rules.own_law else traits.rules.activation) or 0.0
     if traits.rules.activation_unit == "length":
         return activation
-    return activation * min(float(side.lengths(interface.nodes).min()) for side in (interface.slave, interface.master))
+    return activation * min(float(side.heights(interface.nodes).min()) for side in (interface.slave, interface.master))
 
 
 def fit_to_traits(case: Case, traits: Traits) -> tuple[Case, str]:

@@ -25,14 +25,17 @@ from contactverif.contract.property import (
 )
 from contactverif.contract.result import JUDGED_SHARE, OPPOSITE_SIGN, NodalForces, Row, exceeds
 from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
+from contactverif.contract.traits import Traits
 from contactverif.problems.named_states import first_state, flat_in_space, named_case
 from contactverif.problems.open_states import fit_to_traits
+from contactverif.problems.own_law import fit_to_law, is_nonlinear
 from contactverif.sampling.hypothesis_draws import one_thread
 
 STATES = ("a1", "c")  # Flat interfaces that penetrate uniformly.
 LEAST_SHARE = 0.1  # A row says nothing of a formulation that takes less than this share of its cases.
 RAISED = "the property raised "
 ACTS_APART = "it acts where the gap is open, not where it is closed: look at the normal, and the order of master nodes"
+NOT_LINEAR = "; on one flat pair forces are not in proportion to the gap: if that is the law, state rules.law='own'"
 SLOW_CALL = 0.01  # Seconds of a call that are worth a word: the included formulations take 1e-4.
 
 
@@ -63,8 +66,12 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
         if refused:
             return outcome(Verdict.UNDECIDED, refused)
         with one_thread(), np.errstate(all="ignore"):  # A check of the answer reports NaN, not a warning on the way.
-            measurement = question.measure(case, subject)
+            measurement = question.measure(fit_to_law(case, subject), subject)
             verdict, reason = judge(question, measurement)
+            if verdict is Verdict.FAIL and _may_have_own_law(question, case, subject.traits):
+                with suppress(ContractError):
+                    pair = case if "penetration" in case.parameters else named_case(STATES[0])
+                    reason += NOT_LINEAR if is_nonlinear(pair, subject) else ""
     except PluginError as error:
         verdict = Verdict.UNDECIDED if error.cause == "not asked" else Verdict.CRASHED
         return outcome(verdict, f"{error.cause}: {error}")
@@ -75,6 +82,13 @@ def judge_case(question: Property, case: Case, subject: Subject) -> Outcome:
     except Exception as error:  # A mistake of the judge: `verdict_over_all` does not let it pass.
         return outcome(Verdict.UNDECIDED, f"{RAISED}{describe_error(error)}{place_of_error(error)}")
     return replace(outcome(verdict, reason), measurement=measurement)
+
+
+def _may_have_own_law(question: Property, case: Case, traits: Traits) -> bool:
+    """Return whether a law that is not linear may fail so: at a uniform gap, or where linear springs are asked."""
+    rules, uniform = traits.rules, "penetration" in case.parameters
+    springs = rules.enforcement == "penalty" and rules.penalty != "nodal" and rules.law is None
+    return springs and traits.abilities.in_plane and (uniform or bool(question.linear))
 
 
 def judge_if_applicable(question: Property, case: Case, subject: Subject) -> Outcome:
@@ -136,7 +150,7 @@ def verdict_over_all(row: Row) -> tuple[Verdict, str]:
 def forces_on(case: Case, subject: Subject) -> FloatArray | None:
     """Return nodal forces (n_nodes, dim) to draw; None if the plugin returns none or has multipliers."""
     try:
-        formulation = subject.for_case(case)
+        formulation = subject.for_case(fit_to_law(case, subject))
         if formulation.n_multipliers(case.interface):
             return None
         forces = formulation.residual(case.interface, formulation.pair(case.interface, case.z), case.z)

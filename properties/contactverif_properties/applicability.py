@@ -5,6 +5,12 @@ A reason is printed in the table; it is an empty string where the question can b
 
 from contactverif.contract.traits import Traits
 
+# Why a law of its own is not asked: the reasons of `Property.linear`.
+LINEAR_FORCES = "the exact answer is that of springs in proportion to the gap, and the law is the formulation's own"
+LINEAR_BEGINNING = "the law is the formulation's own, and says what springs do in touch"
+LINEAR_STEPS = "the law is the formulation's own, and says how many iterations it takes"
+LINEAR_SIZE = "the law is the formulation's own: a factor of its forces is not seen by any question"
+
 
 def refuse_dependent_multipliers(traits: Traits) -> str:
     """Return why no scene is solved, or an empty string if a solution can be expected.
@@ -30,6 +36,12 @@ def refuse_unstated(traits: Traits, *names: str) -> str:
     """Return which of these rules the traits have to state, in words that a screen collects, or an empty string."""
     missing = ", ".join(f"rules.{name}" for name in names if getattr(traits.rules, name) is None)
     return f"state {missing} to be asked" if missing else ""
+
+
+def law_is_linear(traits: Traits) -> bool | None:
+    """Return True where the traits say that springs are linear, None where they say nothing: a law may be another."""
+    rules = traits.rules
+    return True if rules.law == "linear" or rules.penalty is not None or rules.enforcement != "penalty" else None
 
 
 def refuse_unknown_pressure(traits: Traits) -> str:

@@ -22,6 +22,7 @@ from contactverif.contract.property import WITH_BARRIER, Measurement, Property, 
 from contactverif.contract.result import OPPOSITE_SIGN
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Rules, Traits
+from contactverif.problems.open_states import activation_distance
 from contactverif.strategies import flat_cases, general_cases
 from contactverif.strategies.straight import open_end_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
@@ -157,6 +158,7 @@ REASON = "An open contact is left out, not rounded away."
 OPEN = Quantity("force across an open gap", "0", REASON)
 DISTANT = Quantity("force far from the contact zone", "0", REASON)
 PULL_OF_POINT = Quantity("pull of a contact point", roundoff.SEGMENT_TOLERANCE, roundoff.SEGMENT_REASON)
+BEYOND = 1.01  # A gap beyond which nothing pushes, over the distance at which a barrier or a law of its own begins.
 N_HALVINGS = 40
 ROUNDED = 2.0**12  # The smallest gap in roundings of a position: the gap is known to 2^-11 of itself.
 LEAST_GROWTH = 1.01
@@ -250,6 +252,9 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
     tolerance of a row is u(8X/min(g, ℓ) + 4N). Where springs act twice, an inactive row must have the sign of λ alone.
     A row with another size, or of the other form, breaks the contract.
 
+    A law of its own that begins at a gap (trait `law_distance`) is lifted to 1.01 times that gap, and is not asked for
+    the second number.
+
     A barrier pushes across a gap, up to its activation distance. Beyond that, at 1.01 times and twice the distance,
     its forces must be exactly 0. The fourth number is the factor by which the force on the flat slave grows where
     the gap is halved, down to 2^-40 of what it was or to 4096 u X, where rounding the positions begins to decide the
@@ -283,12 +288,14 @@ def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     """
     formulation, interface, depth = subject.for_case(case), case.interface, case.parameter("penetration")
     size = case.penalty * depth * case.slave_measure
-    raised = FrozenState.with_multiplier(formulation, lift_slave(case, 2 * depth), 0.0)
+    distance = activation_distance(interface, subject.traits)  # 0 where contact begins in touch.
+    gap = max(depth, BEYOND * distance)
+    raised = FrozenState.with_multiplier(formulation, lift_slave(case, depth + gap), 0.0)
     values = {OPEN: float(np.abs(raised.forces).max()) / size}
     one_end, along = _open_all_but_one_end(case), _places_along(case)
     longest = max(float(np.ptp(along[side.faces], axis=1).max()) for side in (interface.slave, interface.master))
     distant = (_slave_places(case) - CLOSED) * np.ptp(along[: interface.n_slave_nodes]) > FAR * longest
-    if not raised.case.n_multipliers and distant.any():
+    if not raised.case.n_multipliers and distant.any() and not distance:
         forces = np.linalg.norm(FrozenState.at(formulation, one_end).forces[: len(distant)], axis=1)
         values[DISTANT] = float(forces[distant].max() / forces.max()) if forces.any() else 0.0
     tolerances = dict.fromkeys(values, 0.0)
@@ -306,7 +313,7 @@ def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
     measurement = Measurement(check_all(values, tolerances), undecided, broken, idle=bool(undecided))
     if values[OPEN] or broken:  # What is broken is so in the state that is drawn.
         worst = worst_force(interface, -raised.forces, 0 * raised.forces, ("force", "needed")) if values[OPEN] else None
-        return measurement.after(f"lifted to a gap of {depth:.4g}", OPEN, finding=worst)
+        return measurement.after(f"lifted to a gap of {gap:.4g}", OPEN, finding=worst)
     of_end = (DISTANT,) if not pulls or values[PULL_OF_POINT] == pulls[0][0] else (DISTANT, PULL_OF_POINT)
     return measurement.after(f"lifted until all is open but {CLOSED:g} of the slave at one end", *of_end)
 
@@ -322,7 +329,7 @@ def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     gaps = gap * 2.0 ** -np.arange(N_HALVINGS + 1)
     pushes = [_push_of_slave(forces_at(each), case) for each in gaps[gaps >= least]]
     size = max(abs(pushes[0]), np.finfo(float).tiny)
-    values = {OPEN: max(float(np.abs(forces_at(share * activation)).max()) for share in (1.01, 2.0)) / size}
+    values = {OPEN: max(float(np.abs(forces_at(share * activation)).max()) for share in (BEYOND, 2.0)) / size}
     if len(pushes) > 1:
         growth = [closer / farther if farther > 0 else 0.0 for farther, closer in pairwise(pushes)]
         # At a free end that a node faces exactly, roundoff may lose a spring at one gap and find it at the next.
@@ -331,7 +338,7 @@ def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     if pushes[0] < 0:
         broken = OPPOSITE_SIGN
     measurement = Measurement(check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH}), broken=broken)
-    action = f"with gaps of {1.01 * activation:.4g} and {2 * activation:.4g}, and halved from {gap:.4g} on"
+    action = f"with gaps of {BEYOND * activation:.4g} and {2 * activation:.4g}, and halved from {gap:.4g} on"
     return measurement.after(action, OPEN, GROWTH)
 
 

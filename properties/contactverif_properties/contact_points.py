@@ -421,6 +421,8 @@ def _refuse_other_decisions(traits: Traits) -> str:
         return "the enforcement is by a multiplier, which decides in its own way"
     if traits.rules.gap == "cells and nodes":
         return "the slave nodes decide, and the points do not"
+    if traits.rules.own_law and traits.rules.law_distance:
+        return "the law begins at a gap, and not in touch"
     return _refuse_without_rule(traits)
 
 
@@ -708,7 +710,7 @@ def projection_forces(case: Case, subject: Subject) -> Measurement:
     if rules.gap is not None:
         values[FOOT] = max((_foot_error(each, reported) for each in reported.passes), default=0.0)
     springs = rules.enforcement == "penalty" and rules.penalty == "distributed" and rules.area is not None
-    if springs and rules.gap not in (None, "cells and nodes"):
+    if springs and not rules.own_law and rules.gap not in (None, "cells and nodes"):
         penalty = 1.0 if state.n_multipliers else subject.penalty(state)
         active = points.select(points.active)
         sizes = penalty * (np.abs(active.gap) + reported.distant)

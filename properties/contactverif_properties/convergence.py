@@ -97,6 +97,7 @@ def _define(studies: Studies) -> Callable[..., Callable[[Measure], Property]]:
         Property.define,
         quantities=studies.quantities,
         cases=Cases.from_list(studies.cases),
+        linear=applicability.LINEAR_FORCES,
         applicable=applicability.refuse_dependent_multipliers,
         series=dict.fromkeys(studies.series, "1"),
         bodies=True,
@@ -269,6 +270,7 @@ def _arc_cases() -> tuple[Case, ...]:
     rank=440,
     quantities=(SLAVE, MASTER, SLAVE_SUM, MASTER_SUM, ALONG, FORCES, SUM, PRESSURE),
     cases=Cases.from_list(_arc_cases),
+    linear=applicability.LINEAR_FORCES,
     promise=lambda traits: None if applicability.refuse_unknown_total(traits) else True,
     applicable=applicability.refuse_unknown_total,
 )

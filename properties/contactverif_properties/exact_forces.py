@@ -264,6 +264,7 @@ ALONG_MASTER = ("closest point", "cells and nodes")  # The rules `gap` that meas
 def knows_linear_total(traits: Traits) -> bool:
     """Return whether the traits say what the total force of a linear gap is."""
     stated = traits.rules.penalty == "distributed" and None not in (traits.rules.area, traits.rules.force_along)
+    stated = stated and not traits.rules.own_law
     return stated and (traits.rules.gap is not None or traits.rules.enforcement == "multiplier")
 
 

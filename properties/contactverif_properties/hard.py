@@ -33,10 +33,18 @@ from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems import block_scenes, flat_states, hard_corner_states
 from contactverif.problems.blocks import pressure_of
+from contactverif.problems.open_states import activation_distance
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif.strategies.beside import beside_cases
 from contactverif_properties import exact_forces, patch_solved, roundoff
-from contactverif_properties.applicability import knows_total, may_act_twice, refuse_dependent_multipliers
+from contactverif_properties.applicability import (
+    LINEAR_BEGINNING,
+    LINEAR_FORCES,
+    knows_total,
+    law_is_linear,
+    may_act_twice,
+    refuse_dependent_multipliers,
+)
 from contactverif_properties.newton_method import end_details
 from contactverif_properties.states import FrozenState
 
@@ -248,7 +256,12 @@ def _outside(force: FloatArray, edges: FloatArray) -> float:
 _define_bounded = partial(Property.define, quantities=(DIRECTION, TOTAL, SIZE))
 
 
-@_define_bounded(id="hard.convex-kink", rank=340, cases=Cases.from_list(hard_corner_states.convex_kink_states))
+@_define_bounded(
+    id="hard.convex-kink",
+    rank=340,
+    cases=Cases.from_list(hard_corner_states.convex_kink_states),
+    linear=LINEAR_FORCES,
+)
 def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
 
@@ -319,15 +332,18 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     either, and contact points are asked for: a kernel may not expect that it pairs nothing. The tolerance is
     u(8X/min(|g|, ℓ) + 4N + 128), in space with D d/h added to X.
 
-    The force points along the common normal. If forces are the derivative of an energy of what is covered, the end
-    that cuts the cover is pushed along the surface by the energy there, ε̂ g²/2 for a length. That is subtracted, unless
-    the trait `force_along` says that contact pushes along a normal, or `symmetric` is False.
+    The force points along the common normal. If forces are the derivative of an energy of what is covered, the end that
+    cuts the cover is pushed along the surface by the energy there, ε̂ g²/2 for a length, and of a law of its own at
+    most ε̂ |g| (|g| + d) if it begins at a gap d. That is subtracted, unless the trait `force_along` says that contact
+    pushes along a normal, or `symmetric` is False.
 
     **Undecided.** Never: what a formulation may choose is inside the bounds.
     """
     traits, gap = subject.traits, case.parameter("penetration")
     may_have_energy = traits.rules.force_along is None and traits.promises.symmetric is not False
-    return _measure_bounded(case, subject, case.penalty * gap**2 / 2 if may_have_energy else 0.0)
+    deepest = gap + activation_distance(case.interface, traits)
+    energy = case.penalty * gap * (deepest if traits.rules.own_law else gap / 2)
+    return _measure_bounded(case, subject, energy if may_have_energy else 0.0)
 
 
 def _promise_no_wild_force(traits: Traits) -> bool | None:
@@ -344,6 +360,7 @@ def _promise_no_wild_force(traits: Traits) -> bool | None:
     id="hard.steep-slave",
     rank=360,
     promise=_promise_no_wild_force,
+    linear=LINEAR_FORCES,
     cases=Cases.from_list(hard_corner_states.steep_slave_states),
 )
 def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
@@ -385,6 +402,8 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
     id="hard.touch",
     rank=140,
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
+    promise=law_is_linear,
+    linear=LINEAR_BEGINNING,
     cases=Cases.from_list(flat_states.touching_states),
     cases_in_space=Cases.from_list(flat_states.touching_face_states),
 )
@@ -676,6 +695,8 @@ def _check_unloaded(
     rank=690,
     quantities=(NO_STRESS, NO_FORCE),
     cases=Cases.from_list(block_scenes.unloaded_scenes),
+    promise=law_is_linear,
+    linear=LINEAR_BEGINNING,
     applicable=refuse_dependent_multipliers,
 )
 def hard_zero_load(case: Case, subject: Subject) -> Measurement:

@@ -348,6 +348,11 @@ def _remote_surface_cases(
     return None if far is None or behind is None else {FAR: far, BEHIND: behind}
 
 
+def _refuse_shortest_segment(traits: Traits) -> str:
+    in_segments = traits.rules.own_law and traits.rules.law_distance and traits.rules.activation_unit == "segment"
+    return "the law begins at a share of the shortest segment, which another body may have" if in_segments else ""
+
+
 @_define(
     id="remote",
     rank=190,
@@ -357,6 +362,7 @@ def _remote_surface_cases(
     cases_in_space=Cases.random(_remote_surface_cases),
     kinds=(FAR, BEHIND),
     asks=WITHOUT_BARRIER,  # The bodies that are added penetrate each other.
+    applicable=_refuse_shortest_segment,
 )
 def remote(case: Case, subject: Subject) -> Measurement:
     """A body that touches nothing, far away or behind the master, changes nothing.
@@ -481,11 +487,15 @@ TURNED_TANGENT = Quantity("error of the tangent after a rotation", roundoff.SEGM
 
 
 def _refuse_unknown_unit(traits: Traits) -> str:
-    if traits.rules.enforcement != "barrier":
+    if not (is_barrier := traits.rules.enforcement == "barrier") and not traits.rules.own_law:
         return refuse_unstated(traits, "penalty")
-    if traits.rules.activation_unit == "length":
-        return "the activation distance of the barrier is a length, which another unit would change"
-    return "" if traits.rules.penalty_power is not None else "the barrier does not state the trait `penalty_power`"
+    if traits.rules.activation_unit == "length" and (is_barrier or traits.rules.law_distance):
+        return f"the {_force_of(traits)} begins at a length, which another unit would change"
+    return "" if traits.rules.penalty_power is not None else f"the {_force_of(traits)} states no `penalty_power`"
+
+
+def _force_of(traits: Traits) -> str:
+    return "barrier" if traits.rules.enforcement == "barrier" else "law"
 
 
 @_define(
@@ -527,7 +537,7 @@ def units(case: Case, subject: Subject) -> Measurement:
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
     # The power of a length in the penalty, so that forces grow with lengths and the tangent stays.
     power = float(1 - dim) if distributed else 0.0
-    if subject.traits.rules.enforcement == "barrier":
+    if subject.traits.rules.enforcement == "barrier" or subject.traits.rules.own_law:
         power = subject.traits.rules.penalty_power or 0.0
     there = FrozenState.at(subject.with_penalty(penalty * factor**power), case_there)
     (forces,), tangents = ask_forces_and_tangents(subject, state)

@@ -21,6 +21,7 @@ from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Call, Subject
+from contactverif.contract.traits import Traits
 from contactverif.mechanics.changed_scenes import change_units, move, snap
 from contactverif.mechanics.linear import scale_factors
 from contactverif.mechanics.newton import MAX_ITERATIONS, End, Trace, solve
@@ -136,12 +137,19 @@ _define = partial(
 )
 
 
+def _promise_few_iterations(traits: Traits) -> bool | None:
+    """Return what the traits promise of the tangent; None where it may have an error, or the law may not be linear."""
+    is_known = applicability.law_is_linear(traits) and not applicability.tangent_error(traits)
+    return applicability.promise_exact_tangent(traits) if is_known else None
+
+
 @_define(
     id="newton.history",
     rank=560,
     quantities=(FINAL_ITERATIONS,),
     series=SERIES,
-    promise=lambda traits: None if applicability.tangent_error(traits) else applicability.promise_exact_tangent(traits),
+    promise=_promise_few_iterations,
+    linear=applicability.LINEAR_STEPS,
 )
 def newton_history(case: Case, subject: Subject) -> Measurement:
     """Once the pairing has settled, Newton's method falls to roundoff in a few iterations.
@@ -381,6 +389,7 @@ STEPS = Quantity(
     rank=570,
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),
+    linear=applicability.LINEAR_FORCES,
     applicable=applicability.refuse_unknown_pressure,
     bodies=True,
 )

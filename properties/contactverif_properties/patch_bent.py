@@ -22,7 +22,7 @@ from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kink
 from contactverif.problems.problem import FORCES
 from contactverif.problems.shrink_fit import FIT, SEGMENTS, FiniteFit, RingStudy, Role, shrink_fit
 from contactverif.problems.uniform_stress import uniform_forces
-from contactverif_properties.applicability import refuse_dependent_multipliers, refuse_unknown_total
+from contactverif_properties.applicability import LINEAR_FORCES, refuse_dependent_multipliers, refuse_unknown_total
 from contactverif_properties.newton_method import end_details
 from contactverif_properties.patch_solved import ITERATIONS, engine_tolerance, is_solved, nearest_to_balance
 from contactverif_properties.states import FrozenState, nearest_sum
@@ -100,6 +100,7 @@ def _promise_mean(traits: Traits) -> bool | None:
     rank=470,
     quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES),
     cases=Cases.from_list(_rings),
+    linear=LINEAR_FORCES,
     promise=_promise_mean,
     applicable=_refuse_unknown_mean,
     bodies=True,
@@ -262,6 +263,7 @@ def _kinked_cases() -> tuple[Case, ...]:
 _define_kinked = partial(
     Property.define,
     cases=Cases.from_list(_kinked_cases),
+    linear=LINEAR_FORCES,
     promise=lambda traits: traits.promises.patch.kinked,
     bodies=True,
 )

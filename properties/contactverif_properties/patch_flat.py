@@ -21,10 +21,13 @@ from contactverif.contract.traits import Traits, parse_forces
 from contactverif.oracle.flat_answers import nodal_spring_weights, nodal_surface_weights
 from contactverif.problems.flat_states import equal_area_states, equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
+from contactverif.problems.own_law import fit_to_law
 from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
 from contactverif.strategies.straight import steep_cases, steep_plane_cases, tilted_cases, tilted_plane_cases
 from contactverif_properties import exact_forces, roundoff
 from contactverif_properties.applicability import (
+    LINEAR_FORCES,
+    LINEAR_SIZE,
     may_act_twice,
     promise_normal,
     promise_single,
@@ -127,8 +130,8 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     """
     stretch = 2.0 ** int(np.random.default_rng(case.seed).integers(-2, 3))
     interface, penetration = case.interface.at(case.interface.nodes * stretch), case.parameter("penetration")
-    stretched = replace(case, interface=interface)
-    state = FrozenState.with_multiplier(subject.for_case(case), stretched, case.penalty * penetration)
+    stretched = fit_to_law(replace(case, interface=interface), subject)
+    state = FrozenState.with_multiplier(subject.for_case(stretched), stretched, case.penalty * penetration)
     exact = exact_forces.forces_of_penetration(case)[: interface.n_slave_nodes].sum(axis=0)
     areas = {"current": exact, "reference": exact * stretch ** (interface.dim - 1)}
     exact = areas.pop(rule := subject.traits.rules.area or "current")
@@ -316,6 +319,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     rank=290,
     quantities=(STATED,),
     cases=Cases.from_list(lambda: tuple(map(named_case, FLAT_NAMES))),
+    linear=LINEAR_FORCES,
     promise=lambda traits: True if traits.evidence.published_forces else None,
     applicable=lambda traits: "" if traits.evidence.published_forces else "the traits state no forces of named cases",
     least_contact=0.0,  # Nothing is asked on a case of which nothing is stated, and one table is better than none.
@@ -403,6 +407,7 @@ PUSH = Quantity(
     cases=Cases.from_list(equal_length_states),
     cases_in_space=Cases.from_list(equal_area_states),
     asks=frozenset({"penalty"}),
+    linear=LINEAR_SIZE,
 )
 def total_stiffness(case: Case, subject: Subject) -> Measurement:
     """The total contact stiffness of a flat interface is ε̂ L, or 2 ε̂ L with two passes.
@@ -425,7 +430,7 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
     space L is the area, and n is the number of slave nodes, 25 or 144; each has the mean area 1.
 
     A law that is not linear has no stiffness. The state is asked again at half the depth, and where the number changes
-    by more than u(8Z/|g| + 4N + 128), it is kept as a detail and not judged.
+    by more than u(8Z/|g| + 4N + 128), it is kept as a detail and not judged, unless the trait `law` says "linear".
 
     **Undecided.** Never.
     """
@@ -438,7 +443,7 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
     (springs, opposite, largest), (shallow, *_) = _springs(case, subject), _springs(half, subject)
     tolerance = roundoff.gap_tolerance(half, depth / 2, roundoff.rounding_distance(case, traits))
     details = {"springs over ε̂ L": springs}
-    if abs(shallow - springs) > 2 * tolerance * abs(springs):
+    if abs(shallow - springs) > 2 * tolerance * abs(springs) and traits.rules.law != "linear":
         return Measurement(details=details)
     passes = 2 if springs > np.sqrt(2) and may_act_twice(traits) else 1
     numbers = [
@@ -565,6 +570,7 @@ def _refuse_unknown_integral(traits: Traits) -> str:
     cases=Cases.random(tilted_cases),
     cases_in_space=Cases.random(tilted_plane_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
+    linear=LINEAR_FORCES,
     applicable=_refuse_unknown_integral,
 )
 def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:

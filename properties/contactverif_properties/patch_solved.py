@@ -24,6 +24,7 @@ from contactverif.mechanics.linear import RANK_ROUNDOFF
 from contactverif.mechanics.newton import NEAR_CONVERGENCE, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.oracle.flat_answers import is_of_class
+from contactverif.problems import own_law
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
@@ -176,12 +177,17 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     Stress error: the largest entry of σ − σ_exact at the Gauss points over p. Slave and master force errors: the
     largest error of a nodal force over p L. Gap error: the largest error of a node's height, or of a
     reported gap, over p/ε̂. Pressure error: the largest error of a reported pressure over p; it is missing where the
-    formulation reports none, or is nodal and so knows forces only.
+    formulation reports none, or is nodal and so knows forces only. A law of its own gets the penalty with which it
+    gives the exact pressure at the exact gap, and the tolerances are those of its stiffness there.
     """
     if isinstance(subject, EngineSubject):
         return _measure_engine(case, subject, penalty)
     scene, pressure = scene_of(case), pressure_of(case, penalty)
-    formulation = subject.for_interface(case.interface, penalty)
+    formulation, stiffness = subject.for_interface(case.interface, penalty), penalty
+    if subject.traits.rules.own_law:
+        own_penalty = own_law.penalty_for(case, subject, penalty, pressure / penalty)
+        formulation = subject.with_penalty(own_penalty)
+        stiffness = max(penalty, own_law.stiffness_at(case, subject, own_penalty, pressure / penalty))
     exact = exact_unknowns(scene, pressure, penalty)
     trace, q = _solve_patch(scene, formulation, exact, pressure / penalty)
     state = replace(case, z=scene.positions(q), penalty=penalty)
@@ -195,7 +201,7 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
         values[GAP] = max(values[GAP], gap)
         if subject.traits.rules.penalty != "nodal":
             values[PRESSURE] = reported
-    roundoff = uniform_tolerances(state, scene, pressure)
+    roundoff = uniform_tolerances(replace(state, penalty=stiffness), scene, pressure)
     tolerances = _tolerances(case, penalty, roundoff.stress) | {PRESSURE: roundoff.pressure}
     return Measurement(check_all(values, tolerances), details=end_details(trace))
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, FloatArray, dense
-from contactverif.contract.case import ACTIVATION, Case
+from contactverif.contract.case import ACTIVATION, FORCE_LENGTH, Case
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.traits import Traits
@@ -62,10 +62,13 @@ def mean_penetration(case: Case, forces: Array) -> float:
     In space the area takes the place of the length L.
 
     Where half passes push the master alone, Σ|R| is that of the master. A barrier has no such penetration; its forces
-    change over the gap, or over what is left of it to the activation distance.
+    change over the gap, or over what is left of it to the activation distance. Those of a law of its own change over a
+    length that the case says.
     """
     if ACTIVATION in case.parameters:
         return case.resolution
+    if FORCE_LENGTH in case.parameters:
+        return case.parameter(FORCE_LENGTH)
     whole = sum_slave_forces(case, forces) or sum_larger_forces(case, forces)
     return whole / (case.penalty * case.slave_measure)
 
@@ -81,8 +84,11 @@ def rounding_distance(case: Case, traits: Traits) -> float:
 def gap_tolerance(case: Case, penetration: float, distance: float | None = None) -> float:
     """Return GAP_TOLERANCE as a number, or STATED_GAP_TOLERANCE for a distance Z at which positions are rounded.
 
-    Where the penetration g, a length, is 0 there is no gap to round, and a force of any size is wrong.
+    Where the penetration g, a length, is 0 there is no gap to round, and a force of any size is wrong. The forces of a
+    law of its own may change over less than g.
     """
+    if FORCE_LENGTH in case.parameters:
+        penetration = min(penetration, case.parameter(FORCE_LENGTH))
     largest = (case.largest_coordinate if distance is None else distance) + normal_rounding(case)
     gap_rounding = 8 * largest / penetration if penetration > 0 else 0.0
     return UNIT_ROUNDOFF * (gap_rounding + 4 * case.n_segments + WEIGHT_ROUNDINGS)

@@ -30,7 +30,7 @@ from contactverif.strategies.flat import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.surfaces import translated_surface_cases
 from contactverif.strategies.translations import translated_cases
 from contactverif_properties import exact_forces, roundoff
-from contactverif_properties.applicability import knows_total, refuse_unknown_pressure
+from contactverif_properties.applicability import LINEAR_FORCES, knows_total, refuse_unknown_pressure
 from contactverif_properties.kinks import explain_by_rounded_decision
 from contactverif_properties.states import FrozenState, ask_forces_and_tangents, freeze_state, move_state
 
@@ -118,6 +118,7 @@ def _local_cases(interface: Interface | None = None) -> dict[str, SearchStrategy
     rank=170,
     quantities=(FORCES_THERE, TOTAL_THERE),
     cases=Cases.random(_local_cases),
+    linear=LINEAR_FORCES,
     kinds=KINDS,
     promise=lambda traits: True if traits.promises.translation_stable else None,
     applicable=refuse_unknown_forces,
@@ -357,6 +358,7 @@ class _TurnedSystem:
     rank=580,
     quantities=(ROUNDINGS,),
     cases=Cases.from_list(stability_scenes),
+    linear=LINEAR_FORCES,
     promise=lambda traits: traits.promises.translation_stable,
     applicable=_refuse_without_solution,
     needs=frozenset({"tangent"}),
@@ -456,7 +458,11 @@ def _step(system: System, matrix: FloatArray, residual: FloatArray) -> FloatArra
 
 
 _define_locking = partial(
-    Property.define, quantities=(DRIFT, ROUGHNESS), cases=Cases.from_list(refined_blocks.wave_cases), bodies=True
+    Property.define,
+    quantities=(DRIFT, ROUGHNESS),
+    cases=Cases.from_list(refined_blocks.wave_cases),
+    bodies=True,
+    linear=LINEAR_FORCES,
 )
 
 

@@ -43,7 +43,18 @@ class SegmentPenalty(Springs):
     def pair(self, interface, z):
         x = z.reshape(-1, 2)
         strips = visible_strips(interface.slave.segments, interface.master.segments, x, self.snap)
-        return {"strips": strips, "active": self._at_points(self._corners(interface, strips, x))[0] < 0}
+        return {
+            "strips": strips,
+            "active": self._at_points(self._corners(interface, strips, x))[0] < self.begins(interface),
+        }
+
+    def begins(self, interface):
+        """Return the gap at which a point begins to push."""
+        return 0.0
+
+    def pull(self, interface, gap):
+        """Return minus the pressure at a gap where a point pushes."""
+        return self.penalty * gap
 
     def _corners(self, interface, strips, x):
         """Return the nodes (..., n, 6, 2) that a strip depends on: two of each segment, and those that cut it."""
@@ -69,15 +80,15 @@ class SegmentPenalty(Springs):
         normal = np.stack([-along[..., 1], along[..., 0]], axis=-1) / size[..., None]
         return gap, s, t, ((end - start) * size)[..., None] * self.weights, normal[..., None, :]
 
-    def _forces(self, active, corners):
+    def _forces(self, interface, active, corners):
         """Return the forces (..., n, 4, 2) on both nodes of the slave segment, and of the master's."""
         gap, s, t, weight, normal = self._at_points(corners)
-        pull = (self.penalty * np.where(active, gap, 0) * weight)[..., None] * normal
+        pull = (np.where(active, self.pull(interface, gap), 0) * weight)[..., None] * normal
         return np.stack([(share[..., None] * pull).sum(axis=-2) for share in (1 - s, s, t - 1, -t)], axis=-2)
 
     def residual(self, interface, pairing, z):
         x = z.reshape(*z.shape[:-1], -1, 2)
-        parts = self._forces(pairing["active"], self._corners(interface, pairing["strips"], x))
+        parts = self._forces(interface, pairing["active"], self._corners(interface, pairing["strips"], x))
         forces, nodes = np.zeros_like(x), self._nodes(interface, pairing["strips"])
         for number in range(4):
             add_at(forces, nodes[:, number], parts[..., number, :])
@@ -86,7 +97,7 @@ class SegmentPenalty(Springs):
     def tangent(self, interface, pairing, z):
         corners = self._corners(interface, pairing["strips"], z.reshape(-1, 2))
         moves = STEP * np.eye(12).reshape(12, 1, 6, 2)
-        slopes = self._forces(pairing["active"], corners + 1j * moves).imag / STEP  # (12, n, 4, 2)
+        slopes = self._forces(interface, pairing["active"], corners + 1j * moves).imag / STEP  # (12, n, 4, 2)
         nodes = self._nodes(interface, pairing["strips"])
         unknowns = 2 * nodes[..., None] + np.arange(2)
         columns = np.broadcast_to(unknowns.reshape(-1, 12).T[:, :, None, None], slopes.shape)

@@ -7,7 +7,7 @@ Each promises what theory says of it, and no more. None may ever be accused. A f
 from collections.abc import Callable
 from typing import Any
 
-from zoo import at_points, on_strips
+from zoo import at_points, laws, on_strips
 
 STRANGERS: dict[str, Callable[..., Any]] = {
     "points first, no tolerance, the last of ties": at_points.PointsFirst,
@@ -32,4 +32,7 @@ STRANGERS: dict[str, Callable[..., Any]] = {
     "springs on the middle line": on_strips.MiddleLine,
     "an energy of what faces the master": on_strips.StripEnergy,
     "a logarithmic barrier on both sides": at_points.LogBarrier,
+    "a law of its own, quadratic": laws.Quadratic,
+    "a law of its own, exponential from a gap on": laws.Exponential,
+    "a law of its own, constant": laws.Constant,
 }
