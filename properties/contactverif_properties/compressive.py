@@ -24,6 +24,7 @@ from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import Rules, Traits
 from contactverif.problems.open_states import activation_distance
 from contactverif.strategies import flat_cases, general_cases
+from contactverif.strategies.closings import KINDS, closing_cases
 from contactverif.strategies.straight import open_end_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties import roundoff
@@ -167,6 +168,15 @@ GROWTH = Quantity(
     "1.01",
     "The force of a barrier has no bound. A law with a bound hardly grows where the gap is small.",
     sense="at least",
+)
+NEAR = 2.0**-8  # The largest gap over the length to the nearest other node, whose forces hardly matter then.
+BESIDE = 2.0**-20  # The step to either side of the border of a vertex, over the gap.
+LEAST_WORK, LARGEST_JUMP = 0.5, 2.0**-10
+WORK = Quantity(
+    "gap times force, over that half-way", "1/2", "Of 1/k, whose sum has no bound, half is left.", sense="at least"
+)
+JUMP = Quantity(
+    "jump at a vertex", "2^-10", "A step of 2^-19 of the gap changes a force gap^-p by p times that; p is below 512."
 )
 CORNER = 0.5  # The cosine of 60°: beyond, a foot along the normal of a point may lie far past the ends of a neighbour.
 HALF = 0.5  # The share of a flat slave that is closed: points and shapes of all formulations find contact there.
@@ -320,26 +330,107 @@ def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
 
 def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     """Open the uniform gap of a flat interface beyond the activation distance, and halve it again and again."""
-    formulation, gap, activation = subject.for_case(case), case.parameter("penetration"), case.parameter(ACTIVATION)
-
-    def forces_at(height: float) -> FloatArray:
-        return FrozenState.at(formulation, lift_slave(case, height - gap)).forces
-
-    least = max(2.0**-N_HALVINGS * gap, ROUNDED * UNIT_ROUNDOFF * case.largest_coordinate)
-    gaps = gap * 2.0 ** -np.arange(N_HALVINGS + 1)
-    pushes = [_push_of_slave(forces_at(each), case) for each in gaps[gaps >= least]]
+    gap, activation = case.parameter("penetration"), case.parameter(ACTIVATION)
+    gaps = _halve_gap(case, gap, gap)
+    outside = [BEYOND * activation, 2 * activation]
+    forces = _forces_at(case, subject, np.multiply.outer(np.array([*gaps, *outside]) - gap, normal_of(case)))
+    pushes = (forces[: len(gaps), : case.interface.n_slave_nodes] @ normal_of(case)).sum(axis=1).tolist()
     size = max(abs(pushes[0]), np.finfo(float).tiny)
-    values = {OPEN: max(float(np.abs(forces_at(share * activation)).max()) for share in (BEYOND, 2.0)) / size}
+    values = {OPEN: float(np.abs(forces[len(gaps) :]).max()) / size}
     if len(pushes) > 1:
-        growth = [closer / farther if farther > 0 else 0.0 for farther, closer in pairwise(pushes)]
+        growth = _growth(pushes)
         # At a free end that a node faces exactly, roundoff may lose a spring at one gap and find it at the next.
         values[GROWTH] = float(np.median(growth[len(growth) // 2 :]))
     broken = "nothing begins within the activation distance" if not pushes[0] else ""
     if pushes[0] < 0:
         broken = OPPOSITE_SIGN
     measurement = Measurement(check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH}), broken=broken)
-    action = f"with gaps of {BEYOND * activation:.4g} and {2 * activation:.4g}, and halved from {gap:.4g} on"
+    action = f"with gaps of {outside[0]:.4g} and {outside[1]:.4g}, and halved from {gap:.4g} on"
     return measurement.after(action, OPEN, GROWTH)
+
+
+def _halve_gap(case: Case, largest: float, least: float) -> FloatArray:
+    """Return gaps, each half of the one before, down to 2^-40 of a length or to where rounding decides them."""
+    gaps = largest * 2.0 ** -np.arange(N_HALVINGS + 1)
+    rounding = UNIT_ROUNDOFF * case.largest_coordinate
+    halved: FloatArray = gaps[gaps >= max(2.0**-N_HALVINGS * least, ROUNDED * rounding)]
+    return halved
+
+
+def _forces_at(case: Case, subject: Subject, shifts: FloatArray) -> FloatArray:
+    """Return the forces (k, n_nodes, dim) that push the nodes where the slave has moved by each of shifts (k, dim)."""
+    states = np.repeat(case.positions[None], len(shifts), axis=0)
+    states[:, : case.interface.n_slave_nodes] += shifts[:, None]
+    pulls = subject.for_case(case).residual(case.interface, None, states.reshape(len(shifts), -1))
+    return -pulls.reshape(states.shape)
+
+
+def _growth(pushes: list[float]) -> list[float]:
+    return [closer / farther if farther > 0 else 0.0 for farther, closer in pairwise(pushes)]
+
+
+@Property.define(
+    id="intersection-free",
+    rank=445,
+    family="invariants",
+    quantities=(GROWTH, WORK, JUMP),
+    cases=Cases.random(closing_cases),
+    kinds=KINDS,
+    promise=lambda traits: traits.promises.never_intersects,
+    applicable=lambda traits: "" if traits.promises.never_intersects is not None else "state `never_intersects`",
+    asks=frozenset({"barrier"}),
+)
+def intersection_free(case: Case, subject: Subject) -> Measurement:
+    """A barrier lets no node of either surface through a vertex or a segment of the other one.
+
+    **Question.** A node of the slave or of the master closes on a vertex, or on a place inside a segment, of the other
+    surface. Does the force that parts them grow so much that its work has no bound? Is it continuous where the node
+    passes from the segment to the vertex?
+
+    **Why it matters.** A barrier of the slave's nodes alone lets a peak of the master into a slave segment; one of
+    segments without their ends lets corners pass. One whose force ends at some gap, or does a bounded work, gives way
+    to a large load. A force that jumps at a border keeps Newton's method from the solution there.
+
+    **How it is judged.** The gap is halved from 1/256 of the length to the nearest other node, down to 2^-40 of the
+    activation distance, or to 4096 u X, where rounding the positions begins to decide it. The force is half of the
+    difference of what pushes the slave and what pushes the master, along the way. It must grow at every halving. Its
+    work has no bound only if the sum of gap × force over all halvings has none. This product may fall as 1/k at the
+    k-th halving does, to half of what it was half-way; with a force that goes with gap^-1/2 it falls to 2^-8.
+
+    Then the node stands over an end of a segment, at a random gap, and steps over the normal there. The last number is
+    the largest change of a nodal force over the largest force. The vertices are convex, or all but straight: there the
+    slope of a distance is continuous. Lengths, slopes, places and gaps are drawn by their exponents. A barrier that
+    weights gaps, or looks from one surface, may be right without this promise.
+
+    **Undecided.** A case whose positions are so large that no gap is left to be halved.
+    """
+    n_slave, normal, gap = case.interface.n_slave_nodes, normal_of(case), case.parameter("penetration")
+    largest = min(gap, NEAR * case.parameter("room"))
+    gaps = _halve_gap(case, largest, case.parameter(ACTIVATION))
+    if len(gaps) < 3:
+        return Measurement(undecided="rounding the positions decides a gap of which nothing is left to be halved")
+    along = _forces_at(case, subject, np.multiply.outer(gaps - gap, normal)) @ normal
+    pushes = (along[:, :n_slave].sum(axis=1) - along[:, n_slave:].sum(axis=1)) / 2
+    growth, (halfway, last) = _growth(pushes.tolist()), (gaps * pushes)[[len(gaps) // 2, -1]]
+    values = {GROWTH: min(growth), WORK: float(last / halfway) if halfway > 0 else 0.0}
+    node, vertex, neighbour = case.parameters["closing"].astype(int)
+    share = 2.0 ** -np.random.default_rng([case.seed, 5]).uniform(0, 16)
+    height = max(ROUNDED**2 * UNIT_ROUNDOFF * case.largest_coordinate, largest * share)
+    if height <= gap:
+        tangent = case.positions[neighbour] - case.positions[vertex]
+        tangent /= np.linalg.norm(tangent)
+        outward = np.array([tangent[1], -tangent[0]])
+        outward *= np.copysign(1.0, outward @ normal * (vertex - n_slave + 0.5))  # Towards the other surface.
+        shifts = case.positions[vertex] - case.positions[node] + height * outward
+        shifts = shifts + BESIDE * height * np.array([tangent, -tangent])
+        both = _forces_at(case, subject, shifts if node < n_slave else -shifts)
+        values[JUMP] = roundoff.ratio(float(np.ptp(both, axis=0).max()), float(np.abs(both).max()))
+    measurement = Measurement(check_all(values, {GROWTH: LEAST_GROWTH, WORK: LEAST_WORK, JUMP: LARGEST_JUMP}))
+    closing = describe_node(case.interface, int(node))
+    measurement = measurement.after(f"{closing} at a gap of {height:.4g} beside a vertex", JUMP)
+    return measurement.after(
+        f"{closing} closed from a gap of {gaps[np.argmin(growth)]:.4g} to half of it", GROWTH, WORK
+    )
 
 
 def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
