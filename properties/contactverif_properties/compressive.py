@@ -349,12 +349,10 @@ def _measure_barrier(case: Case, subject: Subject) -> Measurement:
     return measurement.after(action, OPEN, GROWTH)
 
 
-def _halve_gap(case: Case, largest: float, least: float) -> FloatArray:
+def _halve_gap(case: Case, largest: float, length: float) -> FloatArray:
     """Return gaps, each half of the one before, down to 2^-40 of a length or to where rounding decides them."""
-    gaps = largest * 2.0 ** -np.arange(N_HALVINGS + 1)
-    rounding = UNIT_ROUNDOFF * case.largest_coordinate
-    halved: FloatArray = gaps[gaps >= max(2.0**-N_HALVINGS * least, ROUNDED * rounding)]
-    return halved
+    end = max(2.0**-N_HALVINGS * length, ROUNDED * UNIT_ROUNDOFF * case.largest_coordinate)
+    return np.array([gap for k in range(N_HALVINGS + 1) if (gap := largest * 2.0**-k) >= end])
 
 
 def _forces_at(case: Case, subject: Subject, shifts: FloatArray) -> FloatArray:
