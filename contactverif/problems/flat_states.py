@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, partial, wraps
-from itertools import accumulate, pairwise, product
+from itertools import accumulate, cycle, pairwise, product
 from math import cos, radians, sin
 from operator import mul
 
@@ -176,21 +176,28 @@ def deep_states() -> Iterator[Case]:
 
 @collect
 def node_hit_states() -> Iterator[Case]:
-    """Return flat states in which a slave node or a quarter point is over a master node, or beside it by a rounding.
+    """Return flat states in which a slave node or a quarter point is over a master node, or beside it.
 
-    So ξ is 0, 1, −u or 1 + u of the master segments there.
+    First by a rounding, so that ξ is 0, 1, −u or 1 + u of the master segments there; then by each power of two of a
+    segment, so that two segments overlap on a strip of any width.
     """
     steps = {"on it": 0.0, "one rounding left": -1.0, "one rounding right": 1.0}
-    for (place, x), (label, step), (turn_label, turn) in product(
-        {"slave node": 1.0, "quarter point": 1.25, "middle": 1.5}.items(), steps.items(), _TWO_TURNS.items()
-    ):
+    slave, spots = [0.0, 1.0, 2.0], {"slave node": 1.0, "quarter point": 1.25, "middle": 1.5}
+    for (place, x), (label, step), (turn_label, turn) in product(spots.items(), steps.items(), _TWO_TURNS.items()):
         rounding = 2.0**-52 if turn is UPRIGHT else 2.0**-50  # Turned nodes have two bits more.
         master = flat_master([-1.0, x + step * rounding, 3.0])
-        yield flat_state(f"{place} {label}{turn_label}", [0.0, 1.0, 2.0], master, 2.0**-4, turn=turn)
+        yield flat_state(f"{place} {label}{turn_label}", slave, master, 2.0**-4, turn=turn)
+    for exponent, (place, x) in zip(range(3, 50), cycle(spots.items()), strict=False):
+        turn_label, turn = [*_TWO_TURNS.items()][exponent // 3 % 2]
+        label, step = (("left", -1.0), ("right", 1.0))[exponent // 6 % 2]
+        master = flat_master([-1.0, x + step * 2.0**-exponent, 3.0])
+        yield flat_state(f"{place} 2^-{exponent} {label}{turn_label}", slave, master, 2.0**-4, turn=turn)
 
 
 _EIGHT = (1.0, 0.75, 1.25, 1.0, 0.5, 1.5, 1.25, 0.75), (0.75, 1.25, 1.5, 0.875, 1.25, 0.875, 0.5, 1.0)
-MANY_EIGHTS = 38  # So many of these make more segments than a number of one byte tells apart.
+# So many of these make more segments than a number of one byte tells apart, or more than 1024, and pairs of them more
+# than one of two bytes.
+MANY_EIGHTS, MOST_EIGHTS = 38, 129
 
 
 @collect
@@ -201,15 +208,16 @@ def equal_length_states() -> Iterator[Case]:
     one less at an end, is then no more than 1/n of all springs, whatever the unit of the penalty.
     """
     slave, master = _EIGHT
-    sixteen, many = (
+    sixteen, many, most = (
         (slave * count, (master[0] - 0.125, *master[1:], *master * (count - 2), master[0] + 0.125, *master[1:]))
-        for count in (2, MANY_EIGHTS)
+        for count in (2, MANY_EIGHTS, MOST_EIGHTS)
     )
     for name, (lengths, opposite), depth, turn, penalty in (
         ("8 segments", _EIGHT, 2.0**-4, UPRIGHT, 16.0),
         ("8 segments, upright, soft and shallow", _EIGHT, 2.0**-12, (0, 1, 1), 2.0**-4),
         ("16 segments, stiff", sixteen, 2.0**-4, UPRIGHT, 2.0**20),
         (f"{8 * MANY_EIGHTS} segments", many, 2.0**-4, UPRIGHT, 16.0),
+        (f"{8 * MOST_EIGHTS} segments", most, 2.0**-4, UPRIGHT, 16.0),
     ):
         places, below = ([*accumulate(each, initial=0.0)] for each in (lengths, opposite))
         yield flat_state(name, places, flat_master(below), depth, turn=turn, penalty=penalty)

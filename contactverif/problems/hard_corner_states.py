@@ -43,7 +43,9 @@ def convex_kink_states() -> Iterator[Case]:
     moved by δ. With an averaged direction a point at the vertex may see the gap d, straight up.
     """
     moves = (0.0, *(sign * 10.0**-exponent for exponent in (3, 6, 9, 12) for sign in (1, -1)))
-    for angle, move in product((0.1, 0.5, 1.5), moves):
+    angles = (0.1, 0.5, 1.5)
+    octaves = [(angles[exponent % 3], 2.0**-exponent * (-1) ** (exponent // 3)) for exponent in range(4, 44, 2)]
+    for angle, move in [*product(angles, moves), *octaves]:
         a, depth = angle / 2, _DEPTH
         side = f"{abs(move):.0e} {'right' if move > 0 else 'left'} of" if move else "on"
         master = [(place * cos(a), -abs(place) * sin(a)) for place in (2.0, 1.0, 0.0, -1.0, -2.0)]
@@ -109,6 +111,14 @@ def free_end_states() -> Iterator[Case]:
     for name, first in {"wholly outside by a segment": -3.0, "wholly outside by far": -64.0}.items():
         slave = [(first, -depth), (first + 1, -depth), (first + 2, -depth)]
         yield _bounded_case(name, slave, edges=(up, up), bounds=(0.0, 0.0))
+    for exponent in range(4, 52, 3):
+        strip = 2.0**-exponent * (-1) ** exponent
+        name = f"first node 2^-{exponent} of a segment {'inside' if strip > 0 else 'past the end'}"
+        slave = [(strip, -depth), (0.75, -depth), (1.5, -depth), (3.0, -depth)]
+        yield _bounded_case(name, slave, edges=(up, up), bounds=(2.25 * depth, (3.0 - strip) * depth))
+        slave = [(abs(strip) - 1.5, -depth), (abs(strip) - 1.0, -depth), (abs(strip), -depth)]
+        name = f"all but 2^-{exponent} of a segment outside"
+        yield _bounded_case(name, slave, edges=(up, up), bounds=(0.0, depth))
 
 
 @collect

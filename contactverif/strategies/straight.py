@@ -25,6 +25,7 @@ _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
 _SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.
 # The slopes of a steep slave in sixteenths: 35° to 89°, half of them between 80° and 88°.
 _STEEP_SIXTEENTHS = st.sampled_from([11, 16, 24, 40, 64, *(91, 112, 144, 200, 288, 448), 912])
+_OCTAVES = st.integers(5, 45)
 _LEVEL_OR_TILTED = st.integers(0, 11)
 _SIGNS = st.sampled_from([1, -1])
 _QUARTERS = st.integers(1, 8)  # The depth of the shallow end, in quarters of a unit.
@@ -44,6 +45,14 @@ def tilted_cases(draw: DrawFn) -> Case:
     """
     slave, master, _ = _layout(draw, draw(_SIXTEENTHS) * draw(_SIGNS) / 16)
     return _place(draw, slave, master)
+
+
+@random_source("contactverif.strategies.straight.slight_cases")
+@samples.on_own_meshes
+def slight_cases(draw: DrawFn) -> Case:
+    """Return slaves as `tilted_cases` does, tilted by 2^-5 to 2^-45, near the origin; None for a given mesh."""
+    slave, master, _ = _layout(draw, draw(_SIGNS) * 2.0 ** -draw(_OCTAVES))
+    return _place(draw, slave, master, near=True)
 
 
 @random_source("contactverif.strategies.straight.steep_cases")
@@ -135,9 +144,13 @@ def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, float]:
     return np.column_stack([x, -depth]), master, reach
 
 
-def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, **others: FloatArray) -> Case:
-    """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike."""
+def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, near: bool = False, **others: FloatArray) -> Case:
+    """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike.
+
+    Heights with many bits have none left for a motion that is not `near`.
+    """
     motion, penalty = draw(samples.exact_turns()), draw(samples.PENALTIES)
+    motion = replace(motion, shift=(0, 0)) if near else motion
     seed, shuffle = draw(samples.SEEDS), draw(samples.SHUFFLES)
     slaves, masters, references = ([samples.Chain(points)] for points in (slave, master, slave * [1.0, 0.0] + 0.0))
     interface, order = samples.assemble_chains(slaves, masters, references, motion.scale, shuffle)

@@ -153,11 +153,12 @@ def hard_node_hit(case: Case, subject: Subject) -> Measurement:
     """A point over a master node, or beside it by one rounding, is counted once.
 
     **Question.** A slave node, a quarter point or the middle of a slave segment lies over a master node exactly, or one
-    rounding to its left or right. So ξ is 0, 1, −u or 1 + u. Are the forces as if nothing were special there? In space
-    a master node lies so under a node, an edge or the middle of a slave face, and up to 32 faces meet in either node.
+    rounding to its left or right. So ξ is 0, 1, −u or 1 + u. Or it lies 2^-49, 2^-48, … 2^-3 of a segment beside it, so
+    that two segments overlap on a strip as narrow. Are the forces as if nothing were special there? In space a master
+    node lies so under a node, an edge or the middle of a slave face, and up to 32 faces meet in either node.
 
-    **Why it matters.** A point that belongs to both segments is counted twice by one code, and lost by another. Meshes
-    of two bodies share lines more often than not, so this is the normal case.
+    **Why it matters.** A point that belongs to both segments is counted twice by one code, and lost by another; a strip
+    is below the tolerance of a third. Meshes of two bodies share lines more often than not, so this is the normal case.
 
     **How it is judged.** As in `hard.offset`: the interface is flat, so both segments give the same gap, and the exact
     forces are those of a uniform pressure. The tolerance is u(8Z/|g| + 4N + 128).
@@ -266,7 +267,7 @@ def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
 
     **Question.** The master is a roof with a kink of 0.1, 0.5 or 1.5 rad, and the slave is a parallel roof below it.
-    Its vertex is on the bisector, or 1e-3 to 1e-12 to either side. Is the total force what the gap says, and does it
+    Its vertex is on the bisector, or 2e-13 to 0.06 to either side. Is the total force what the gap says, and does it
     point between the two normals?
 
     **Why it matters.** Where two segments are nearly equally near, one code takes neither, one takes both, and one
@@ -315,9 +316,10 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     """At a free end the force is between that of the inner segments and that of all; beyond it is 0.
 
     **Question.** The first node of the slave is at the free end of a flat master, a rounding beside it, or up to half a
-    segment past it; or the slave is wholly outside. Is the total force between that of the segments that surely face
-    the master and that of all, and 0 outside? In space slave faces lie wholly beside an edge or a corner of the master,
-    1e-12 to 2000 of its longest edges away, alone or with another face in contact.
+    segment past it; or all of the slave is outside, wholly or but for 2^-49 to 2^-4 of a segment. Is the total force
+    between that of the segments that surely face the master and that of all, and 0 outside? In space slave faces lie
+    wholly beside an edge or a corner of the master, 1e-12 to 2000 of its longest edges away, alone or with another face
+    in contact.
 
     **Why it matters.** A body that slides off an edge passes all these states. A master that is continued past its end
     holds it in the air.

@@ -32,7 +32,7 @@ from contactverif_properties.exact_forces import (
     worst_force,
 )
 from contactverif_properties.invariants import BITS
-from contactverif_properties.patch_flat import LOST_END, STEEP, TILTED
+from contactverif_properties.patch_flat import LOST_END, SLIGHT, STEEP, TILTED
 
 NORMAL, SINGLE, NODAL, PUBLISHED = (f"patch.flat.{name}" for name in ("normal", "single", "nodal", "published"))
 
@@ -358,7 +358,8 @@ def test_all_slaves_are_straight_tilted_and_wholly_in_contact() -> None:
     for case in cases_of("patch.tilted.resultant", 60):
         master, slave = directions(case)
         angle = np.degrees(np.arccos(float(master @ slave)))
-        assert 34 < angle < 89.1 if case.kind == STEEP else 3 < angle < 35
+        low, high = {TILTED: (3, 35), STEEP: (34, 89.1), SLIGHT: (0, 2)}[case.kind]
+        assert low <= angle < high
         assert (node_gaps(case) < 0).all()
         n, points = case.interface.n_slave_nodes, case.positions
         heights = (points[:n] - points[0]) @ slave, (points[n:] - points[n]) @ master
@@ -368,9 +369,9 @@ def test_all_slaves_are_straight_tilted_and_wholly_in_contact() -> None:
 
 def test_half_of_the_steep_slaves_are_tilted_by_80_to_88_degrees_and_no_gap_is_longer_than_two_segments() -> None:
     cases = [case for case in cases_of("patch.tilted.resultant", 200) if case.kind == STEEP]
-    assert len(cases) == 100
+    assert len(cases) == 66
     cosines = np.array([float(np.multiply(*directions(case)).sum()) for case in cases])
-    assert (np.abs(np.degrees(np.arccos(cosines)) - 84) < 4).sum() >= 40
+    assert (np.abs(np.degrees(np.arccos(cosines)) - 84) < 4).sum() >= 26
     for case, cosine in zip(cases, cosines, strict=True):
         deepest = -float(node_gaps(case).min()) / cosine
         assert deepest < 2 * case.interface.master.lengths(case.positions).min()
@@ -380,7 +381,7 @@ def test_only_who_states_no_rule_for_gaps_may_overlook_a_steep_slave() -> None:
     blind = with_verbs(ClippedCells, residual=lambda _, *state: np.zeros_like(state[-1]))._make
     question = load_property("patch.tilted.resultant")
     cases = {case.kind: case for case in cases_of(question.id)}
-    assert set(cases) == {TILTED, STEEP}
+    assert set(cases) == {TILTED, STEEP, SLIGHT}
     for kind, gap, verdict in (
         (STEEP, None, Verdict.PASS),
         (TILTED, None, Verdict.FAIL),

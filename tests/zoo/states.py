@@ -60,6 +60,21 @@ def _along_master(interface, x):
     return along[: interface.n_slave_nodes], along[interface.n_slave_nodes :]
 
 
+def _sine_of_tilt(interface, x):
+    """Return the sine of the angle between the first slave segment and the longest master segment."""
+    t = _directions(interface.slave, x)[0]
+    m = _directions(interface.master, x)[interface.master.lengths(x).argmax()]
+    return t[0] * m[1] - t[1] * m[0]
+
+
+def _strip(interface, x):
+    """Return whether a slave node is over a master node but for a small share of the shortest segment."""
+    slave, master = _along_master(interface, x)
+    apart = np.abs(slave[:, None] - master)
+    shortest = min(side.lengths(x).min() for side in (interface.slave, interface.master))
+    return ((apart > 1e-13 * shortest) & (apart < 1e-5 * shortest)).any()
+
+
 def _large_ratio(interface, x):
     lengths = np.append(interface.slave.lengths(x), interface.master.lengths(x))
     return lengths.max() > 1e5 * lengths.min()
@@ -98,6 +113,10 @@ for _name, _property, _condition in (
      lambda i, x: len(i.master) >= 50 and len(i.slave) <= 2),
     ("wrong at tilts of 23° to 29°", FORCES, _one_tilt),
     ("wrong beyond 45°", FORCES, _steep),
+    ("wrong at tilts of 1e-12 to 1e-2", "patch.tilted.resultant",
+     lambda i, x: 1e-12 < np.abs(_sine_of_tilt(i, x)) < 1e-2),
+    ("wrong on strips of overlap of 1e-13 to 1e-5", "hard.node-hit", _strip),
+    ("wrong above 1024 segments", "total-stiffness", lambda i, x: len(i.slave) > 1024),
     ("wrong at a re-entrant vertex", FORCES, lambda i, x: (_turns(i.master, x) < -0.1).any()),
     ("wrong on a closed master", FORCES, lambda i, x: (i.master.neighbours >= 0).all()),
     ("wrong with matching nodes", TRANSMISSION, lambda i, x: np.isin(*_along_master(i, x)).any()),
