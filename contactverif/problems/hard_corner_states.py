@@ -44,7 +44,7 @@ def convex_kink_states() -> Iterator[Case]:
     """
     moves = (0.0, *(sign * 10.0**-exponent for exponent in (3, 6, 9, 12) for sign in (1, -1)))
     angles = (0.1, 0.5, 1.5)
-    octaves = [(angles[exponent % 3], 2.0**-exponent * (-1) ** (exponent // 3)) for exponent in range(4, 44, 2)]
+    octaves = [(angles[exponent % 3], 2.0**-exponent * (-1) ** (exponent // 3)) for exponent in range(5, 44, 2)]
     for angle, move in [*product(angles, moves), *octaves]:
         a, depth = angle / 2, _DEPTH
         side = f"{abs(move):.0e} {'right' if move > 0 else 'left'} of" if move else "on"
