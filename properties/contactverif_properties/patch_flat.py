@@ -554,7 +554,7 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     push, across = float(total @ normal), exact_forces.distance_from_line(total, normal)
     broken = "" if push > 0 else "nothing pushes the slave out of the master"
     values, errors = {OFF_NORMAL: roundoff.ratio(across, float(np.linalg.norm(total)))}, {OFF_NORMAL: across}
-    if (is_known := exact_forces.knows_linear_total(traits)) or knows_total(traits):
+    if (is_known := exact_forces.knows_linear_total(traits)) or (knows_total(traits) and not traits.rules.own_law):
         most = float(np.linalg.norm(exact_forces.exact_slave_forces(case, traits).sum(axis=0)))
         least = most if is_known else 0.0 if case.kind in (STEEP, STEEP_PLANE) else most * cosine
         errors[TILTED_TOTAL] = max(least - push, push - most, 0.0)
