@@ -38,10 +38,11 @@ class Exponential(Quadratic):
 class Constant(Quadratic):
     """The pressure is ε̂ where surfaces penetrate: forces are the derivative of ε̂ times the area of overlap.
 
-    A strip that is open at one end alone is cut where its gap is 0.
+    A strip that is open at one end alone is cut where its gap is 0. Parallel segments begin to touch with all of it, so
+    that forces may jump.
     """
 
-    traits = Quadratic.traits.revise(penalty_power=0.0)
+    traits = Quadratic.traits.revise(penalty_power=0.0, continuity=None)
     places, weights = np.array([0.0, 1.0]), np.array([0.5, 0.5])  # The ends of a strip.
 
     def _forces(self, interface, active, corners):
