@@ -9,11 +9,13 @@ from contactverif.contract.errors import ContractError, NonFiniteError
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.result import OF_TANGENT
 from contactverif.contract.subject import CheckedFormulation, Subject
+from contactverif.contract.traits import PatchPromises
 from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residual_of
 from contactverif.diagnosis.force_patterns import diagnose_forces
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
 _OF_TANGENTS = ("tangent.", "newton.")
+_OF_FORCES = ("balance.", "unilateral", "patch.", "nodal-push", "total-stiffness", "accuracy.", "projection.")
 _SCALES = range(4, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
 # A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
 _SAME_SCALED = 2.0**-20
@@ -40,12 +42,16 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             if all(name.startswith(_OF_TANGENTS) for name in every):
                 text = diagnose_tangent(subject)
                 return f"only the tangent fails: {text}" if text else ""
-            asks_nodes = property_id.startswith("patch.") and not property_id.endswith(".resultant")
+            promises_none = subject.traits.promises.patch == PatchPromises()  # Else its own errors may be no mistake.
+            asks_nodes = promises_none and property_id.startswith("patch.") and not property_id.endswith(".resultant")
             in_full = asks_nodes or subject.traits.promises.patch.flat is True
             text = diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
             if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
                 text = _diagnose_scale(subject)
+            # A right tangent is no derivative of wrong forces, and says nothing of these.
+            if not text and any(name.startswith(_OF_FORCES) for name in every):
+                return ""
             return OF_TANGENT.join(filter(None, (text, diagnose_tangent(subject))))
     except ContractError:
         return ""

@@ -65,7 +65,9 @@ def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
     if rules.penalty == "nodal" or promises.patch.flat is False:
         return  # Other forces than the consistent ones are right there.
     yield _diagnose_digits(subject)
-    yield _diagnose_law(subject)
+    if rules.penalty is not None:  # Else the pressure may be any function of the penetration.
+        yield _diagnose_law(subject)
+    yield _diagnose_free_ends(subject)
     state = flat_state()
     forces = pushes_of(subject, state)
     yield from _uniform_patterns(state, forces, in_full)
@@ -110,11 +112,6 @@ def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
     if same(pushes, factor * exact):
         near = [words for known, words in _MEANINGS.items() if abs(factor - known) <= SAME * abs(known)]
         yield f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
-    is_right = equal(pushes[:n], exact[:n])
-    ends = [node for node in (0, n - 1) if not is_right[node]]
-    if n > 2 and is_right[1:-1].all() and ends:
-        words = " and ".join(f"{_times(pushes[node] / exact[node])} at slave node {node}" for node in ends)
-        yield f"only free ends are wrong: {words}"
     _, factors = _segment_factors(state, pushes, 0)
     lengths = np.diff(state.along[:n])
     if factors is not None and len(factors) > 1:
@@ -129,6 +126,19 @@ def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
     yield _segment_pattern(state, pushes, 0)
     yield _segment_pattern(state, pushes, 1)
     yield _exchange(state, pushes, 1)
+
+
+def _diagnose_free_ends(subject: Subject) -> str:
+    words = set()
+    for master in (MASTER, MASTER[[0, -1]]):  # Of one long segment no part is left out.
+        state = flat_state(places=(SLAVE, master))
+        pushes, exact = (forces[: len(SLAVE)] for forces in (pushes_of(subject, state)[:, 1], state.exact))
+        is_right = equal(pushes, exact)
+        ends = [node for node in (0, len(SLAVE) - 1) if not is_right[node]]
+        if not (is_right[1:-1].all() and ends):
+            return ""
+        words.add(" and ".join(f"{_times(pushes[node] / exact[node])} at slave node {node}" for node in ends))
+    return f"only free ends are wrong: {words.pop()}" if len(words) == 1 else ""
 
 
 def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
@@ -290,7 +300,7 @@ def _find_lost_places(subject: Subject) -> str:
         if len(without):
             low = right[right < without.min()].max(initial=0.0)
             parts[segment] = low, right[right > without.max()].min(initial=1.0)
-    if not parts or idle.all():
+    if not parts or idle.all() or np.sum(np.any(all_idle, axis=0)) == 1:  # One node may lose it by its number.
         return ""
     if len(parts) == len(MASTER) - 1:  # Then the parts are alike, but for the places that were asked.
         lows, highs = zip(*parts.values(), strict=True)
@@ -303,15 +313,20 @@ def _find_lost_places(subject: Subject) -> str:
 
 
 def _find_lost_sums(subject: Subject) -> str:
-    sums = []
-    for lift in (-1.0, *_LIFTS):
-        state = flat_state(places=FINE, depths=DEPTH * np.array([1.0, *[-lift] * (len(FINE[0]) - 1)]))
-        sums.append([float(pushes_of(subject, state)[nodes, 1].sum()) for nodes in state.sides])
-    (slave, master), (alone, opposite) = sums[0], next((pair for pair in sums[1:] if pair[0] > 0), (0.0, 0.0))
-    if not 0 <= master < (1 - SAME) * slave or not alone or abs(opposite - alone) > SAME * alone:
+    def sums(lift: float, pressed: int) -> list[float]:
+        depths = np.where(np.arange(len(FINE[0])) == pressed, DEPTH, -DEPTH * lift)
+        state = flat_state(places=FINE, depths=depths)
+        return [float(pushes_of(subject, state)[nodes, 1].sum()) for nodes in state.sides]
+
+    slave, master = sums(-1.0, 0)
+    if not 0 <= master < (1 - SAME) * slave:
         return ""
-    less = f"the master gets {_times(master / slave)} the force of the slave, and all of it where one point presses"
-    return f"{less}: do several points add to one node (`np.add.at`)?"
+    for pressed in (0, len(FINE[0]) - 1):  # Open points that follow may overwrite a force by 0.
+        alone, opposite = next((pair for lift in _LIFTS if (pair := sums(lift, pressed))[0] > 0), (0.0, 0.0))
+        if alone and abs(opposite - alone) <= SAME * alone:
+            less = f"the master gets {_times(master / slave)} the force of the slave"
+            return f"{less}, and all of it where one point presses: do several points add to one node (`np.add.at`)?"
+    return ""
 
 
 def _diagnose_turned(subject: Subject) -> str:

@@ -411,6 +411,7 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
 @Property.define(
     id="hard.touch",
     rank=140,
+    role="comparison",  # Springs of a wrong size fail here, too, and an exact answer says more of them.
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
     promise=law_is_linear,
     linear=LINEAR_BEGINNING,

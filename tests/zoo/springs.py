@@ -247,7 +247,7 @@ UNSEEN = {
         points=lambda self, start, end: [(np.full_like(start, p), (start.real <= p) & (p < end.real)) for p in PLACES]),
     "last-pair": mistake(
         "The residual is assembled with `+=`, so a node that several pairs share gets the force of the last one only.",
-        r"overwritten, and not added", residual=_last_pair_only),
+        r"`np\.add\.at`", residual=_last_pair_only),
     "fixed-points": mistake(
         "The tangent lacks the change of the places of the Gauss points on the slave: only the lengths of parts vary.",
         r"the part of the places of points",
