@@ -11,11 +11,21 @@ from contactverif.contract.result import OF_TANGENT
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import PatchPromises
 from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residual_of
-from contactverif.diagnosis.force_patterns import diagnose_forces
+from contactverif.diagnosis.force_patterns import diagnose_forces, find_lost_places
+from contactverif.diagnosis.matching_pairs import diagnose_matching
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
 
 _OF_TANGENTS = ("tangent.", "newton.")
-_OF_FORCES = ("balance.", "unilateral", "patch.", "nodal-push", "total-stiffness", "accuracy.", "projection.")
+_OF_FORCES = (
+    "balance.",
+    "unilateral",
+    "patch.",
+    "nodal-push",
+    "stability.",
+    "total-stiffness",
+    "accuracy.",
+    "projection.",
+)
 _SCALES = range(4, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
 # A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
 _SAME_SCALED = 2.0**-20
@@ -33,7 +43,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
         with np.errstate(all="ignore"):
             if subject.traits.rules.own_law:  # Patterns are of forces in proportion to the gap.
                 return ""
-            springs = subject.traits.rules.enforcement == "penalty"
+            springs = subject.traits.rules.enforcement == "penalty" and subject.traits.abilities.in_plane
             if springs and (text := _diagnose_numbering(subject)):
                 return text
             if property_id.startswith("purity"):  # Other patterns mean nothing then.
@@ -45,7 +55,8 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             promises_none = subject.traits.promises.patch == PatchPromises()  # Else its own errors may be no mistake.
             asks_nodes = promises_none and property_id.startswith("patch.") and not property_id.endswith(".resultant")
             in_full = asks_nodes or subject.traits.promises.patch.flat is True
-            text = diagnose_forces(subject, in_full=in_full)
+            text = (springs and find_lost_places(subject)) or diagnose_matching(subject)
+            text = text or diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
             if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
                 text = _diagnose_scale(subject)
@@ -73,7 +84,7 @@ def _diagnose_numbering(subject: Subject) -> str:
 
 
 def _diagnose_scale(subject: Subject) -> str:
-    if subject.traits.rules.enforcement != "penalty":
+    if subject.traits.rules.enforcement != "penalty" or not subject.traits.abilities.in_plane:
         return ""
     reference = _scaled_forces(subject, 1.0)
     for sign, word in ((-1, "smaller"), (1, "larger")):

@@ -90,9 +90,10 @@ def flat_state(
     return FlatState(case, pieces, ends[:-1], np.diff(ends), segments, nodes, n_slave)
 
 
-def residual_of(subject: Subject, interface: Interface, z: FloatArray) -> FloatArray:
-    """Return the forces (n_unknowns,) of a formulation with the penalty of the flat states."""
+def residual_of(subject: Subject, interface: Interface, z: FloatArray, pressure: float = 0.0) -> FloatArray:
+    """Return the residual with the penalty of the flat states; all multipliers, if there are any, have a pressure."""
     formulation = subject.for_interface(interface, PENALTY)
+    z = np.append(z, np.full(formulation.n_multipliers(interface), pressure))
     return formulation.residual(interface, formulation.pair(interface, z), z)
 
 

@@ -28,11 +28,6 @@ from contactverif.diagnosis.flat_state import (
     spell,
 )
 
-_MEANINGS = {  # {factor: what it may mean}
-    2.0: "two passes that each have the whole penalty, or a factor 2",
-    0.5: "a factor ½, such as a mean of two sides that is taken once too often",
-    -1.0: "the sign",
-}
 _MOST_POINTS = 4  # More points of integration are used by hardly anybody.
 # The slave is moved along the master by these lengths. Its nodes pass nearly all of it, and face no node.
 _SHIFTS = (np.arange(-61, 61) + 0.5) / 128
@@ -58,25 +53,23 @@ def diagnose_forces(subject: Subject, *, in_full: bool) -> str:
 
 def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
     rules, promises = subject.traits.rules, subject.traits.promises
-    if rules.enforcement != "penalty":
+    if rules.enforcement != "penalty" or not subject.traits.abilities.in_plane:
         return
-    yield _find_lost_places(subject)
     yield _find_lost_sums(subject)
+    if rules.penalty is not None:  # Else the pressure may be any function of the penetration.
+        yield _diagnose_law(subject)
     if rules.penalty == "nodal" or promises.patch.flat is False:
         return  # Other forces than the consistent ones are right there.
     yield _diagnose_digits(subject)
-    if rules.penalty is not None:  # Else the pressure may be any function of the penetration.
-        yield _diagnose_law(subject)
-    yield _diagnose_free_ends(subject)
     state = flat_state()
     forces = pushes_of(subject, state)
     yield from _uniform_patterns(state, forces, in_full)
     if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
         yield "the forces have a part along the surface, where both normals are the same"
-    state = flat_state(slope=1.0)
-    pushes = pushes_of(subject, state)[:, 1]
-    if not same(pushes, state.exact):  # Other rules of integration give other forces, and are not wrong.
-        yield _exchange(state, pushes, 0) or _exchange(state, pushes, 1)
+    for state in (flat_state(slope=1.0), flat_state(slope=1.0, places=(SLAVE, MASTER[[0, -1]]))):
+        pushes = pushes_of(subject, state)[:, 1]
+        if not same(pushes, state.exact):  # Other rules of integration give other forces, and are not wrong.
+            yield _exchange(state, pushes, 0) or _exchange(state, pushes, 1)
     for places, words in ((FINE, "finer"), (COARSE, "coarser")):
         state = flat_state(places=places)
         for text in filter(None, _uniform_patterns(state, pushes_of(subject, state), in_full)):
@@ -107,42 +100,13 @@ def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> It
 
 
 def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
-    exact, n = state.exact, state.n_slave_nodes
-    factor = float(pushes @ exact / (exact @ exact))
-    if same(pushes, factor * exact):
-        near = [words for known, words in _MEANINGS.items() if abs(factor - known) <= SAME * abs(known)]
-        yield f"every node has {_times(factor)} the exact force{f': {near[0]}' if near else ''}"
-    _, factors = _segment_factors(state, pushes, 0)
-    lengths = np.diff(state.along[:n])
-    if factors is not None and len(factors) > 1:
-        for power, words in ((-1, "is missing"), (1, "is counted twice")):
-            if same(factors, lengths**power):
-                size = f"its force has {_times(factors[1])} the exact size on segment 1"
-                yield f"the length of a slave segment {words}: {size}"
-        sizes = factors * lengths
-        if same(sizes, np.full(len(factors), sizes.mean())):
-            words = ", the mean" if same(sizes[0], lengths.mean()) else ""
-            yield f"each slave segment counts with the same length, {sizes[0]:.4g}{words}, whatever its own"
     yield _segment_pattern(state, pushes, 0)
     yield _segment_pattern(state, pushes, 1)
     yield _exchange(state, pushes, 1)
 
 
-def _diagnose_free_ends(subject: Subject) -> str:
-    words = set()
-    for master in (MASTER, MASTER[[0, -1]]):  # Of one long segment no part is left out.
-        state = flat_state(places=(SLAVE, master))
-        pushes, exact = (forces[: len(SLAVE)] for forces in (pushes_of(subject, state)[:, 1], state.exact))
-        is_right = equal(pushes, exact)
-        ends = [node for node in (0, len(SLAVE) - 1) if not is_right[node]]
-        if not (is_right[1:-1].all() and ends):
-            return ""
-        words.add(" and ".join(f"{_times(pushes[node] / exact[node])} at slave node {node}" for node in ends))
-    return f"only free ends are wrong: {words.pop()}" if len(words) == 1 else ""
-
-
 def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
-    exact, n = state.exact, state.n_slave_nodes
+    exact = state.exact
     parts = [*state.pieces]
     for numbers in state.segments:
         parts += [state.pieces[numbers == segment].sum(axis=0) for segment in np.unique(numbers)]
@@ -151,10 +115,6 @@ def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
         owners = "nodes that belong to several pieces"
         yield f"{owners} have the force of one alone: the others are overwritten, and not added (`np.add.at`)"
     yield _piece_factors(state, pushes)
-    halves = np.zeros(len(pushes))
-    np.add.at(halves, state.ends[1], state.pieces[:, n:].sum(axis=1)[:, None] / 2)
-    if same(pushes[:n], exact[:n]) and same(pushes[n:], halves[n:]):
-        yield "both nodes of a master segment take half of its force, wherever it acts: the shape functions are ½"
     rules = [np.polynomial.legendre.leggauss(n_points) for n_points in range(1, _MOST_POINTS + 1)]
     for side, ends, nodes in zip(("slave", "master"), state.ends, state.sides, strict=True):
         for places, weights in rules:
@@ -278,7 +238,7 @@ def _sum_at_points(state: FlatState, places: FloatArray, weights: FloatArray) ->
     return forces
 
 
-def _find_lost_places(subject: Subject) -> str:
+def find_lost_places(subject: Subject) -> str:
     """Return the places along the master at which a slave node has no force; empty if there are none.
 
     Each node must have the exact force or a whole spring elsewhere: else the places mean nothing.

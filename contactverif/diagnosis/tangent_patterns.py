@@ -48,7 +48,7 @@ class Tangents:
 
 def diagnose_tangent(subject: Subject) -> str:
     """Return which part of the tangent is wrong; empty where it is right, or no rule knows the mistake."""
-    approximate = subject.traits.promises.tangent == "approximate"
+    approximate = subject.traits.promises.tangent == "approximate" or not subject.traits.abilities.in_plane
     if subject.traits.rules.enforcement != "penalty" or approximate or "tangent" not in subject.provides:
         return ""
     pair = _measure(subject, [flat_state(depth=depth) for depth in DEPTHS])
@@ -188,6 +188,9 @@ def _one_part(pair: Tangents) -> str:
     ((name, power),) = powers.items()
     errors, n = pair.errors[blocks[name]], pair.n_slave // 2
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
+    for side, others in (("slave", errors[:, n:]), ("master", errors[:, :n])) if name == "nn" else ():
+        if _is_small(others, pair.scale):
+            return f"entries in n–n are wrong, in rows of the {side} alone"
     part = _part_of(name, nearest, errors, pair) if abs(power - nearest) < _POWER else ""
     if not part:
         return f"entries in {name[0]}–{name[1]} are wrong, and grow like the penetration to the power {power:.2g}"

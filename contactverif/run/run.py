@@ -552,8 +552,8 @@ class Driver:
                 continue
             row, crashed = rows[id(failure)], failure.verdict is Verdict.CRASHED
             explains = failure.breach and row.question.role != "foundation" and "not finite" not in failure.reason
-            # The rules look at plane states. Crashes and most breaches of the contract explain themselves.
-            if subject.traits.abilities.in_plane and not (crashed or explains):
+            # Crashes and most breaches of the contract explain themselves.
+            if not (crashed or explains):
                 others = [wrong.property_id for wrong in wrong_rows(each.row for each in rows.values())]
                 self._report(Progress(subject.name, failure.property_id, "diagnosis", 0, 1))
                 note = partial(self._diagnoses.__setitem__, subject.name)
