@@ -71,8 +71,8 @@ def _patterns(subject: Subject, corners: int) -> Iterator[str]:
     forces, rules = [_pushes(subject, pair) for pair in pairs], subject.traits.rules
     presses = any(map(np.any, forces))
     if rules.enforcement == "penalty" and rules.penalty and _pushes(subject, _pair(surfaces[-1], -DEPTH, 0)).any():
-        where = "there are forces" if presses else "there is no force at all where they penetrate, and there is"
-        yield f"{where} where the surfaces are apart: look at the sign of the gap, and at its test"
+        forces_apart = "there are forces" if presses else "there is no force at all where they penetrate, and there is"
+        yield f"{forces_apart} where the surfaces are apart: look at the sign of the gap, and at its test"
     exact = [pair.areas.sum(axis=0) for pair in pairs]
     if rules.penalty == "nodal":
         of_nodes = [subject.penalty(pair.case) / PENALTY if rules.enforcement == "penalty" else 1.0 for pair in pairs]
