@@ -61,9 +61,9 @@ def test_lists_in_space_are_asked_beside_those_of_the_plane() -> None:
     rows = run([load_subject("vts-ppt"), load_subject("vts-cell-3d")], questions, examples=1, seed=1).rows
     assert {(row.formulation, row.property_id): row.judged for row in rows} == {
         ("vts-ppt", "hard.deep"): 6,
-        ("vts-ppt", "hard.search"): 14,
+        ("vts-ppt", "hard.search"): 20,
         ("vts-cell-3d", "hard.deep"): 6,
-        ("vts-cell-3d", "hard.search"): 18,
+        ("vts-cell-3d", "hard.search"): 19,
     }
 
 
