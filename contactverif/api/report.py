@@ -62,7 +62,6 @@ class Drawing:
         save(self.figure, checked_name(path, SUFFIXES))
 
     def _repr_html_(self) -> str:
-        """Return the picture as SVG."""
         from contactverif_reports.html.pages import svg_inline
 
         return str(svg_inline(self.figure))
@@ -122,7 +121,6 @@ class Failure(Counterexample):
         return "\n    ".join(self.words)
 
     def _repr_html_(self) -> str:
-        """Return the picture, whose title says what fails."""
         return self.draw()._repr_html_()
 
 

@@ -78,10 +78,7 @@ def compare(options: RunOptions, against: Sequence[str], screen: Screen, resume:
 
 
 def _reports_among(names: Sequence[str]) -> list[Path]:
-    """Return the two reports, if the names are those of reports; nothing if they are those of formulations.
-
-    The name of a report ends in .nc, or is that of a file and of no installed formulation.
-    """
+    """Return the two reports, if all names end in .nc, or are those of files and of no installed formulation."""
     installed = registry.formulation_names()
     reports = [
         name for name in names if name.lower().endswith(REPORT) or (name not in installed and Path(name).is_file())

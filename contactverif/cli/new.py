@@ -129,10 +129,7 @@ def _distribution(name: str) -> Distribution | None:
 
 
 def _requirements() -> tuple[str, str]:
-    """Return what installs this contactverif once more: on this machine, and on any other.
-
-    What pip installed from a folder is a folder on this machine, and a release elsewhere.
-    """
+    """Return what installs this once more, on this machine (from a folder, if pip did so) and on any other."""
     release = "contactverif[box]"
     installed = _distribution("contactverif")
     source = json.loads((installed and installed.read_text("direct_url.json")) or "{}")

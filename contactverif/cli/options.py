@@ -211,10 +211,7 @@ def select_names(options: RunOptions) -> tuple[str, ...]:
 
 
 def read_place(options: RunOptions) -> Interface | Case | None:
-    """Return the scene or the interface on which a run asks; None for random ones.
-
-    What the scene of a mesh is, or why it has none, goes to standard error.
-    """
+    """Return the scene or interface on which a run asks; None for random ones. Remarks go to standard error."""
     places = {"--scene": options.scene, "--scene-file": options.scene_file, "--mesh": options.mesh}
     typed = [(option, value) for option, value in places.items() if value is not None]
     if len(typed) > 1:

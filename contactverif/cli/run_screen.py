@@ -239,10 +239,7 @@ def _part(title: str, rows: Sequence[Row], width: int, most: int = _MOST_ROWS) -
 
 
 def _words(row: Row, room: int) -> str:
-    """Return what a line says of a row: the number that is furthest beyond its tolerance, or why there is none.
-
-    Where there is no room for all, it is the name of the number that is cut.
-    """
+    """Return the number that is furthest beyond its tolerance, or why there is none; if room lacks, its name is cut."""
     known_ways = "", results.BROKEN_BY_FAILING, results.BREAKS_LAW, results.NOT_JUDGED
     before = f"{row.unexpected}; " if row.unexpected not in known_ways else ""
     behind = f"; known: {row.known}" if row.known else ""

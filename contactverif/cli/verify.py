@@ -98,10 +98,7 @@ def campaign(options: RunOptions, shard: str, folder: Path) -> int:
 
 
 def merge(folder: Path, out: Sequence[Path], options: RunOptions, audit: bool, share: float, screen: Screen) -> int:
-    """Make the report of a campaign from the journals of its shards, and audit a share of it; return the exit status.
-
-    What fails is shrunk here.
-    """
+    """Make the report of a campaign from its shards' journals, shrink what fails, audit a share; return the status."""
     from contactverif.cli import replay
 
     replay.check_share(share if audit else 1.0)
@@ -289,10 +286,7 @@ def options_of(plan: Plan, command: str, argument: str, typed: RunOptions | None
 
 
 def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
-    """Judge what a job says, show the tables and write the files; return the exit status.
-
-    With a memory, what failed in earlier runs is asked first. On a mesh or a scene of the user's there is none.
-    """
+    """Return the exit status. With a memory, what failed before is asked first; a user's mesh or scene has none."""
     failures = FailureMemory() if memory and job.place is None else None
     with watch_for_stops(job), ExitStack() as stack:
         alone = len(job.options.names) == 1 and job.options.isolation is not Isolation.INLINE

@@ -344,10 +344,7 @@ def host_of(command: tuple[str, ...], name: str, limits: Limits, *, second: bool
 
 
 def _make_room(name: str) -> None:
-    """End the processes that were not asked for the longest time, until there is memory for another one.
-
-    Those of the formulation of that name stay, since the case that is judged may hold a pairing there.
-    """
+    """End the longest idle processes, for memory; not those of this formulation, whose pairings a case may hold."""
     others = [host for (_, other, _, _), host in _HOSTS.items() if other != name and host.has_process]
     for host in sorted(others, key=lambda host: host.last_question):
         if psutil.virtual_memory().available >= _LEAST_MEMORY:

@@ -75,10 +75,7 @@ class Question:
 
 
 class PluginProcess:
-    """A process that may hold one plugin: any program that speaks the protocol.
-
-    A `second` one has another hash seed.
-    """
+    """A process that may hold one plugin: any program that speaks the protocol. A `second` has another hash seed."""
 
     def __init__(self, command: Sequence[str], limits: Limits, *, second: bool = False) -> None:
         _end_at_exit()
@@ -259,15 +256,10 @@ class CpuPinning:
     To wake a process that sleeps on another core takes longer than most answers, and the system likes to wake a process
     on a core that sleeps. So both are held on one core, and let go now and then for one question: then the system may
     move the judge to a better core. A plugin's process starts on one core and stays on one, for what counts cores.
-
-    Attributes
-    ----------
-    core : int
-        The core that it is held on; −1 if it may run on any of its cores.
     """
 
     def __init__(self) -> None:
-        self.core = -1
+        self.core = -1  # It may run on any of its cores.
         self._n_questions = 0
         self._cores: set[int] = set()
         self._until = 0.0
@@ -314,12 +306,7 @@ class ActiveClock:
     """A clock that goes on with each look at a process and its descendants.
 
     A process that sleeps, or was stopped, uses all of the time that passes. One that runs, or waits for a core, uses
-    the time that the processor has worked for it: on a busy machine that is less.
-
-    Attributes
-    ----------
-    seconds : float
-        The time used up since the first look.
+    the time that the processor has worked for it: on a busy machine that is less. `seconds` count from the first look.
     """
 
     def __init__(self, pid: int) -> None:

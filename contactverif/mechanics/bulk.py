@@ -58,10 +58,7 @@ _RIGID = _Matrices(_NONE, _NONE, _EMPTY, _EMPTY, _EMPTY.dot, _EMPTY.dot, _EMPTY,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CondensedBody:
-    """A body condensed onto its contact boundary. S q − g are the forces that contact must supply.
-
-    `condense` makes one.
-    """
+    """A body condensed onto its contact boundary by `condense`. S q − g are the forces that contact must supply."""
 
     body: Body
     load: FloatArray  # (n,) The condensed load g, a force, of nodal forces and of imposed displacements.
@@ -112,7 +109,13 @@ def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
 
     K is dense up to `DENSE_LIMIT` unknowns, else sparse. Gradients are (n_cells, n_points, n_corners, 2).
     """
-    gradients, areas = _evaluate_shapes(body)  # (n_cells, n_points, n_corners, 2), (n_cells, n_points)
+    reference, weights = _reference_cell(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
+    # Differences of nodes first: a cell far from the origin has the same stiffness to the last bit.
+    corners = (body.nodes[body.cells] - body.nodes[body.cells[:, :1]]) @ body.frame  # (n_cells, n_corners, 2)
+    jacobians = np.einsum("pad,eac->epcd", reference, corners)  # ∂x_c/∂X_d
+    (a, b), (c, d) = jacobians.transpose(2, 3, 0, 1)  # Written out, so that another unit of length changes no bit.
+    areas = (a * d - b * c) * weights
+    gradients = np.matmul(reference, np.linalg.inv(jacobians))
     n_cells, n_points, n_corners, _ = gradients.shape
     unit = np.zeros((n_cells, n_points, 3, n_corners, 2))  # Strains of unit displacements.
     unit[:, :, 0, :, 0] = unit[:, :, 2, :, 1] = gradients[..., 0]
@@ -127,17 +130,6 @@ def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
         return np.bincount(places, weights=blocks.ravel(), minlength=size * size).reshape(size, size), gradients
     rows, columns = np.broadcast_arrays(rows, columns)
     return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)), gradients
-
-
-def _evaluate_shapes(body: Body) -> tuple[FloatArray, FloatArray]:
-    """Return gradients of the shape functions, in the body's axes, and weights × areas at the Gauss points."""
-    reference, weights = _reference_cell(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
-    # Differences of nodes first: a cell far from the origin has the same stiffness to the last bit.
-    corners = (body.nodes[body.cells] - body.nodes[body.cells[:, :1]]) @ body.frame  # (n_cells, n_corners, 2)
-    jacobians = np.einsum("pad,eac->epcd", reference, corners)  # ∂x_c/∂X_d
-    (a, b), (c, d) = jacobians.transpose(2, 3, 0, 1)  # Written out, so that another unit of length changes no bit.
-    areas = (a * d - b * c) * weights
-    return np.matmul(reference, np.linalg.inv(jacobians)), areas
 
 
 @cache
@@ -190,7 +182,6 @@ class _ElasticPart:
 
 @lru_cache(maxsize=SHARED_SIZE)
 def _factorise(part: _ElasticPart) -> _Matrices:
-    """Assemble and factorise an elastic body."""
     body = part.body
     unknowns = free_on_contact(body)
     free = ~body.fixed.reshape(-1)
@@ -235,10 +226,7 @@ def forget_condensed() -> None:
 
 
 def _interior_solver(body: Body, matrix: Any) -> tuple[Callable[[FloatArray], FloatArray], IntArray | None]:
-    """Factorise the stiffness (n_interior, n_interior) of the interior.
-
-    Return a function that solves for given forces, and the order (n_interior,) of elimination of a sparse matrix.
-    """
+    """Return a solver for forces on the interior, and the order (n_interior,) of elimination of a sparse matrix."""
     order = None
     if not matrix.shape[0]:
         return lambda forces: forces, order

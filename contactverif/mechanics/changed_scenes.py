@@ -60,10 +60,7 @@ def change_units(scene: Scene, length: float, modulus: float) -> Scene:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def snap(scene: Scene, spacing: float) -> Scene:
-    """Return the scene with each coordinate of each node rounded to a multiple of `spacing`, a power of two.
-
-    The spacing is a length far shorter than a cell, or cells become flat.
-    """
+    """Return the scene with coordinates rounded to multiples of `spacing`, a power of two far shorter than a cell."""
     bodies = tuple(replace(body, nodes=np.rint(body.nodes / spacing) * spacing) for body in scene.bodies)
     return replace(scene, bodies=bodies)
 

@@ -101,10 +101,7 @@ def gap_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
 
 
 def _residuals(scene: Scene, formulation: CheckedFormulation, shifts: FloatArray) -> FloatArray:
-    """Return the residuals of states that are shifted (n_states, n) from one, in batches, on the pairing of that one.
-
-    It has the reference positions and multipliers of 1, so that every point that faces something is active.
-    """
+    """Return residuals near the reference with multipliers of 1, where every point that faces something is active."""
     interface = scene.interface
     state = np.concatenate([interface.nodes.reshape(-1), np.ones(formulation.n_multipliers(interface))])
     pairing = formulation.pair(interface, state)

@@ -348,20 +348,10 @@ class _Deck:
 
 
 def read_deck(path: str, place: str) -> PlainMesh:
-    """Read an input deck of Abaqus or CalculiX.
+    """Read an input deck of Abaqus or CalculiX; it may include files of its `place`, where it may lie compressed.
 
-    Parameters
-    ----------
-    path : str
-        The deck.
-    place : str
-        The same, or where it lies compressed: it may include files of this folder.
-
-    Returns
-    -------
-    PlainMesh
-        Its groups are surfaces and sets. One of an instance is ``INSTANCE.NAME``, and ``NAME`` if no other instance has
-        that name. A set with the name of a surface ends with "(ELSET)" or "(NSET)".
+    Groups are surfaces and sets. One of an instance is ``INSTANCE.NAME``, and ``NAME`` if no other instance has that
+    name. A set with the name of a surface ends with "(ELSET)" or "(NSET)".
 
     Raises
     ------

@@ -153,7 +153,6 @@ def _word(elements: IntArray) -> str:
 
 
 def _interface(points: FloatArray, slave: IntArray, master: IntArray) -> Interface:
-    """Return the interface of oriented lines or faces."""
     used = [np.unique(side) for side in (slave, master)]
     argument = "--slave"
     try:
@@ -168,7 +167,6 @@ def _interface(points: FloatArray, slave: IntArray, master: IntArray) -> Interfa
 
 
 def _pair(mesh: PlainMesh, number: int) -> tuple[str, str]:
-    """Return the slave and the master of a contact pair of a file."""
     listed = "; ".join(f"{each} {slave}, {master}" for each, (slave, master) in enumerate(mesh.pairs, 1))
     if not number and len(mesh.pairs) > 1:
         raise MisuseError("--pair", f"nothing, and {len(mesh.pairs)} contact pairs: {listed}", "one of them")
@@ -305,10 +303,7 @@ def _run_one_way(
 
 
 def _neighbours(argument: str, points: FloatArray, elements: IntArray) -> list[list[tuple[int, bool]]]:
-    """Return for each line or face its neighbours, and whether one of both is to be turned.
-
-    That is so if both lines begin or both end in their node, or both faces run the same way along their edge.
-    """
+    """Return neighbours, and whether one is to be turned: both begin or both end in a node, or run an edge alike."""
     of_lines = elements.shape[1] == SEGMENT
     owners: dict[tuple[int, ...], list[tuple[int, bool]]] = {}
     for number, corners in enumerate(elements.tolist()):

@@ -180,7 +180,6 @@ def _one_shape(blocks: list[IntArray]) -> IntArray:
 
 
 def _points_of_group(sides: MeshSides, option: str, name: str) -> IntArray:
-    """Return the points of all members of a group."""
     group = sides.mesh.groups[find_group(sides.mesh, option, name)]
     return np.unique(np.concatenate([data.reshape(-1) for data in group.values()]))
 
@@ -254,7 +253,6 @@ def _push_slaves(parts: list[_Part], scene: Scene) -> None:
 
 
 def _scene(parts: list[_Part]) -> Scene:
-    """Return the scene of some bodies, slaves first."""
     arrays = [(part.nodes, part.cells, part.contact, *part.material, part.fixed, part.imposed) for part in parts]
     bodies = tuple(Body(*each, name=f"{part.side} body") for each, part in zip(arrays, parts, strict=True))
     n_slaves = sum(part.side == "slave" for part in parts)

@@ -85,7 +85,6 @@ def _unpack(stored: PackedMesh) -> PlainMesh:
 
 
 def _whole(kind: str, packed: PackedArray, n_points: int) -> IntArray:
-    """Return the nodes of cells, checked."""
     data = packed.unpack()
     if data.ndim != 2 or data.dtype.kind not in "iu":
         raise ValueError(f"{kind} cells of type {data.dtype} and shape {data.shape}, not whole numbers in rows")

@@ -181,7 +181,6 @@ def _unite(first: _Members, second: _Members) -> _Members:
 
 
 def _nodes_of(mesh: Any, members: _Members) -> Group:
-    """Return the nodes of the members of a group, by kind."""
     parts: dict[str, list[IntArray]] = {}
     for number, those in sorted(members.items()):
         block = mesh.cells[number]

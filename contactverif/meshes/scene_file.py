@@ -102,7 +102,6 @@ def _call(path: str, name: str) -> Any:
 
 
 def _unpack(stored: _PackedScene) -> Scene:
-    """Return the scene of its arrays, checked."""
     packed = {key: values.unpack() for key, values in stored.bodies.items()}
     facts = {key: np.asarray(values.unpack(), dtype=np.float64) for key, values in stored.facts.items()}
     bodies, slave, master = unpack_bodies(packed)

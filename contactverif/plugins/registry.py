@@ -283,10 +283,7 @@ def _digest_of(packages: frozenset[str]) -> str:
 
 @cache
 def _compile_once(packages: frozenset[str]) -> None:
-    """Let Python keep the compiled files of packages, and of numba, which a plugin's process may not write.
-
-    Without them, as pip can leave them, each start of a process would compile for some seconds. No plugin runs here.
-    """
+    """Let Python keep compiled files: a plugin's process may write none, and would compile for seconds each time."""
     if sys.dont_write_bytecode:
         return
     for name in sorted(packages | {"numba"}):

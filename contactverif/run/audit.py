@@ -50,7 +50,12 @@ def audit(
 
     The formulations and the properties are those of its rows, and the sampling has its size, its seed and its place.
     """
-    start, changes = perf_counter(), _find_changes(run)
+    start = perf_counter()
+    digests = code_digests(run.formulations, list(run.properties))
+    today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
+    recorded = {name: run.provenance.get(name, "unknown") for name in today}
+    changed = [name for name in today if recorded[name] != today[name]]
+    changes = tuple(f"{name}: {recorded[name]} in the report, {today[name]} here" for name in changed)
     subject_of = {subject.name: subject for subject in subjects}
     question_of = {question.id: question for question in questions}
     source_of = cache(sampling.source)
@@ -111,14 +116,6 @@ def check_libraries(run: Run) -> None:
         if stored != today[name]:
             needed = "the library with which it was judged"
             raise MisuseError("REPORT", f"{name}: {stored} in the report and {today[name]} here", needed)
-
-
-def _find_changes(run: Run) -> tuple[str, ...]:
-    digests = code_digests(run.formulations, list(run.properties))
-    today = collect_versions() | machine() | {name.replace(" ", "_"): digest for name, digest in digests.items()}
-    stored = {name: run.provenance.get(name, "unknown") for name in today}
-    changed = [name for name in today if stored[name] != today[name]]
-    return tuple(f"{name}: {stored[name]} in the report, {today[name]} here" for name in changed)
 
 
 class DerivedOutcomes(Outcomes):

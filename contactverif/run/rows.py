@@ -336,10 +336,7 @@ def judge_cases(
 
 
 def _judge_together(question: Property, subject: Subject, cases: Mapping[int, Case]) -> dict[int, Outcome]:
-    """Return {place: outcome} of cases that are judged in lockstep; a failure that nobody stated is judged alone.
-
-    Lockstep saves messages to the plugin's process. It is not tried if the first case fails so or a process has ended.
-    """
+    """Return {place: outcome} of cases in lockstep, which saves messages; a failure nobody stated is judged alone."""
     if not isinstance(subject, RemoteSubject) or len(cases) < 2 or count_ends(subject):
         return {}
     stated = question.promise(subject.traits) is False

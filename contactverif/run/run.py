@@ -250,10 +250,7 @@ class Driver:
         self._report(replace(before, count=1, remark=remark))
 
     def _ask_first_round(self) -> None:
-        """Ask the properties that state a turn about the first of their planned cases, and show at once what is wrong.
-
-        One of these cheap properties fails for most mistakes, and a person need not wait for all that takes long.
-        """
+        """Ask the cheap properties that state a turn about their first cases, and show at once what is wrong."""
         cases: dict[str, tuple[Case, ...]] = {}
         self._scheduler.work(self._first_round(cases))
         kinds = {kind for question in self._questions if question.id in cases for kind in question.kinds}
@@ -306,10 +303,7 @@ class Driver:
             self._report(replace(before, count=before.planned, row=row.row))
 
     def _work_to_first_failure(self) -> None:
-        """Judge until a row is wrong; a run asks nothing more then. One of the first round is judged whole.
-
-        All jobs of some properties end before the row is chosen, so that it depends on no clock.
-        """
+        """Judge until a row is wrong. All jobs of some properties end before it is chosen, so that no clock decides."""
         rows = [row for row in self._first_wrong.values() if row.unexpected]
         rows.sort(key=lambda row: next(each.turn for each in self._questions if each.id == row.property_id))
         while self._groups and not rows:
@@ -444,10 +438,7 @@ class Driver:
         yield Job(draw_chunks, (sampling, question, number), partial(self._add_drawn, rows, number), before)
 
     def _known_block(self, rows: Sequence[OpenRow], number: int) -> Iterable[Job] | None:
-        """Return the jobs that follow from the outcomes of a block.
-
-        None if it is to be drawn: the store lacks an outcome, or a row keeps one of its cases whole.
-        """
+        """Return a block's jobs; None if it is to be drawn: the store lacks an outcome, or a row keeps a case whole."""
         first, examples = number * BLOCK, self._sampling.examples
         count, parts = min(BLOCK, examples - first), []
         for row in rows:

@@ -159,10 +159,7 @@ class CellRecord:
 def run_cell(
     cell: Cell, subjects: Sequence[Subject], seed: int, *, solve: bool = True, dead: Collection[str] = ()
 ) -> CellRecord:
-    """Solve a cell with all formulations in all variants, unless that is done, and time their evaluations in turns.
-
-    Those whose names are in `dead` are asked nothing.
-    """
+    """Solve a cell with all formulations but the `dead` ones, unless that is done, and time evaluations in turns."""
     instances = [pose(cell, RULE.penalty, subject.traits, seed) for subject in subjects]
     whole = WholeScene.of_scene(instances[0].scene) if solve else None
     runs = [RunRecord(_NOT_RUN[:] if subject.name in dead else []) for subject in subjects]

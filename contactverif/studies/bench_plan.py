@@ -46,10 +46,7 @@ class BenchPlan:
 def make_plan(
     scenes: Sequence[str] = (), *, quick: bool = False, instances: int | None = None, processes: int | None = None
 ) -> BenchPlan:
-    """Return the plan of a bench of some scenes, or of all installed problems.
-
-    A quick bench takes the coarsest meshes, few instances and few processes.
-    """
+    """Return the plan of a bench of scenes, or of all problems; a quick one has coarse meshes and few processes."""
     problems = load_problems()
     usual = (QUICK_INSTANCES, QUICK_PROCESSES) if quick else (INSTANCES, PROCESSES)
     n_instances, n_processes = (

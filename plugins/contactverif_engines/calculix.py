@@ -158,10 +158,7 @@ def _materials(layer: Layer) -> list[str]:
 
 
 def _springs_across(layer: Layer) -> list[str]:
-    """Return the lines of springs that hold the slave's nodes across the layer.
-
-    The mortar methods find no pivot where a node of the slave is held there by a support.
-    """
+    """Hold the slave's nodes across the layer by springs: at supports the mortar methods find no pivot."""
     stiffness = _STIFF * float(layer.plane.scene.young.max()) * layer.plane.scene.unit
     first = sum(len(cells) for cells, _ in layer.solids) + 1
     nodes = enumerate(np.unique(layer.slave).tolist(), start=first)

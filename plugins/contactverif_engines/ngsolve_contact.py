@@ -42,7 +42,10 @@ class NGSolve:
         for node, part in np.argwhere(plane.fixed).tolist():
             free.Clear(int(numbers[node, part]))
         u = space.TrialFunction()
-        first, second = _stiffnesses(mesh, plane)
+        young, poisson = np.transpose(plane.materials)
+        lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))  # λ and μ.
+        names = [f"body{body}" for body in range(len(young))]
+        first, second = (mesh.MaterialCF(dict(zip(names, values.tolist(), strict=True))) for values in lame)
         energy, strain = ng.BilinearForm(space), ng.Sym(ng.Grad(u))
         energy += ng.Variation((second * ng.InnerProduct(strain, strain) + first / 2 * ng.Trace(strain) ** 2) * ng.dx)
         contact = ng.ContactBoundary(mesh.Boundaries("slave"), mesh.Boundaries("master"))
@@ -95,11 +98,3 @@ def _make_mesh(plane: PlaneScene) -> Any:
             mesh.Add(Element1D([points[node] for node in edge], index=index))
         mesh.SetBCName(index - 1, name)
     return ng.Mesh(mesh)
-
-
-def _stiffnesses(mesh: Any, plane: PlaneScene) -> list[Any]:
-    """Return Lamé's constants λ and μ of each body as coefficients."""
-    young, poisson = np.transpose(plane.materials)
-    both = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
-    names = [f"body{body}" for body in range(len(young))]
-    return [mesh.MaterialCF(dict(zip(names, values.tolist(), strict=True))) for values in both]

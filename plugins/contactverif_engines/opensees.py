@@ -46,14 +46,17 @@ class OpenSees:
         loaded = float(np.abs(scene.load).sum()) / float(scene.young[~scene.rigid].max())
         size = max(float(np.abs(scene.imposed).max()), float(np.abs(scene.start).max()), loaded)
         tolerance = _CONVERGED * size + _ROUNDED * float(np.abs(scene.nodes).max())
-        converged, n_steps = _run(ops, tolerance, _choose_handler(plane))
+        # "Plain" knows no imposed displacement but 0, and "Transformation" few nodes.
+        many = len(np.unique(scene.slave)) + len(np.unique(scene.master)) > _MANY
+        imposes = (plane.fixed & (plane.imposed != 0)).any()
+        handler = ("Lagrange" if many else "Transformation") if imposes else "Plain"
+        converged, n_steps = _run(ops, tolerance, handler)
         count = range(1, len(scene.nodes) + 1)
         moves = np.array([[ops.nodeDisp(node, part) for part in (1, 2)] for node in count], np.float64)
         ops.wipe()
         return EngineAnswer(moves, converged, n_steps, "" if converged else "analyze failed in one step")
 
     def _add_contact(self, ops: Any, plane: PlaneScene) -> None:
-        """Add an element for each pair of a slave's and a master's chain of edges."""
         scene, number = plane.scene, sum(len(cells) for cells, _ in plane.cells)
 
         def mean_length(chain: list[int]) -> float:
@@ -104,14 +107,6 @@ def _add_supports_and_loads(ops: Any, plane: PlaneScene) -> None:
         ops.sp(node + 1, part + 1, float(plane.imposed[node, part]))
     for node in np.flatnonzero(plane.load.any(axis=1)).tolist():
         ops.load(node + 1, *plane.load[node].tolist())
-
-
-def _choose_handler(plane: PlaneScene) -> str:
-    """Return the handler of supports: "Plain" knows no imposed displacement but 0, and "Transformation" few nodes."""
-    if not (plane.fixed & (plane.imposed != 0)).any():
-        return "Plain"
-    many = len(np.unique(plane.scene.slave)) + len(np.unique(plane.scene.master)) > _MANY
-    return "Lagrange" if many else "Transformation"
 
 
 def _run(ops: Any, tolerance: float, handler: str) -> tuple[bool, int]:

@@ -60,8 +60,6 @@ class SfePy:
 
 
 class _Model:
-    """A plane scene as a domain of sfepy, with its field and its variables."""
-
     def __init__(self, plane: PlaneScene, cells: IntArray, bodies: IntArray) -> None:
         from sfepy.discrete import FieldVariable
         from sfepy.discrete.fem import FEDomain, Field, Mesh

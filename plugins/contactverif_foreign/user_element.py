@@ -31,10 +31,7 @@ from contactverif_foreign.shared_library import Argument, GuardedSlot, SlotRows
 
 
 class Convention:
-    """The arguments of the user elements of a solver. What no method says is zero.
-
-    Each method gets or returns arguments by name.
-    """
+    """The arguments of the user elements of a solver, by name. What no method says is zero."""
 
     name: str
     order: tuple[str, ...]  # The names of the arguments in the order of the call.

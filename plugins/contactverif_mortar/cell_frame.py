@@ -95,10 +95,7 @@ class CellPoint(NamedTuple):
 
 
 def cell_arguments(interface: Interface, cells: Cells, rule: Quadrature) -> tuple[Fields, Fields]:
-    """Return the arrays of segments and cells and those of the rule, as kernels unpack them.
-
-    A length of −1 stands for the current length of a slave segment.
-    """
+    """Return the arrays of segments, cells and rule, as kernels unpack them; a length of −1 is the current one."""
     slave, master = interface.slave, interface.master
     lengths = np.full(len(slave), -1.0) if rule.current else slave.lengths(interface.nodes)
     pairs_and_cuts = map(read_only, (cells.slave, cells.master, cells.cut_low, cells.cut_high))
@@ -270,10 +267,7 @@ def _weigh(written: Weights, x: FloatArray, segments_and_cells: Fields, rule: Fi
 
 @compile_inline
 def _write_shape(shapes: FloatArray, s: int, points: FloatArray, count: int, dual: bool) -> None:
-    """Write the numbers of the shapes on segment s, from c and weights of its points.
-
-    c̄ is measured from a point that is covered. So c − c̄ is as exact as c, however short the covered part is.
-    """
+    """Write the shapes of segment s. c̄ is measured from a covered point, so that c − c̄ is as exact as c."""
     shapes[s, ORIGIN], shapes[s, MEAN], shapes[s, KAPPA] = 0.0, 0.0, 0.5
     shapes[s, VARIANCE], shapes[s, EXTENT] = 0.0, 0.0
     if not dual:

@@ -128,10 +128,7 @@ def turn_of_ends(
 def _average_turn(
     row: FloatArray, x: FloatArray, slave: IntArray, other: int, t: Vector, n: Vector, first: int, second: int
 ) -> None:
-    """Change the turn of a segment's own normal n into that of the average with segment `other`.
-
-    The nodes of `other` are the local nodes `first` and `second`.
-    """
+    """Average `row`, the turn of n, with that of segment `other`, whose local nodes are `first` and `second`."""
     length, t_other, n_other = frame(node(x, slave[other, 0]), node(x, slave[other, 1]))
     total = (n[0] + n_other[0], n[1] + n_other[1])
     squared = dot(total, total)

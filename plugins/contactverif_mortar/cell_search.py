@@ -146,11 +146,7 @@ def _find_candidates(
     members: IntArray,
     table: FloatArray,
 ) -> int:
-    """Keep those of the first `members` that overlap the slave segment and are near enough; return how many.
-
-    They and their overlaps are written into `members` and `table`, sorted by the lower ends of their overlaps, then by
-    number.
-    """
+    """Keep the members that overlap the slave segment and are near, by lower ends, then numbers; return how many."""
     (master, master_longest), count = masters, 0
     for place in range(n_members):
         m = members[place]

@@ -58,10 +58,7 @@ class Weighting:
     quadrature: Quadrature  # The points on a cell, and the configuration in which lengths are measured.
 
     def carrying(self, interface: Interface, pairing: Pairing, x: Array) -> Weighted:
-        """Compute points, shapes and weighted gaps at the positions x (n_states, n_nodes, 2).
-
-        They lie on the cells whose slave segment has an active node; the others carry no pressure.
-        """
+        """Compute points, shapes, gaps at x (n_states, n_nodes, 2) on cells of segments with an active node."""
         cells = near(Cells.from_pairing(pairing), pairing["active"], interface)
         return weigh_points(interface, cells, self.quadrature, x, self.dual, self.alike)
 

@@ -230,10 +230,7 @@ class Force(NamedTuple):
 def add_tangent(
     csr: Csr, x: FloatArray, multipliers: FloatArray, surfaces: Fields, points: Fields, options: Fields
 ) -> None:
-    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`.
-
-    `csr` has its indptr, indices and data.
-    """
+    """Add the derivative of `residual` at one state to a matrix with the pattern of `list_couplings`."""
     reference, slave, master, _ = surfaces
     segment, other, slot, partner, active = points
     places, weights, area_from, penalty = options
@@ -287,10 +284,7 @@ def _add_linearized_forces(
 def _add_turned_force(
     csr: Csr, row: int, column: int, v: Contact, force: float, d_force: Vector, omega: Vector
 ) -> None:
-    """Add Δ(force n) = n Δforce + force Δn, with Δn = −t ω, to the rows of one node and the columns of another.
-
-    `d_force` and `omega` are gained for a displacement of the node `column`.
-    """
+    """Add Δ(force n) = n Δforce + force Δn, Δn = −t ω; `d_force` and `omega` are for displacements of node `column`."""
     normal, t = v.normal, v.t
     xx = normal[0] * d_force[0] - force * t[0] * omega[0]
     xy = normal[0] * d_force[1] - force * t[0] * omega[1]

@@ -84,11 +84,7 @@ class TwoPass:
         return scipy.sparse.coo_array((values, (rows, columns)), shape=(z.size, z.size))
 
     def _contact_points(self, interface: Interface, pairing: Pairing | None, z: FloatArray, /) -> ContactPoints:
-        """Return the points of both passes, each with the gap, area and pressure of its own pass.
-
-        The points of the second pass lie on the master, and their roles are exchanged (`on_master`). The forces
-        pressure × weight of both passes add up.
-        """
+        """Return the points of both passes, the second with exchanged roles (`on_master`); their forces add up."""
         first, second = (
             self._inner.contact_points(each.interface, each.part(pairing), z[each.places])
             for each in self._passes(interface)

@@ -120,10 +120,7 @@ def _write_couplings(
 def _insert_point(
     nodes: NumberArray, start: int, place: int, master: IntArray, neighbours: IntArray, area: Area, j: int
 ) -> int:
-    """Insert the nodes of one virtual slave node with one or the WHOLE of its master segments; return the list's end.
-
-    The list is not complete if it has more than MOST_NODES.
-    """
+    """Insert the nodes of a point with one or the WHOLE of its segments; return the end, past MOST_NODES if cut off."""
     if area.frame != NOT_CUT:
         place = _insert_segment(nodes, start, place, master, area.frame)
     if area.cut_p != NOT_CUT:
@@ -309,7 +306,6 @@ def _cut_end(
 
 @compile_inline
 def _part_under_area(x_f: Vector, x_m: Vector, v: VirtualSlaveNode, area: Area, j: int) -> Part:
-    """Return the part of master segment j with the nodes f and m, and what its derivative needs."""
     fm = minus(x_m, x_f)
     length, rise = dot(fm, v.t), dot(fm, v.normal)
     a, b, a_moves, b_moves, a_lever, b_lever = 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
@@ -626,7 +622,6 @@ def _add_part_forces(
 
 @compile_inline
 def _add_constraint(local: FloatArray, push: FloatArray, point: LinearizedNode) -> None:
-    """Add the constraint −g × size of a multiplier, and its Δ."""
     v, force, at, _, _ = point
     row, normal, t = at.multiplier, v.normal, v.t
     push[row] -= v.g * force.size

@@ -71,10 +71,7 @@ class Areas(NamedTuple):
 
 @compile_kernel
 def middle_of_part(i: int, n: int, unity: float) -> float:
-    """Return where on its slave segment the virtual slave node i lies, c in [−1, 1]; there are n on each segment.
-
-    The number `unity` is 1 in the type of the result.
-    """
+    """Return where virtual slave node i of n lies on its segment, c in [−1, 1]; `unity` is 1 in the result's type."""
     return (2 * (i % n) + 1) * unity / n - 1
 
 
@@ -190,10 +187,7 @@ def _projected_length(x: FloatArray, master: IntArray, segment: int, t: Vector) 
 def _cover(
     x: FloatArray, master: IntArray, neighbours: IntArray, m: int, x_a: Vector, x_b: Vector, c_p: float, c_q: float
 ) -> tuple[float, float, int, int]:
-    """Cut the area of competence [c_q, c_p] to what faces the master, in the frame of master segment m.
-
-    Return c_p, c_q, and the nodes that cut them. Nothing is left where c_p ≤ c_q.
-    """
+    """Cut [c_q, c_p] to what faces the master; return c_p, c_q (nothing is left if c_p ≤ c_q) and the cutting nodes."""
     cut_p = cut_q = NOT_CUT
     _, t, _ = frame(node(x, master[m, 0]), node(x, master[m, 1]))
     half = dot(minus(x_b, x_a), t) / 2  # s gains this for each unit of c

@@ -126,10 +126,7 @@ def plane_areas(corners: Array) -> Array:
 
 
 def evaluate_shapes(corners: Array, points: Array) -> Array:
-    """Return the shape functions (..., n_points, n_corners) of faces (..., n_corners, 2).
-
-    The points are (..., n_points, 2).
-    """
+    """Return shape functions (..., n_points, n_corners) of faces (..., n_corners, 2) at points (..., n_points, 2)."""
     arm = points - corners[..., :1, :]
     if corners.shape[-2] == TRIANGLE:
         first, second = corners[..., 1:2, :] - corners[..., :1, :], corners[..., 2:, :] - corners[..., :1, :]

@@ -357,10 +357,7 @@ def _differentiate_forces(
 def _set_row(
     row: FloatArray, slopes: FloatArray, room: FloatArray, metric: tuple[float, float, float], push: float
 ) -> None:
-    """Write the derivative of a push along n by moves of the nodes along e^1, e^2, n (N_NODES, 3); it grows with J.
-
-    `slopes` (9,) are its derivatives by s_j, t_j and h_j.
-    """
+    """Write the derivative of a push along n by moves along e^1, e^2, n, from its `slopes` by s_j, t_j and h_j."""
     turn_1, turn_2 = 0.0, 0.0
     for d in range(3):
         row[1, d], row[2, d] = 0.0, 0.0

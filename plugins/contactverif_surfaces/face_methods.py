@@ -455,10 +455,7 @@ def _nodes_and_faces(interface: Interface, nodes: IntArray, faces: IntArray) -> 
 
 
 def _feet(corners: Array) -> CellPoints:
-    """Return the feet of nodes on faces (..., n, n_corners + 1, 3), the node last.
-
-    The face takes the place of the slave in the view, so that its normal is that of the gap.
-    """
+    """Return feet on faces (..., n, n_corners + 1, 3), the node last; the face is the view's slave, for its normal."""
     view = SlaveView.of_corners(corners[..., :-1, :], corners[..., -1:, :])
     shape = evaluate_shapes(view.slave, view.master)  # (..., n, 1, n_corners)
     gap = view.master_height - (shape * view.slave_height[..., None, :]).sum(axis=-1)

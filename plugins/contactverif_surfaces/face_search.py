@@ -300,10 +300,7 @@ def _cut_by_edge(slave: FloatArray, i: int, width: float, cell: Fields, count: i
 
 @compile_part
 def _set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArray) -> None:
-    """Write the middle of a cell, the mean of its corners, and the plane of its master face, seen from the slave.
-
-    The plane of a warped quadrilateral is that of its diagonals, through the mean of its corners.
-    """
+    """Write the middle of a cell and the plane of its master face: that of its diagonals, through its corners' mean."""
     row[MIDDLE_X], row[MIDDLE_Y], row[HEIGHT] = 0.0, 0.0, 0.0
     for v in range(count):
         row[MIDDLE_X] += places[v, 0] / count

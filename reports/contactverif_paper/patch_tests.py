@@ -87,8 +87,6 @@ class PatchSetup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curve:
-    """The pressure that one formulation leaves on a scene."""
-
     x: Annotated[FloatArray, sparse_column("point", schema.LENGTH, "reference coordinate on the paper's axis")]
     pressure: Annotated[FloatArray, sparse_column("point", "1", "contact pressure over the exact one")]
     # True at the formulation's own contact points; else nodal forces over the nodes' shares of the interface.
@@ -313,7 +311,6 @@ def _range_statement(patch: _PatchSolution) -> Statement:
 
 
 def _plot_pressures(tests: PatchTests) -> Figure:
-    """Draw one panel for each scene, or for a scene and its close-up, with the paper's axes."""
     views = [(patch, patch.setup.axis) for patch in tests.patches]
     views += [(patch, patch.setup.close_up) for patch in tests.patches if patch.setup.close_up]
     figure, panels = figure_style.new_panels(3.6 if len(views) > 1 else 3.4, len(views))
@@ -376,7 +373,6 @@ def _plot_penetrations(tests: PatchTests) -> Figure:
 
 
 def _plot_meshes(tests: PatchTests) -> Figure:
-    """Draw the undeformed meshes of both bodies of the first patch test, and the pressure on them."""
     figure = figure_style.new_figure(3.6)
     axes = figure.subplots()
     axes.set_axis_off()

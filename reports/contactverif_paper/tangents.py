@@ -67,8 +67,6 @@ _STEPS_BEYOND = 6  # Newton steps that are taken behind the solution, for the st
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _History:
-    """The way of Newton's method to a solution."""
-
     formulation: PaperFormulation
     # The first two, (n_iterates,), go up to the solution.
     residuals: Annotated[
@@ -313,7 +311,6 @@ class _Tangents:
 
 @cache
 def _tangents() -> _Tangents:
-    """Compute the tangents of VTS-ME, of both versions of VTS-PPT, and of segment-to-segment."""
     rows = np.array([_tangent_row(formulation) for formulation in TANGENT_FORMULATIONS])
     return _Tangents(rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3].astype(np.int64))
 

@@ -84,7 +84,6 @@ class RowNumbers:
 
 
 def _facts(info: PropertyInfo, outcome: Outcome) -> tuple[Any, ...]:
-    """Return verdict, margin, order, details, closest number, kind and seconds of one case."""
     measurement, case = outcome.measurement, outcome.summary
     closest = max(checked_numbers(info, measurement), key=lambda number: number.ratio, default=None)
     margin = nan if closest is None else closest.ratio

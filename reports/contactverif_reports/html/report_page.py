@@ -131,7 +131,6 @@ def _examples(run: Run, path: str) -> list[dict[str, Any]]:
 
 
 def _figure(example: Counterexample) -> Markup:
-    """Return the figure of a case, with the forces that the run keeps of it."""
     from contactverif_reports.plot.case_figures import make_mesh_figure  # Importing matplotlib is slow.
 
     forces = example.row.forces

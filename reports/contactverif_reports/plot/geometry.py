@@ -111,7 +111,6 @@ def segment_lengths(case: Case) -> list[FloatArray]:
 
 
 def _chords(surface: Surface, positions: FloatArray) -> FloatArray:
-    """Return vectors (n_segments, 2) from first to second node."""
     return positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
 
 

@@ -75,7 +75,6 @@ def choose_pen(number: int) -> Pen:
 
 
 def _plot_pressures(axes: Axes, solved: SolvedScene, side: Literal["slave", "master"]) -> None:
-    """Draw the pressure along one side of the interface, for each formulation."""
     order = [index for index, its_side in enumerate(solved.sides) if its_side == side]
     for number, solution in enumerate(solved.solutions):
         along, pressures, look = solved.along, solved.node_pressures(solution), choose_pen(number)
