@@ -312,10 +312,7 @@ class RemoteFormulation(Prefetching):
 
 
 class RemotePairing(Pairing):
-    """A pairing that the process of a plugin keeps. It comes here, and is checked, when it is looked into.
-
-    The process keeps it as long as this object is there.
-    """
+    """A pairing that a plugin's process keeps as long as this is there. It comes, and is checked, when looked into."""
 
     __slots__ = ("_content", "_host", "_interface", "_question", "_started")
 

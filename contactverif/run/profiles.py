@@ -26,10 +26,7 @@ class Profile:
     seed: int | None  # The seed of all cases; None means a fresh seed in every run.
 
     def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
-        """Return the profile with the numbers of the user and with a seed, which can be printed and used again.
-
-        Where neither the user nor the profile names a seed, it is the fresh one, or a new one.
-        """
+        """Return the profile with the numbers of the user, and the seed of either, else the fresh one, or a new one."""
         examples = self.examples if examples is None else examples
         seed = self.seed if seed is None else seed
         if not 1 <= examples <= MOST_EXAMPLES:

@@ -245,10 +245,7 @@ class PatchTests:
             yield self.study.statement(self)
 
     def groups(self) -> dict[str, Group]:
-        """Return patch tests, forces and numbers beside them, a group each.
-
-        Nothing stands where a figure does not show a formulation.
-        """
+        """Return patch tests, forces and numbers beside them, a group each; nothing where a figure shows none."""
         patches, rows = self.patches, tuple(self.formulations)
         cells = [[patch.curves.get(row) for row in rows] for patch in patches]
         comment = "pressures at virtual slave nodes where at_points, else nodal forces over the nodes' shares"

@@ -175,10 +175,7 @@ def total_ratio(cost: Cost, reference: Cost, share: float) -> Ratio:
 
 
 def runtimes(results: BenchResults, formulation: str, scene: str, number: str) -> FloatArray:
-    """Return the seconds (n,) of all evaluations, or of all factorisations, to each target on each instance.
-
-    They are infinite where a target is not reached.
-    """
+    """Return seconds (n,) of all evaluations, or factorisations, to each target on each instance; infinite if not."""
     parts = []
     for target in results.targets[scene]:
         cost = cost_of(results, formulation, scene, target)

@@ -65,7 +65,14 @@ def render(template_name: str, *, package: str = "contactverif_reports.html", **
     What is not `Markup` is escaped; a name that the template asks for and the context lacks is an error. A figure that
     stands in the page several times gets ids of its own each time.
     """
-    return _with_distinct_ids(_environment(package).get_template(template_name).render(context))
+    counts: dict[str, int] = {}
+
+    def with_own_ids(match: re.Match[str]) -> str:
+        name = match[1]
+        counts[name] = counts.get(name, 0) + 1
+        return match[0] if counts[name] == 1 else match[0].replace(name, f"{name}-{counts[name]}")
+
+    return _INLINED.sub(with_own_ids, _environment(package).get_template(template_name).render(context))
 
 
 def write_page(path: str | os.PathLike[str], html: str, argument: str = "--out") -> None:
@@ -182,18 +189,6 @@ def _prefix_ids(root: ElementTree.Element, prefix: str) -> None:
         if (id_ := element.attrib.pop("id", None)) in used:
             element.set("id", f"{prefix}-{id_}")
     root.set("data-figure", prefix)
-
-
-def _with_distinct_ids(html: str) -> str:
-    """Make the ids distinct, so that a repeated figure refers to its own parts, not to those of the first."""
-    counts: dict[str, int] = {}
-
-    def with_own_ids(match: re.Match[str]) -> str:
-        name = match[1]
-        counts[name] = counts.get(name, 0) + 1
-        return match[0] if counts[name] == 1 else match[0].replace(name, f"{name}-{counts[name]}")
-
-    return _INLINED.sub(with_own_ids, html)
 
 
 # Strips: a histogram of the margins of the cases of a row, as a small SVG that fits into a table.

@@ -135,10 +135,7 @@ class SolvedScene:
 
 
 def pressures_across(body: Body, stresses: FloatArray) -> FloatArray:
-    """Return −σ across the first axis of a body, along which its interface lies, in each cell.
-
-    `stresses` (n_cells, 3) are xx, yy and xy in global axes.
-    """
+    """Return −σ across the first axis of a body in each cell, of `stresses` (n_cells, 3): xx, yy, xy in global axes."""
     x, y = body.axis
     xx, yy, xy = stresses.T
     pressures: FloatArray = 2 * x * y * xy - y * y * xx - x * x * yy
